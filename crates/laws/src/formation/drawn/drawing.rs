@@ -1,0 +1,149 @@
+//! What is drawn, and its slots.
+
+use super::error::DrawingError;
+use super::limits::MAX_DRAWN_SLOTS;
+use super::mask::Mask;
+use super::outline::{Curves, Point, Region, regions};
+use super::picture::{Ink, mask};
+use super::spread::spread;
+use super::{svg, text, walk};
+use crate::formation::Formation;
+use tautline_core::swarm::{Rows, set_row};
+
+/// Samples for each slot; odd, so that the middle of a part of a line is one.
+const SAMPLES: usize = 33;
+/// Samples in all, unless slots ask for more.
+const LEAST_SAMPLES: usize = 4097;
+
+/// Pixels along the longer side of an area, and the most where many slots ask for more.
+const PIXELS: usize = 1024;
+const MOST_PIXELS: usize = 8192;
+
+/// Letters, lines or areas in the plane, of a size still to be chosen.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    drawn: Drawn,
+    /// Letters that each need a slot.
+    letters: usize,
+}
+
+#[derive(Clone, Debug)]
+enum Drawn {
+    Lines(Vec<Region>),
+    Areas(Vec<Region>),
+    Pixels(Mask),
+}
+
+impl Drawing {
+    /// The inside of letters, lines of text below each other.
+    ///
+    /// # Errors [`DrawingError`] for a character that the font does not have, more than
+    /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS), or blanks alone.
+    pub fn text(text: &str) -> Result<Self, DrawingError> {
+        let letters = text::letters(text)?;
+        Ok(Self { drawn: Drawn::Areas(regions(&letters, false)?), letters: letters.len() })
+    }
+
+    /// SVG path data (`M 0 0 L 4 3 ...`, y downwards): its lines, or what they surround.
+    ///
+    /// # Errors
+    /// [`DrawingError`] for data that cannot be read, are not finite, or draw nothing.
+    pub fn path(data: &str, filled: bool) -> Result<Self, DrawingError> {
+        Self::curves(&svg::path(data)?, filled)
+    }
+
+    /// An SVG file: the lines of its visible shapes, or what they surround. What is written in letters or holds pixels
+    /// is not drawn, and nothing that the file refers to is read.
+    ///
+    /// # Errors
+    /// [`DrawingError`] for bytes that are no SVG, or draw nothing.
+    pub fn svg(bytes: &[u8], filled: bool) -> Result<Self, DrawingError> {
+        Self::curves(&svg::file(bytes)?, filled)
+    }
+
+    /// The pixels of a PNG picture that have this ink; without one, those that are opaque where some are not, or else
+    /// those that are dark.
+    ///
+    /// # Errors
+    /// [`DrawingError`] for bytes that are no PNG, more than [`MAX_PIXELS`](super::MAX_PIXELS), or no such pixel.
+    pub fn png(bytes: &[u8], ink: Option<Ink>) -> Result<Self, DrawingError> {
+        Ok(Self { drawn: Drawn::Pixels(mask(bytes, ink)?), letters: 0 })
+    }
+
+    fn curves(curves: &[Curves], filled: bool) -> Result<Self, DrawingError> {
+        let regions = regions(curves, true)?;
+        Ok(Self { drawn: if filled { Drawn::Areas(regions) } else { Drawn::Lines(regions) }, letters: 0 })
+    }
+
+    /// Width and height: the longer one is 1.
+    #[must_use]
+    pub fn size(&self) -> [f64; 2] {
+        match &self.drawn {
+            Drawn::Lines(regions) | Drawn::Areas(regions) => {
+                let points = || regions.iter().flat_map(|region| region.lines.iter().flatten());
+                [0, 1].map(|axis| points().map(|point| point[axis]).fold(0.0, f64::max))
+            }
+            Drawn::Pixels(mask) => [mask.width, mask.drawn.len() / mask.width].map(|pixels| pixels as f64 * mask.side),
+        }
+    }
+
+    /// Slots on the drawing in the plane z = 0, whose middle is the origin and whose longer side is 1 m: spread as
+    /// evenly as the drawing allows, always the same, near ones by near numbers.
+    ///
+    /// # Errors [`DrawingError`] for more than [`MAX_DRAWN_SLOTS`], fewer than there are letters, or lines and areas
+    /// without extent.
+    pub fn slots(&self, count: usize) -> Result<Formation, DrawingError> {
+        if count > MAX_DRAWN_SLOTS {
+            return Err(DrawingError::Slots(count));
+        }
+        if count < self.letters {
+            return Err(DrawingError::Letters { slots: count, letters: self.letters });
+        }
+        let places = self.places(count)?;
+        let middle = self.size().map(|side| 0.5 * side);
+        let mut slots_m = Rows::zeros(count);
+        for (i, place) in places.into_iter().enumerate() {
+            set_row(&mut slots_m, i, [place[0] - middle[0], place[1] - middle[1], 0.0].into());
+        }
+        Ok(Formation::points(slots_m))
+    }
+
+    fn places(&self, count: usize) -> Result<Vec<Point>, DrawingError> {
+        let least = (count * SAMPLES).max(LEAST_SAMPLES);
+        let raster;
+        let mask = match &self.drawn {
+            Drawn::Lines(regions) => {
+                let lines: Vec<&[Point]> = regions.iter().flat_map(|region| &region.lines).map(Vec::as_slice).collect();
+                let odd = least.div_ceil(count.max(1)) | 1;
+                let (samples, step) = walk::along(&lines, odd * count);
+                return if samples.is_empty() {
+                    Err(DrawingError::Empty)
+                } else {
+                    Ok(spread(&samples, count, step, 0.0))
+                };
+            }
+            Drawn::Areas(regions) => {
+                raster = fine_enough(regions, least);
+                &raster
+            }
+            Drawn::Pixels(mask) => mask,
+        };
+        if mask.count() == 0 {
+            return Err(DrawingError::Empty);
+        }
+        let (samples, side) = walk::inside(mask, least);
+        Ok(spread(&samples, count, side, mask.side))
+    }
+}
+
+/// The raster of an area with about this many pixels drawn.
+fn fine_enough(regions: &[Region], least: usize) -> Mask {
+    let coarse = Mask::of(regions, PIXELS);
+    let finer = (least as f64 / coarse.count().max(1) as f64).sqrt();
+    if finer <= 1.0 {
+        return coarse;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1, and clamped")]
+    let pixels = ((PIXELS as f64 * finer).ceil().min(MOST_PIXELS as f64)) as usize;
+    Mask::of(regions, pixels)
+}

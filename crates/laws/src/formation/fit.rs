@@ -1,0 +1,156 @@
+//! How well a swarm fits a shape once the best rigid motion is taken out.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Formation;
+use super::flat::centre;
+use tautline_core::swarm::{Rows, row};
+
+/// What a formation may be moved by and still be the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Nothing: every slot is a place.
+    Fixed,
+    /// A translation.
+    Translation,
+    /// Any rigid motion, reflections among them.
+    RigidMotion,
+}
+
+/// How far positions are from the slots that are laid over them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionError {
+    /// Root mean square \[m\].
+    pub rms_m: f64,
+    /// Of the vehicle that is farthest from its slot \[m\].
+    pub max_m: f64,
+}
+
+impl PositionError {
+    /// Of nothing that could be laid over anything.
+    pub const UNKNOWN: Self = Self { rms_m: f64::NAN, max_m: f64::NAN };
+
+    /// Of positions from slots, which are moved by `place_m` \[m\] and then as they are free to be so that the root mean square
+    /// is least; [`PositionError::UNKNOWN`] where there is none. Allocates nothing.
+    #[must_use]
+    pub fn of(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, freedom: Freedom) -> Self {
+        let (count, slots_m) = (positions_m.nrows(), &formation.slots_m);
+        let offset_m = match freedom {
+            Freedom::RigidMotion => {
+                let fit = Fit::new(positions_m, formation);
+                return fit.map_or(Self::UNKNOWN, |fit| Self::of_residuals(fit.residuals_m(positions_m, formation)));
+            }
+            _ if count == 0 || slots_m.nrows() != count => return Self::UNKNOWN,
+            Freedom::Translation => centre(positions_m) - centre(slots_m),
+            Freedom::Fixed => place_m,
+        };
+        Self::of_residuals((0..count).map(|i| row(positions_m, i) - row(slots_m, i) - offset_m))
+    }
+
+    /// Summing residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit. One that is not a number
+    /// makes both so: a largest of comparisons would pass it over.
+    fn of_residuals(residuals_m: impl ExactSizeIterator<Item = Vector3<f64>>) -> Self {
+        let count = residuals_m.len();
+        let (sum, most) = residuals_m
+            .map(|residual_m| residual_m.norm_squared())
+            .fold((0.0, 0.0_f64), |(sum, most), square| (sum + square, most.max(square)));
+        let rms_m = (sum / count as f64).sqrt();
+        Self { rms_m, max_m: if rms_m.is_nan() { f64::NAN } else { most.sqrt() } }
+    }
+}
+
+/// An isometry of space: x -> rotation x + translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidMotion {
+    /// Orthogonal 3 x 3 matrix; its determinant is -1 where it reflects.
+    pub rotation: Matrix3<f64>,
+    /// Translation \[m\].
+    pub translation_m: Vector3<f64>,
+}
+
+impl RigidMotion {
+    /// The image of a point \[m\].
+    #[must_use]
+    pub fn apply(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+        self.rotation * point_m + self.translation_m
+    }
+
+    /// Whether the motion reflects.
+    #[must_use]
+    pub fn reflects(&self) -> bool {
+        self.rotation.determinant() < 0.0
+    }
+}
+
+/// The isometry that takes the slots onto the positions with the least sum of squared errors, reflections allowed
+/// (orthogonal Procrustes problem).
+///
+/// With the centred tables P (positions) and H (slots), the rotation is U V^T of the singular value decomposition
+/// H^T P = V S U^T. Where the shape is flat the motion out of its flat is any that fits.
+/// None for an empty swarm, for different numbers of positions and slots, or where a number is not finite.
+/// Allocates nothing.
+#[must_use]
+pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<RigidMotion> {
+    Fit::new(positions_m, formation).map(|fit| RigidMotion {
+        rotation: fit.rotation,
+        translation_m: fit.positions_centre - fit.rotation * fit.slots_centre,
+    })
+}
+
+/// Root mean square distance \[m\] between the positions and the slots after [`best_rigid_motion`], NaN where there is
+/// none. Allocates nothing.
+#[must_use]
+pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
+    PositionError::of(positions_m, formation, Vector3::zeros(), Freedom::RigidMotion).rms_m
+}
+
+/// The distances \[m\] of the two positions that are farthest from their slots after [`best_rigid_motion`], added; NaN where
+/// there is none. Allocates nothing.
+pub(super) fn two_farthest_m(positions_m: &Rows, formation: &Formation) -> f64 {
+    let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
+    let distances_m = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm());
+    let (first, second) = distances_m.fold((0.0_f64, 0.0_f64), |(first, second), distance_m| {
+        (first.max(distance_m), second.max(first.min(distance_m)))
+    });
+    first + second
+}
+
+struct Fit {
+    rotation: Matrix3<f64>,
+    positions_centre: Vector3<f64>,
+    slots_centre: Vector3<f64>,
+}
+
+impl Fit {
+    /// From each slot as it is laid to its position \[m\].
+    fn residuals_m<'a>(
+        &'a self,
+        positions_m: &'a Rows,
+        formation: &'a Formation,
+    ) -> impl ExactSizeIterator<Item = Vector3<f64>> + 'a {
+        (0..positions_m.nrows()).map(move |i| {
+            let slot = row(&formation.slots_m, i) - self.slots_centre;
+            row(positions_m, i) - self.positions_centre - self.rotation * slot
+        })
+    }
+
+    fn new(positions_m: &Rows, formation: &Formation) -> Option<Self> {
+        let slots_m = &formation.slots_m;
+        let count = positions_m.nrows();
+        if count == 0 || slots_m.nrows() != count {
+            return None;
+        }
+        let (positions_centre, slots_centre) = (centre(positions_m), centre(slots_m));
+        let mut covariance = Matrix3::zeros();
+        for i in 0..count {
+            let position = row(positions_m, i) - positions_centre;
+            covariance += position * (row(slots_m, i) - slots_centre).transpose();
+        }
+        let largest = covariance.amax();
+        if !covariance.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let svd = if largest > 0.0 { covariance / largest } else { covariance }.svd(true, true);
+        Some(Self { rotation: svd.u? * svd.v_t?, positions_centre, slots_centre })
+    }
+}

@@ -1,0 +1,234 @@
+//! Control barrier functions: the acceleration nearest to that of a controller that minds nobody, among those with which any
+//! two vehicles can still brake.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::carried::Carried;
+use super::certificate::{Certificate, Void};
+use super::consensus::{check_observation, check_range};
+use super::error::{LawError, ParameterError};
+use super::half_spaces::{HalfSpace, HalfSpaces};
+use super::interface::{Controls, Law};
+use super::near_lists::NearLists;
+use super::setting::{Gain, Setting};
+use crate::observation::Observation;
+use tautline_core::swarm::{Pair, Rows, row, set_row};
+
+/// Clearance that a pair counts as having at least, as a part of delta: the barrier's slope is infinite where there is none.
+const LEAST_CLEARANCE: f64 = 1e-6;
+
+/// Keys of `[law]` with `kind = "cbf-qp"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CbfQpKeys {
+    /// Gain of the nominal controller on the way to the slot in 1/s^2.
+    pub k_per_s2: f64,
+    /// Its gain on velocity in 1/s.
+    pub c_per_s: f64,
+    /// Highest speed that it asks for in m/s.
+    pub max_speed_m_s: f64,
+    /// Highest acceleration that is commanded in m/s^2.
+    pub max_accel_m_s2: f64,
+    /// How fast the barrier may be approached, in s/m^2: h' >= -gamma h^3.
+    pub gamma_s_per_m2: f64,
+}
+
+impl Default for CbfQpKeys {
+    fn default() -> Self {
+        Self { k_per_s2: 1.0, c_per_s: 2.0, max_speed_m_s: 2.0, max_accel_m_s2: 5.0, gamma_s_per_m2: 1.0 }
+    }
+}
+
+impl CbfQpKeys {
+    /// No key follows from others.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        vec![
+            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
+            Gain::positive("law.c_per_s", "the gain c", self.c_per_s),
+            Gain::positive("law.max_speed_m_s", "the highest speed", self.max_speed_m_s),
+            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
+            Gain::positive("law.gamma_s_per_m2", "gamma", self.gamma_s_per_m2),
+        ]
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<CbfQpLaw, ParameterError> {
+        CbfQpLaw::new(setting, self.clone())
+    }
+}
+
+/// Safety barrier certificates (Wang, Ames, Egerstedt: Safety barrier certificates for collisions-free multirobot systems, 2017)
+/// around a proportional-derivative controller to the slot, decentralised, all vehicles having the same limit:
+///
+/// ```text
+/// U_i = r'' - c (v_i - V_i) - a22 v_i,   V_i = r' + min((k/c) |d_i|, v_max) d_i/|d_i|,   d_i = h_i + r - p_i
+/// u_i = in |u| <= a_max and all half-spaces of i, the acceleration nearest to U_i
+/// ```
+///
+/// With A = 2 `a_max`, what two vehicles brake with together, the unit vector n from vehicle j to vehicle i, their distance l and
+/// their relative velocity w = `v_i - v_j`, a pair is safe while
+///
+/// ```text
+/// h = sqrt(2 A (l - delta)) + n . w >= 0
+/// ```
+///
+/// and stays so while h' >= -gamma h^3, that is, while
+///
+/// ```text
+/// -n . (u_i - u_j) <= B,   B = gamma h^3 + (|w|^2 - (n . w)^2)/l + A n . w / sqrt(2 A (l - delta)) + a22 n . w
+/// ```
+///
+/// of which each of the two sees to half: `n . u_i >= -B/2`. Of two that are nearer than delta the root of h is taken of
+/// delta - l and is negative, which parts them. Where not all half-spaces have a point in common, the acceleration
+/// that violates least is commanded.
+///
+/// # Guarantee
+/// None for a swarm. A pair alone that starts with h >= 0 keeps delta, in continuous time with a22 = 0. Between several others
+/// a vehicle may have no acceleration that all of them ask for.
+///
+/// # Cost
+/// O(near pairs) a step without allocation.
+#[derive(Clone, Debug)]
+pub struct CbfQpLaw {
+    keys: CbfQpKeys,
+    carried: Carried,
+    count: usize,
+    delta_m: f64,
+    a22_per_s: f64,
+    range_m: f64,
+    near: NearLists,
+    half_spaces: HalfSpaces,
+}
+
+impl CbfQpLaw {
+    /// The law of so many vehicles; links play no part.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
+    pub fn new(setting: &Setting<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
+        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
+        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        ParameterError::check(links, formation, &gains)?;
+        Ok(Self {
+            range_m: range_m(&keys, delta_m, a22_per_s),
+            keys,
+            carried: Carried::new(setting)?,
+            count: links.count(),
+            delta_m,
+            a22_per_s,
+            near: NearLists::default(),
+            half_spaces: HalfSpaces::default(),
+        })
+    }
+
+    /// What vehicle i would do if it were alone.
+    fn nominal_m_s2(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
+        let CbfQpKeys { k_per_s2, c_per_s, max_speed_m_s, .. } = self.keys;
+        let reference = &at.target.reference;
+        let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
+        let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
+        let own_m_s = row(&at.own.velocities_m_s, i);
+        self.carried.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
+    }
+
+    /// What vehicle j leaves of vehicle i's accelerations; everything where it is out of range.
+    fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
+        let seen = at.seen(i, j);
+        let apart_m = row(&at.own.positions_m, i) - seen.position_m;
+        let distance_m = apart_m.norm();
+        if distance_m == 0.0 {
+            return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
+        }
+        if distance_m > self.range_m {
+            return Ok(None);
+        }
+        let normal = apart_m / distance_m;
+        let bound = self.bound_m_s2(normal, distance_m, row(&at.own.velocities_m_s, i) - seen.velocity_m_s);
+        Ok(Some(HalfSpace { normal, offset: -0.5 * bound }))
+    }
+
+    /// B of a pair.
+    fn bound_m_s2(&self, normal: Vector3<f64>, distance_m: f64, relative_m_s: Vector3<f64>) -> f64 {
+        let both_m_s2 = 2.0 * self.keys.max_accel_m_s2;
+        let clearance_m = distance_m - self.delta_m;
+        let root_m_s = (2.0 * both_m_s2 * clearance_m.abs().max(LEAST_CLEARANCE * self.delta_m)).sqrt();
+        let braked_m_s = root_m_s.copysign(clearance_m);
+        let parting_m_s = normal.dot(&relative_m_s);
+        let barrier_m_s = braked_m_s + parting_m_s;
+        self.keys.gamma_s_per_m2 * barrier_m_s.powi(3)
+            + (relative_m_s.norm_squared() - parting_m_s * parting_m_s) / distance_m
+            + both_m_s2 * parting_m_s / root_m_s
+            + self.a22_per_s * parting_m_s
+    }
+}
+
+/// Beyond this no pair below the highest speed is asked for anything: with s = sqrt(2 A (l - delta)) at least their relative
+/// speed V, B is at least `gamma (s - V)^3 - A - a22 V`, and no two ask for more than A.
+fn range_m(keys: &CbfQpKeys, delta_m: f64, a22_per_s: f64) -> f64 {
+    let (both_m_s2, closing_m_s) = (2.0 * keys.max_accel_m_s2, 2.0 * keys.max_speed_m_s);
+    let spare_m_s2 = 2.0 * both_m_s2 + a22_per_s.max(0.0) * closing_m_s;
+    let braked_m_s = closing_m_s + libm::cbrt(spare_m_s2 / keys.gamma_s_per_m2);
+    delta_m + braked_m_s * braked_m_s / (2.0 * both_m_s2)
+}
+
+impl Law for CbfQpLaw {
+    fn name(&self) -> &'static str {
+        "cbf-qp"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, at, command)?;
+        self.near.update(self.count, at.near);
+        for i in 0..self.count {
+            self.half_spaces.clear();
+            for &j in self.near.of(i) {
+                if let Some(half_space) = self.half_space(at, i, j)? {
+                    self.half_spaces.push(half_space);
+                }
+            }
+            let nominal = self.nominal_m_s2(at, i);
+            set_row(command, i, self.half_spaces.nearest(nominal, self.keys.max_accel_m_s2).point);
+        }
+        check_range(command)
+    }
+
+    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
+        Certificate::void(Void::CommandLimited)
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
+    }
+
+    fn max_command_m_s2(&self) -> Option<f64> {
+        Some(self.keys.max_accel_m_s2)
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.range_m)
+    }
+
+    /// A vehicle alone follows x'' = -c x' - k x. Nothing is known where others are within the range: of several half-spaces a
+    /// corner may run as fast as two of their planes close.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        nearest_m.filter(|nearest_m| *nearest_m > self.range_m)?;
+        Some(self.keys.c_per_s.max(self.keys.k_per_s2.sqrt()))
+    }
+
+    /// Vehicles are held to places, and a22 is made up for.
+    fn common_mode_rate_per_s(&self, _a22_per_s: f64) -> f64 {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests;

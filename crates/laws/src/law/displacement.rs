@@ -1,0 +1,443 @@
+//! The displacement law: consensus on the slots over any connected graph, and a one-sided edge tension between all who are
+//! near.
+
+mod conditions;
+mod promise;
+
+use conditions::{growth, voids};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::certificate::{Certificate, Void};
+use super::clearance::{ClearanceTension, slot_room_m};
+use super::consensus::{add_pushes, check_count, check_range, check_state, check_tables};
+use super::contact::in_contact;
+use super::error::{LawError, ParameterError};
+use super::growth::Growth;
+use super::interface::{Controls, Law, VelocityMargin};
+use super::memo::Memo;
+use super::modes::{Linear, Mode};
+use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
+use super::setting::{Gain, Setting};
+use super::tension::{EdgeTension, TensionError};
+use crate::formation::Formation;
+use crate::graph::Pinning;
+use crate::observation::Observation;
+use crate::space::{Metric, NearPairs, Obstacle};
+use crate::target::{Settling, Target};
+use tautline_core::swarm::{Pair, Rows, row, set_row};
+
+/// Keys of `[law]` with `kind = "displacement"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DisplacementKeys {
+    /// Gain on positions over links in 1/s^2, before it is divided by the graph's algebraic connectivity.
+    pub k_per_s2: f64,
+    /// Rate at which relative velocities are damped at least in 1/s, whatever a22 is.
+    pub zeta_per_s: f64,
+    /// Scale of the tension between vehicles that are nearer than slots are, in m^2/s^2.
+    pub alpha: f64,
+}
+
+impl Default for DisplacementKeys {
+    fn default() -> Self {
+        Self { k_per_s2: 1.0, zeta_per_s: 1.0, alpha: 1.0 }
+    }
+}
+
+impl DisplacementKeys {
+    /// No key follows from others.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        vec![
+            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
+            Gain::positive("law.zeta_per_s", "the damping zeta", self.zeta_per_s),
+            Gain::positive("law.alpha", "alpha", self.alpha),
+        ]
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<DisplacementLaw, ParameterError> {
+        DisplacementLaw::new(setting, self.clone())
+    }
+}
+
+/// The displacement law on a connected undirected graph of N vehicles that share a compass: with `e_i = p_i - h_i`,
+///
+/// ```text
+/// u_i = -sigma sum_{j in N_i} [ k (e_i - e_j) + c (v_i - v_j) ] - sum_{j : l_ij < R} grad_i V_R(l_ij)
+/// sigma = 1/lambda2(L),   c = max(0, zeta + a22),   R = smallest distance of two slots on any leg
+/// ```
+///
+/// where `V_R` is the [`EdgeTension`] with rest length R, used only while it pushes: its slope is continuous at R. The first
+/// sum goes over links, the second over near pairs, linked or not. The sum of all `u_i` is zero.
+///
+/// On the complete graph sigma = 1/N, and the first sum is `N [k (e_i - mean e) + c (v_i - mean v)]`.
+///
+/// # Reference
+/// Where some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M takes the place of L
+/// ([`crate::graph::Pinning`]), sigma is the inverse of its least eigenvalue, `k (e_i - r) + c (v_i - r')` is added to the sum
+/// of those who know, and `r'' - a22 r'` is fed forward to all. A leader flies `r'' - a22 r' - k (e - r) - c (v - r')`,
+/// which no other vehicle changes. Energy and certificate are those below with v - r' for v~ and M for L; a leader's own
+/// place and velocity are the reference then.
+///
+/// # Energy
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (sigma k/2) sum over links of |e_i - e_j|^2 + sum over near pairs of V_R
+/// dE/dt = a22 sum |v~_i|^2 - sigma c sum over links of |v_i - v_j|^2 <= -zeta sum |v~_i|^2
+/// ```
+///
+/// because the sum over links of `|v_i - v_j|^2` is at least lambda2 times the sum of `|v~_i|^2`.
+///
+/// # Certificate
+/// `V_R(l_ij(t)) <= E(0)` for *every* pair, for ever, on *every* connected graph. It assumes exact knowledge of links and near
+/// pairs, a common compass, no delay, no saturation and continuous time.
+///
+/// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
+/// `c - a22` for zeta, and at most that of |w~|/sqrt 2 to sqrt E: what is certified then is certified to the end of the flight.
+/// w~ counts as v~ does: what all feel alike is nothing to a swarm without a reference.
+///
+/// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
+/// what holds through all legs is known before the first step.
+///
+/// # Ellipsoids
+/// Where what must stay empty around a vehicle is an ellipsoid, `l_ij` is the scaled length of its [`Metric`], in which R and delta
+/// are lengths too, and a near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes, and what is certified is
+/// certified of scaled lengths.
+///
+/// # Obstacles
+/// The same one-sided tension acts between vehicles and obstacles at rest, on the distance from the surface less the
+/// clearance, over a range of R - delta, or of the least room that a slot has where slots are places. E holds all of these
+/// and absolute velocities then. So what is certified, of pairs and of the room from obstacles, is certified of a reference at
+/// rest, or without a reference for a22 <= 0. A leader keeps clear by itself.
+///
+/// # Cost
+/// O(links + near pairs) a step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
+#[derive(Clone, Debug)]
+pub struct DisplacementLaw {
+    pulls: PinnedConsensus,
+    keys: DisplacementKeys,
+    delta_m: f64,
+    /// What vehicles are kept apart in.
+    metric: Metric,
+    a22_per_s: f64,
+    /// Whether `r'' - a22 r'` is fed forward to those who follow.
+    is_fed: bool,
+    /// Why nothing is certified from any start.
+    voids: Vec<Void>,
+    /// What the wind may add to the energy, where it blows.
+    growth: Option<Growth>,
+    /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
+    connectivity: f64,
+    largest: f64,
+    /// `V_R`.
+    tension: EdgeTension,
+    /// R is at most this, for legs to come \[m\].
+    rest_at_most_m: f64,
+    /// Between vehicles and obstacles, where there are any.
+    clearance: Option<ClearanceTension>,
+    /// Whether there are two vehicles at all.
+    has_pairs: bool,
+    /// That of the target that R is taken from.
+    revision: u64,
+    /// Sum of `V_R` over the near pairs.
+    memo: Memo,
+}
+
+impl DisplacementLaw {
+    /// The law on these links, with the smallest distance of two slots on any leg as the range of its tension.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
+    /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
+    pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
+        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = setting;
+        let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
+        for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
+            ParameterError::check(links, formation, &gains)?;
+        }
+        if let Some(&vehicle) = links.unreachable().first() {
+            return Err(ParameterError::Disconnected { vehicle });
+        }
+        let pulls = PinnedConsensus::new(links, setting.pinning());
+        let connectivity = pulls.connectivity();
+        if connectivity <= 0.0 {
+            return Err(ParameterError::NobodyKnowsTheReference);
+        }
+        let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, (delta_m, metric))?, f64::INFINITY);
+        for leg in later {
+            let of_leg = tension_between(&leg.formation, &keys, (delta_m, metric))?;
+            if of_leg.rest_m() < tension.rest_m() {
+                tension = of_leg;
+            }
+            rest_at_most_m = tension.rest_m();
+        }
+        let clearance = if obstacles.is_empty() {
+            None
+        } else {
+            let range_m = slot_room_m(setting)?.min(tension.rest_m() - delta_m);
+            let tension = ClearanceTension::new(keys.alpha, range_m);
+            Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
+        };
+        let growth = growth(setting, (keys.zeta_per_s + a22_per_s).max(0.0) - a22_per_s);
+        Ok(Self {
+            clearance,
+            largest: links.largest_eigenvalue_bound(&pulls.pinning),
+            pulls,
+            keys,
+            delta_m,
+            metric,
+            a22_per_s,
+            is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            growth,
+            voids: voids(setting),
+            connectivity,
+            tension,
+            rest_at_most_m,
+            has_pairs: links.count() > 1,
+            revision: 0,
+            memo: Memo::new(links.count()),
+        })
+    }
+
+    /// sigma.
+    fn scale(&self) -> f64 {
+        1.0 / self.connectivity
+    }
+
+    /// c \[1/s\].
+    fn damping_per_s(&self) -> f64 {
+        (self.keys.zeta_per_s + self.a22_per_s).max(0.0)
+    }
+
+    /// Whether somebody knows a reference.
+    fn is_guided(&self) -> bool {
+        self.pulls.pinning != Pinning::Nobody
+    }
+
+    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`; nothing out of range.
+    fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
+        let scaled_m = self.metric.scaled(apart_m);
+        let separation_m = scaled_m.norm();
+        if separation_m >= self.tension.rest_m() {
+            return Ok(None);
+        }
+        if separation_m <= self.delta_m {
+            return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m: self.delta_m });
+        }
+        let slope_m_s2 = self.tension.derivative(separation_m);
+        let pushed = self.metric.scaled(scaled_m) * (-slope_m_s2 / separation_m);
+        Ok(Some((pushed, self.tension.value(separation_m))))
+    }
+
+    /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
+    fn potential(&self, positions_m: &Rows, obstacles: &[Obstacle]) -> Result<f64, LawError> {
+        let of_obstacles = match &self.clearance {
+            Some(clearance) => clearance.potential(obstacles, positions_m)?,
+            None => 0.0,
+        };
+        let mut near = NearPairs::default();
+        near.update(positions_m, self.metric.longest_m(self.tension.rest_m()));
+        let of_pair = |&(i, j): &(usize, usize)| {
+            let pushed = self.push(i, j, row(positions_m, i) - row(positions_m, j));
+            pushed.map(|pushed| pushed.map_or(0.0, |(_, of_pair)| of_pair))
+        };
+        Ok(of_obstacles + near.pairs().iter().map(of_pair).sum::<Result<f64, LawError>>()?)
+    }
+
+    /// `(sigma k/2) e' M e` \[m^2/s^2\].
+    fn stretch(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
+        0.5 * self.scale() * self.keys.k_per_s2 * self.pulls.stretch_m2(error_m)
+    }
+
+    fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
+        check_state(self.pulls.graph.count(), at.own)?;
+        let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
+        let stretch = self.stretch(|i| error_m(positions_m, formation, reference.position_m, i));
+        let pushes = self.memo.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
+        let is_absolute = self.clearance.is_some() && !self.is_guided();
+        let kinetic = if is_absolute {
+            0.5 * at.own.velocities_m_s.norm_squared()
+        } else {
+            self.pulls.kinetic_energy(at.own, &reference)
+        };
+        let energy = kinetic + stretch + pushes;
+        if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+
+    fn try_command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
+        let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
+        self.pulls.add_pulls(at, gains, -self.scale(), command)?;
+        let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
+        if let Some(of_pairs) = of_pairs {
+            self.memo.keep(&at.own.positions_m, of_pairs + of_obstacles);
+        }
+        if self.is_guided() {
+            if self.is_fed {
+                let fed = fed_forward(&at.target.reference, self.a22_per_s);
+                (0..command.nrows()).for_each(|i| {
+                    let sum = row(command, i) + fed;
+                    set_row(command, i, sum);
+                });
+            }
+            self.pulls.lead(at, gains, self.a22_per_s, command);
+        }
+        check_range(command)
+    }
+
+    /// R for these slots \[m\].
+    fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
+        let (pair, distance_m) = nearest_slots(formation, self.delta_m, self.metric);
+        (pair, distance_m.min(self.rest_at_most_m))
+    }
+}
+
+/// The two slots that are nearest to each other, and how near \[m\]; a vehicle alone keeps any distance.
+fn nearest_slots(formation: &Formation, delta_m: f64, metric: Metric) -> (Pair, f64) {
+    let slots = Formation::points(metric.scaled_rows(&formation.slots_m));
+    slots.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
+}
+
+fn tension_between(
+    formation: &Formation,
+    keys: &DisplacementKeys,
+    (delta_m, metric): (f64, Metric),
+) -> Result<EdgeTension, ParameterError> {
+    let (pair, rest_m) = nearest_slots(formation, delta_m, metric);
+    EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
+}
+
+impl Law for DisplacementLaw {
+    fn name(&self) -> &'static str {
+        "displacement"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        let count = self.pulls.graph.count();
+        check_tables(count, at, command)?;
+        // No shared state that is not finite has a finite command: who is to blame is looked for where there is none.
+        self.try_command(at, command).map_err(|fault| check_state(count, at.own).err().unwrap_or(fault))
+    }
+
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision != self.revision {
+            check_count(self.pulls.graph.count(), target.formation.count())?;
+            // Slots that are spread are farther apart than the leg's own.
+            if target.spread <= 1.0 {
+                let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_for(target.formation));
+                self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
+                    .map_err(|_: TensionError| LawError::Target { pair, distance_m, delta_m })?;
+                self.memo.forget();
+            }
+            self.revision = target.revision;
+        }
+        Ok(())
+    }
+
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.try_energy(at).ok()
+    }
+
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        self.certificate_through(start, &[])
+    }
+
+    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        self.promise_through(start, ahead)
+    }
+
+    /// In contact on the complete graph without a reference.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
+        let mut linear = self.pulls.linear(lead.times(self.scale()), lead);
+        if self.pulls.graph.is_complete() && !self.is_guided() && self.has_pairs {
+            linear.in_contact = in_contact(lead, &self.tension, formation);
+        }
+        Some(linear)
+    }
+
+    fn controls(&self) -> Controls {
+        if self.is_guided() { Controls::Places } else { Controls::Displacements }
+    }
+
+    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
+        if self.is_guided() { a22_per_s - self.damping_per_s() } else { a22_per_s }
+    }
+
+    fn barrier_m(&self) -> Option<f64> {
+        Some(self.delta_m)
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.metric.longest_m(self.tension.rest_m()))
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        if self.clearance.is_some() {
+            return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
+        }
+        &["all share a compass", "each sees who is nearer than slots are"]
+    }
+
+    fn keeps_ellipsoids(&self) -> bool {
+        true
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
+    }
+
+    fn keeps_clear_of_obstacles(&self) -> bool {
+        self.clearance.is_some()
+    }
+
+    fn obstacle_rate_squared(&self, room_m: f64) -> f64 {
+        self.clearance.map_or(0.0, |clearance| clearance.rate_squared(room_m))
+    }
+
+    /// With mu, the largest eigenvalue of the graph's Laplacian: a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the
+    /// links sigma k mu. Damping is followed while sigma c mu dt is at most 0.5, which `max_rate_dt` = 0.3 keeps. In a crowd
+    /// several near pairs may add up to 3.6 times as much to omega^2, which the step still follows.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        const DAMPED: f64 = 0.3 / 0.5;
+        let contact = match nearest_m? {
+            nearest_m if nearest_m < self.tension.rest_m() => {
+                2.0 * self.tension.second_derivative(nearest_m) / self.metric.shortest_m(1.0).powi(2)
+            }
+            _ => 0.0,
+        };
+        let links = self.scale() * self.largest;
+        let omega = (contact + links * self.keys.k_per_s2).sqrt();
+        Some(omega.max(DAMPED * links * self.damping_per_s()))
+    }
+
+    /// A mode of the graph with the eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1
+    /// or, towards k/c, for m without bound.
+    fn settling(&self) -> Option<Settling> {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let half = 0.5 * (c - self.a22_per_s);
+        let first_per_s = if half * half > k { k / (half + (half * half - k).sqrt()) } else { half };
+        let rate_per_s = if c > 0.0 { first_per_s.min(k / c) } else { first_per_s };
+        Some(Settling { rate_per_s, response_s: rate_per_s / k })
+    }
+
+    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        let of_graph = if self.is_guided() { 1.0 } else { connectivity / self.connectivity };
+        let damping_per_s = self.damping_per_s() * of_graph;
+        Some(VelocityMargin {
+            per_s: damping_per_s - a22_per_s,
+            terms_per_s: damping_per_s + a22_per_s.abs(),
+            remedy: "Raise law.zeta_per_s.",
+        })
+    }
+}
+
+#[cfg(test)]
+mod guided_tests;
+#[cfg(test)]
+mod tests;

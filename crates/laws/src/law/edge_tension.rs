@@ -1,0 +1,384 @@
+//! The edge-tension law (8): vehicles joined by an edge are pulled to their desired distance and never let closer than
+//! delta.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::certificate::{Certificate, Void};
+use super::consensus::{
+    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
+    consensus_margin, of_table, relative_kinetic_energy,
+};
+use super::error::{LawError, ParameterError};
+use super::growth::{Frame, Grown, Growth};
+use super::interface::{Controls, Law, VelocityMargin};
+use super::kernel::Kernel;
+use super::memo::Memo;
+use super::modes::{Linear, Mode};
+use super::setting::{Blown, Gain, Setting};
+use super::tension::{EdgeTension, TensionError};
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::observation::Observation;
+use crate::target::Target;
+use tautline_core::swarm::{Pair, Rows, Swarm, row, separation};
+
+/// Keys of `[law]` with `kind = "edge-tension"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EdgeTensionKeys {
+    /// Scale of the tension in m^2/s^2.
+    #[serde(default = "one")]
+    pub alpha: f64,
+}
+
+/// Rate at which the law damps relative velocities on the complete graph, whatever a22 is \[1/s\].
+const DAMPING_PER_S: f64 = 1.0;
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Default for EdgeTensionKeys {
+    fn default() -> Self {
+        Self { alpha: one() }
+    }
+}
+
+impl EdgeTensionKeys {
+    /// No key follows from others.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        vec![Gain::positive("law.alpha", "alpha", self.alpha)]
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
+        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
+        let law =
+            EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })?;
+        let is_unbounded = |blown: &Blown<'_>| blown.wind.turbulence.is_some() && !blown.wind.shared;
+        Ok(EdgeTensionLaw {
+            growth: setting.blown.map(|blown| Growth::new(&blown, links.count(), Frame::Mean, DAMPING_PER_S)),
+            is_unbounded: setting.blown.as_ref().is_some_and(is_unbounded),
+            ..law
+        })
+    }
+}
+
+/// Parameters of [`EdgeTensionLaw`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeTensionParameters {
+    /// Scale alpha of the tension \[m^2/s^2\], positive.
+    pub alpha: f64,
+    /// Safety distance delta \[m\], below every desired distance of an edge.
+    pub delta_m: f64,
+    /// Velocity coefficient a22 of the plant \[1/s\].
+    pub a22_per_s: f64,
+}
+
+/// The edge-tension law on an undirected graph of N vehicles, equation (8):
+///
+/// ```text
+/// u_i = -(1/N) sum_{j in N_i} [ (1 + a22)(v_i - v_j) + w_ij (p_i - p_j) ],    w_ij = V'_ij(l_ij)/l_ij
+/// ```
+///
+/// The desired distance of an edge is that of the formation's slots. The sum of all `u_i` is zero: the law cannot move
+/// the centre of mass.
+///
+/// # Energy
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (1/N) sum over edges of V_ij(l_ij)
+/// dE/dt = -sum |v_i - mean v|^2                                        complete graph, whatever a22 is
+/// dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2           graph of algebraic connectivity lambda2
+/// ```
+///
+/// [`Law::certificate`] rests on the second line.
+///
+/// # Cost
+/// O(edges) time a step without allocation, and 8 bytes of memory an edge (24 where the graph is not complete).
+#[derive(Clone, Debug)]
+pub struct EdgeTensionLaw {
+    graph: Graph,
+    formation: Formation,
+    parameters: EdgeTensionParameters,
+    kernel: Kernel,
+    /// The tension of the edge with the smallest desired distance.
+    tightest: Option<EdgeTension>,
+    /// That of the target whose distances are desired.
+    revision: u64,
+    /// What the wind may add to the energy, where it blows, and whether that has no bound.
+    growth: Option<Growth>,
+    is_unbounded: bool,
+    /// (1/alpha) sum of V over the edges.
+    memo: Memo,
+}
+
+impl EdgeTensionLaw {
+    /// The law for the edges of `graph` and the distances of `formation`.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where an edge has no
+    /// tension (see [`EdgeTension::new`]), where a22 is not finite, or where the edges do not fit in memory.
+    pub fn new(
+        graph: &Graph,
+        formation: &Formation,
+        parameters: EdgeTensionParameters,
+    ) -> Result<Self, ParameterError> {
+        ParameterError::check(graph, formation, &[("a22", parameters.a22_per_s)])?;
+        let kernel =
+            Kernel::new(graph, parameters.delta_m).map_err(|_| ParameterError::Memory { edges: graph.edge_count() })?;
+        let mut law = Self {
+            graph: graph.clone(),
+            formation: formation.clone(),
+            parameters,
+            kernel,
+            tightest: None,
+            revision: 0,
+            growth: None,
+            is_unbounded: false,
+            memo: Memo::new(graph.count()),
+        };
+        law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
+        Ok(law)
+    }
+
+    /// Takes the tension of each edge from the formation; the first edge that has none is the error.
+    fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        self.tightest = None;
+        self.memo.forget();
+        for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
+            let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
+                .map_err(|source| (Pair::new(i, j), source))?;
+            *inverse_k_per_m = 1.0 / tension.k_m();
+            if self.tightest.is_none_or(|best| tension.rest_m() < best.rest_m()) {
+                self.tightest = Some(tension);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds `w_ij (p_i - p_j) / alpha` over what each vehicle heard of its neighbours.
+    fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        add_heard(at, command, |i, own, j, heard| {
+            let edge_m = own.position_m - heard.position_m;
+            let separation_m = edge_m.norm();
+            if separation_m <= delta_m {
+                return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m });
+            }
+            let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j));
+            let slope = tension.map_or(f64::NAN, |tension| tension.derivative(separation_m));
+            Ok(edge_m * (slope / (alpha * separation_m)))
+        })
+    }
+
+    /// The same control from the weighted Laplacian, equation (9): `U = -(1/N) [L_w(P) P + (1 + a22) L_G V]` with
+    /// `w_ij = V'_ij(l_ij)/l_ij`, N x 3 \[m/s^2\].
+    ///
+    /// Equal to [`Law::command`] to rounding, and there to check it: it takes O(N^2) memory and O(N^3) time.
+    ///
+    /// # Errors
+    /// As [`Law::command`].
+    pub fn matrix_form(&self, swarm: &Swarm) -> Result<Rows, LawError> {
+        check_state(self.graph.count(), swarm)?;
+        let EdgeTensionParameters { alpha, delta_m, a22_per_s } = self.parameters;
+        let within = |distance_m: f64| distance_m > delta_m && distance_m.is_finite();
+        if !self.graph.edges().all(|(i, j)| within(separation(&swarm.positions_m, i, j))) {
+            return Err(self.fault(swarm));
+        }
+        let weighted = self.graph.weighted_laplacian(|i, j| {
+            let distance_m = separation(&swarm.positions_m, i, j);
+            EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
+                .map_or(f64::NAN, |tension| tension.derivative(distance_m) / distance_m)
+        });
+        let sum = weighted * &swarm.positions_m + self.graph.laplacian() * &swarm.velocities_m_s * (1.0 + a22_per_s);
+        let control = sum / -(swarm.count() as f64);
+        check_range(&control).map(|()| control)
+    }
+
+    /// The kernel found a distance that is not in (delta, infinity): names the first edge that is too short.
+    fn fault(&self, swarm: &Swarm) -> LawError {
+        let delta_m = self.parameters.delta_m;
+        self.graph
+            .edges()
+            .map(|(i, j)| (Pair::new(i, j), separation(&swarm.positions_m, i, j)))
+            .find(|&(_, separation_m)| separation_m <= delta_m)
+            .map_or(LawError::OutOfRange, |(pair, separation_m)| LawError::Collision { pair, separation_m, delta_m })
+    }
+
+    fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
+        check_rows(self.graph.count(), swarm)?;
+        let potential = if let Some(potential) = self.memo.of(&swarm.positions_m) {
+            potential
+        } else {
+            check_state(self.graph.count(), swarm)?;
+            self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?
+        };
+        let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
+        if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+}
+
+impl Law for EdgeTensionLaw {
+    fn name(&self) -> &'static str {
+        "edge-tension"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), at, command)?;
+        command.fill(0.0);
+        let per_vehicle = -1.0 / at.own.count().max(1) as f64;
+        let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
+        let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
+        if let Some(swarm) = at.shared() {
+            let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
+            self.memo.keep(&swarm.positions_m, potential);
+            *command *= alpha * per_vehicle;
+            add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
+        } else {
+            self.add_heard_pulls(at, command)?;
+            *command *= alpha * per_vehicle;
+            add_heard(at, command, |_, own, _, heard| Ok(velocity_gain * (own.velocity_m_s - heard.velocity_m_s)))?;
+        }
+        check_range(command)
+    }
+
+    /// Takes the tension of each edge from the new slots: O(edges), and nothing where they have not changed.
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision == self.revision {
+            return Ok(());
+        }
+        check_count(self.graph.count(), target.formation.count())?;
+        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        for (i, j) in self.graph.edges() {
+            let distance_m = target.formation.desired_distance(i, j);
+            EdgeTension::new(alpha, delta_m, distance_m).map_err(|_| LawError::Target {
+                pair: Pair::new(i, j),
+                distance_m,
+                delta_m,
+            })?;
+        }
+        self.formation.slots_m.copy_from(&target.formation.slots_m);
+        self.revision = target.revision;
+        // Every edge has a tension, as was just seen.
+        let _ = self.set_rest_lengths();
+        Ok(())
+    }
+
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.try_energy(at.own).ok()
+    }
+
+    fn promise(&self) -> &'static str {
+        "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the control, no \
+         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, so no \
+         pair's tension exceeds N times all of it."
+    }
+
+    fn barrier_m(&self) -> Option<f64> {
+        Some(self.parameters.delta_m)
+    }
+
+    fn controls(&self) -> Controls {
+        Controls::Distances
+    }
+
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
+    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
+    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at `nearest_m` of the pair with
+    /// the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
+    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
+    /// largest eigenvalue is at most V''max: omega^2 <= V''max. On the complete graph relative velocities decay at the
+    /// rate 1/s, so the fastest rate is max(omega, 1/s).
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        Some(self.tightest?.second_derivative(nearest_m?).sqrt().max(1.0))
+    }
+
+    /// On the complete graph relative velocities are all damped by 1 + a22, and the stiffnesses are the eigenvalues of 1/N times
+    /// the sum over edges of V'' in their directions: V' is 0 at the desired distance. 0 for rotations.
+    fn linear(&self, formation: &Formation) -> Option<Linear> {
+        /// Most vehicles for whom they are computed, in O(N^3).
+        const MOST: usize = 130;
+        let (count, EdgeTensionParameters { alpha, delta_m, a22_per_s }) = (self.graph.count(), self.parameters);
+        if !self.graph.is_complete() || !(2..=MOST).contains(&count) {
+            return None;
+        }
+        let mut stiffness = DMatrix::zeros(3 * count, 3 * count);
+        for (i, j) in self.graph.edges() {
+            let distance_m = formation.desired_distance(i, j);
+            let along = (row(&formation.slots_m, j) - row(&formation.slots_m, i)) / distance_m;
+            let curvature = EdgeTension::new(alpha, delta_m, distance_m).ok()?.second_derivative(distance_m);
+            let block = along * along.transpose() * (curvature / count as f64);
+            for (a, b, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
+                let mut part = stiffness.fixed_view_mut::<3, 3>(3 * a, 3 * b);
+                part += block * sign;
+            }
+        }
+        // Rounding of eigenvalues that are 0.
+        let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
+        let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
+        Some(Linear { free: stiffnesses.iter().map(mode).collect(), in_contact: None, heard: None })
+    }
+
+    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        let gain_per_s = 1.0 + self.parameters.a22_per_s;
+        Some(consensus_margin(self.graph.count(), gain_per_s, connectivity, a22_per_s))
+    }
+
+    fn linked_separation_m(&self, start: &Observation<'_>) -> Option<f64> {
+        let energy = self.try_energy(start.own).ok()?;
+        Some(self.tightest?.push_side_root(start.own.count() as f64 * energy))
+    }
+
+    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
+    /// the same function, so the pair that may come closest is the one with the smallest K, and one root
+    /// ([`EdgeTension::push_side_root`]) answers for all pairs.
+    ///
+    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of
+    /// `|w_i - mean w|^2`/4 to E: what all feel alike changes nothing.
+    ///
+    /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
+    /// Without pairs there is nothing to promise, and nothing void either.
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        let energy = self.try_energy(start.own);
+        let mut void = Vec::new();
+        if !self.graph.is_complete() {
+            void.push(Void::GraphNotComplete);
+        }
+        if let Err(fault) = energy {
+            void.push(Void::StartRefused(fault));
+        }
+        if self.is_unbounded {
+            void.push(Void::WindUnbounded);
+        }
+        let energy_initial = energy.ok();
+        let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());
+        let count = start.own.count() as f64;
+        let grown = promised.map(|(energy, tightest)| match &self.growth {
+            None => Grown { energy, until_s: None },
+            Some(growth) => {
+                let borne = tightest.value(tightest.delta_m() + growth.resolution_m()) / count;
+                growth.of(energy, start.time_s, borne)
+            }
+        });
+        Certificate {
+            certified_m: promised.zip(grown).map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
+            certified_until_s: grown.and_then(|grown| grown.until_s),
+            certified_room_m: None,
+            energy_initial,
+            void,
+            legs: Vec::new(),
+        }
+    }
+
+    fn reckons_with_wind(&self) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

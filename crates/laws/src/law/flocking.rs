@@ -1,0 +1,246 @@
+//! Flocking: vehicles keep one distance from whoever is near, match velocities and follow a point.
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::carried::Carried;
+use super::certificate::{Certificate, Void};
+use super::consensus::{check_count, check_observation, check_range};
+use super::error::{LawError, ParameterError};
+use super::interface::{Controls, Law};
+use super::setting::{Gain, Setting};
+use crate::formation::Formation;
+use crate::observation::Observation;
+use crate::target::Target;
+use tautline_core::swarm::{Rows, mean_row, row, set_row};
+
+/// epsilon of the sigma-norm \[1/m^2\].
+const EPSILON: f64 = 0.1;
+/// a = b of the action function.
+const ACTION: f64 = 5.0;
+/// h of the bump function.
+const BUMP: f64 = 0.2;
+/// r/d.
+const REACH: f64 = 1.2;
+
+/// Keys of `[law]` with `kind = "flocking"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FlockingKeys {
+    /// Gain c1 on distances to near vehicles in 1/s^2; velocities are matched with 2 sqrt(c1).
+    pub c1_alpha_per_s2: f64,
+    /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a flock that
+    /// goes nowhere.
+    pub c1_gamma_per_s2: f64,
+    /// Highest acceleration that is commanded in m/s^2.
+    pub max_accel_m_s2: f64,
+    /// Distance d that near vehicles keep in m; the smallest distance of two slots unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spacing_m: Option<f64>,
+}
+
+impl Default for FlockingKeys {
+    fn default() -> Self {
+        Self { c1_alpha_per_s2: 1.0, c1_gamma_per_s2: 0.2, max_accel_m_s2: 5.0, spacing_m: None }
+    }
+}
+
+impl FlockingKeys {
+    /// No key follows from others before the slots are known.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        let spacing = self.spacing_m.map(|spacing_m| Gain::positive("law.spacing_m", "the spacing d", spacing_m));
+        let gains = [
+            Gain::positive("law.c1_alpha_per_s2", "the gain c1 on distances", self.c1_alpha_per_s2),
+            Gain::at_least_zero("law.c1_gamma_per_s2", "the gain c1 towards the centre", self.c1_gamma_per_s2),
+            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
+        ];
+        gains.into_iter().chain(spacing).collect()
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<FlockingLaw, ParameterError> {
+        FlockingLaw::new(setting, self.clone())
+    }
+}
+
+/// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms and theory,
+/// 2006, algorithm 2), whose objective pulls with at most `c1_gamma` times a metre, as its algorithm 3 does:
+///
+/// ```text
+/// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i) - c1g s(p_i - p_r) - c2g (v_i - v_r) + r'' - a22 v_i,   |u_i| <= a_max
+/// |z|_s = (sqrt(1 + eps |z|^2) - 1)/eps,   n_ij = q_ij/sqrt(1 + eps |q_ij|^2),   q_ij = p_j - p_i,   s(z) = z/sqrt(1 + |z|^2)
+/// phi_a(z) = rho(z/|r|_s) a s(z - |d|_s),   a_ij = rho(|q_ij|_s/|r|_s),   c2 = 2 sqrt(c1)
+/// ```
+///
+/// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the centre of the
+/// slots, where the reference has carried it, and `v_r` is r'; the source does not feed r''. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
+/// asked for, and given slots are not reached but by chance.
+///
+/// # Guarantee
+/// None: the force between two vehicles is bounded, and so it stops only so much speed.
+///
+/// # Cost
+/// O(near pairs) a step without allocation.
+#[derive(Clone, Debug)]
+pub struct FlockingLaw {
+    keys: FlockingKeys,
+    carried: Carried,
+    count: usize,
+    a22_per_s: f64,
+    /// d \[m\].
+    spacing_m: f64,
+    /// That of the target that d is taken from.
+    revision: u64,
+}
+
+impl FlockingLaw {
+    /// The law of so many vehicles; links play no part.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
+    pub fn new(setting: &Setting<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
+        let &Setting { links, formation, a22_per_s, .. } = setting;
+        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        ParameterError::check(links, formation, &gains)?;
+        let spacing_m = spacing_m(&keys, formation);
+        let carried = Carried::new(setting)?;
+        Ok(Self { keys, carried, count: links.count(), a22_per_s, spacing_m, revision: 0 })
+    }
+
+    /// r \[m\].
+    fn range_m(&self) -> f64 {
+        REACH * self.spacing_m
+    }
+
+    /// What vehicle i makes of one whom it sees at q with a relative velocity.
+    fn pull_m_s2(&self, towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> Vector3<f64> {
+        let c1 = self.keys.c1_alpha_per_s2;
+        let stretched = (1.0 + EPSILON * towards_m.norm_squared()).sqrt();
+        let (length, range) = ((stretched - 1.0) / EPSILON, sigma_norm(self.range_m()));
+        let nearness = bump(length / range);
+        let action = nearness * ACTION * saturated(length - sigma_norm(self.spacing_m));
+        towards_m * (c1 * action / stretched) + relative_m_s * (2.0 * c1.sqrt() * nearness)
+    }
+
+    /// What vehicle i makes of the point that the flock follows, and of its own motion.
+    fn objective_m_s2(&self, at: &Observation<'_>, centre_m: Vector3<f64>, i: usize) -> Vector3<f64> {
+        let c1 = self.keys.c1_gamma_per_s2;
+        let reference = &at.target.reference;
+        let off_m = row(&at.own.positions_m, i) - centre_m - reference.position_m;
+        let own_m_s = row(&at.own.velocities_m_s, i);
+        let off_m_s = own_m_s - reference.velocity_m_s;
+        let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
+        self.carried.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
+    }
+}
+
+/// d \[m\]; a vehicle alone keeps any distance.
+fn spacing_m(keys: &FlockingKeys, formation: &Formation) -> f64 {
+    keys.spacing_m.or_else(|| formation.min_distance().map(|(_, distance_m)| distance_m)).unwrap_or(1.0)
+}
+
+/// `|z|_s` of a vector of this length.
+fn sigma_norm(length: f64) -> f64 {
+    ((1.0 + EPSILON * length * length).sqrt() - 1.0) / EPSILON
+}
+
+/// s.
+fn saturated(z: f64) -> f64 {
+    z / (1.0 + z * z).sqrt()
+}
+
+/// rho.
+fn bump(z: f64) -> f64 {
+    if z < BUMP {
+        1.0
+    } else if z < 1.0 {
+        0.5 * (1.0 + libm::cos(PI * (z - BUMP) / (1.0 - BUMP)))
+    } else {
+        0.0
+    }
+}
+
+impl Law for FlockingLaw {
+    fn name(&self) -> &'static str {
+        "flocking"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, at, command)?;
+        let centre_m = mean_row(&at.target.formation.slots_m);
+        for i in 0..self.count {
+            set_row(command, i, self.objective_m_s2(at, centre_m, i));
+        }
+        for &(a, b) in at.near {
+            for (i, j) in [(a, b), (b, a)] {
+                let seen = at.seen(i, j);
+                let towards_m = seen.position_m - row(&at.own.positions_m, i);
+                let pull = self.pull_m_s2(towards_m, seen.velocity_m_s - row(&at.own.velocities_m_s, i));
+                let sum = row(command, i) + pull;
+                set_row(command, i, sum);
+            }
+        }
+        for i in 0..self.count {
+            let limited = row(command, i).cap_magnitude(self.keys.max_accel_m_s2);
+            set_row(command, i, limited);
+        }
+        check_range(command)
+    }
+
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision != self.revision {
+            check_count(self.count, target.formation.count())?;
+            self.spacing_m = spacing_m(&self.keys, target.formation);
+            self.revision = target.revision;
+        }
+        Ok(())
+    }
+
+    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
+        Certificate::void(Void::CommandLimited)
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
+    }
+
+    fn max_command_m_s2(&self) -> Option<f64> {
+        Some(self.keys.max_accel_m_s2)
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.range_m())
+    }
+
+    /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to the damping,
+    /// a vehicle has at most as many near ones as balls of that diameter fit around it, and the eigenvalues of a sum over pairs
+    /// are at most twice the sum at a vehicle. While velocities differ, what they are matched with changes with distance too.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        let (nearest_m, range_m) = (nearest_m?, self.range_m());
+        let (alpha, gamma) = (self.keys.c1_alpha_per_s2, self.keys.c1_gamma_per_s2);
+        let packed = if nearest_m > range_m { 0.0 } else { (1.0 + 2.0 * range_m / nearest_m).powi(3) - 1.0 };
+        let near = packed.min(self.count.saturating_sub(1) as f64);
+        let steep = 1.0 + PI / (2.0 * (1.0 - BUMP) * sigma_norm(range_m));
+        let of_pair = alpha * ACTION * (steep * range_m * range_m / (1.0 + EPSILON * range_m * range_m) + 1.0);
+        let half = gamma.sqrt() + 2.0 * near * alpha.sqrt();
+        Some(half + (half * half + gamma + 2.0 * near * of_pair).sqrt())
+    }
+
+    /// The objective brakes, and a22 is made up for.
+    fn common_mode_rate_per_s(&self, _a22_per_s: f64) -> f64 {
+        -2.0 * self.keys.c1_gamma_per_s2.sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,195 @@
+//! The edge-tension sums over all edges, in blocks that fill the lanes of vector instructions.
+//!
+//! The loops over edges hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
+//! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
+//! are taken in an order fixed by the edges alone, so the bits depend neither on the width of the machine's vectors
+//! nor on the level of optimisation.
+#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
+
+mod block;
+
+use std::collections::TryReserveError;
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
+
+use self::block::{Block, Ends, LANES, NOWHERE_M, add_lanes, total};
+use super::bands::Bands;
+use super::tension::OutOfDomain;
+use crate::graph::Graph;
+use tautline_core::swarm::{Rows, columns, columns_mut};
+
+/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. The order of sums
+/// differs, so this number is a part of what the bits of a flight rest on.
+const LISTED_UP_TO: usize = 16;
+/// From this many vehicles on all threads at hand share the rows of the complete graph, in bands. Sums of bands differ from
+/// those of all rows in their last bits, so this number is a part of what the bits of a flight rest on.
+const BANDED_FROM: usize = 640;
+/// Number of bands, each with about as many edges as any other; so many threads have work.
+const BANDS: usize = 16;
+/// Edges in a block of a row: so many that stages follow each other seldom, and so few that they stay near the processor.
+const ROW_BLOCK: usize = 8 * LANES;
+/// Edges in a block of a list: few, because lists are often short and a block is cleared for each.
+const LIST_BLOCK: usize = 2 * LANES;
+
+/// The edges of a graph with the length scale of each.
+#[derive(Clone, Debug)]
+pub(super) struct Kernel {
+    delta_m: f64,
+    /// The number of edges.
+    edges: usize,
+    /// 1/K of each edge, in row order, and room for whole lanes.
+    inverse_k_per_m: Vec<f64>,
+    /// The rows of the complete graph; none where edges are listed.
+    bands: Option<Bands>,
+    list: Vec<[usize; 2]>,
+    arch: pulp::Arch,
+}
+
+impl Kernel {
+    /// The edges of a graph, whose 1/K are still to be given. An error where they do not fit in memory.
+    pub(super) fn new(graph: &Graph, delta_m: f64) -> Result<Self, TryReserveError> {
+        let (count, edges) = (graph.count(), graph.edge_count());
+        let mut inverse_k_per_m = Vec::new();
+        inverse_k_per_m.try_reserve_exact(edges + LANES)?;
+        inverse_k_per_m.resize(edges, f64::NAN);
+        inverse_k_per_m.resize(edges + LANES, 1.0);
+        let is_listed = !graph.is_complete() || count <= LISTED_UP_TO;
+        let bands = if count < BANDED_FROM { 1 } else { BANDS };
+        Ok(Self {
+            delta_m,
+            edges,
+            inverse_k_per_m,
+            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, NOWHERE_M)),
+            list: if is_listed { graph.edges().map(|(i, j)| [i, j]).collect() } else { Vec::new() },
+            arch: pulp::Arch::new(),
+        })
+    }
+
+    /// 1/K of each edge in row order \[1/m\].
+    pub(super) fn inverse_k_per_m_mut(&mut self) -> &mut [f64] {
+        &mut self.inverse_k_per_m[..self.edges]
+    }
+
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\], and
+    /// returns (1/alpha) sum of V over all edges, which costs next to nothing here.
+    /// Both tables have a row for each vehicle of the graph.
+    pub(super) fn add_pulls(&mut self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
+        let mut bands = self.bands.take();
+        let potential = self.add_pulls_in(bands.as_mut(), positions_m, sums);
+        self.bands = bands;
+        potential
+    }
+
+    /// (1/alpha) sum of V over all edges.
+    pub(super) fn potential(&self, positions_m: &Rows) -> Result<f64, OutOfDomain> {
+        self.add_pulls_in(self.bands.clone().as_mut(), positions_m, &mut Rows::zeros(positions_m.nrows()))
+    }
+
+    fn add_pulls_in(&self, bands: Option<&mut Bands>, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
+        let (axes, sums) = (columns(positions_m), columns_mut(sums));
+        match bands {
+            Some(bands) => bands.add_to(axes, sums, |rows, axes, sums| {
+                self.arch.dispatch(AddRows { kernel: self, count: positions_m.nrows(), rows, axes, sums })
+            }),
+            None => self.arch.dispatch(AddList { kernel: self, axes, sums }),
+        }
+    }
+}
+
+/// Adds the pulls of the edges from these rows of the complete graph to later ones.
+struct AddRows<'a> {
+    kernel: &'a Kernel,
+    count: usize,
+    rows: Range<usize>,
+    /// The positions along each axis, and [`NOWHERE_M`] in the rest of the lanes.
+    axes: [&'a [f64]; 3],
+    /// From the first of the rows on, and room for whole lanes.
+    sums: [&'a mut [f64]; 3],
+}
+
+impl WithSimd for AddRows<'_> {
+    type Output = Result<f64, OutOfDomain>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { kernel, count, rows, axes: [x, y, z], sums: [of_x, of_y, of_z] } = self;
+        let mut block = Block::<ROW_BLOCK>::new(kernel.delta_m);
+        let start = rows.start;
+        let mut edge = start * (2 * count - start).saturating_sub(1) / 2;
+        for i in start..rows.end {
+            let own = [x[i], y[i], z[i]];
+            let mut of_own = [[0.0; LANES]; 3];
+            let mut j = i + 1;
+            while j < count {
+                let edges = ROW_BLOCK.min(count - j);
+                let lanes = edges.next_multiple_of(LANES);
+                let (from, to) = (j - start, j - start + lanes);
+                let ends = Ends {
+                    count: edges,
+                    inverse_k_per_m: &kernel.inverse_k_per_m[edge..edge + lanes],
+                    positions_m: [&x[j..j + lanes], &y[j..j + lanes], &z[j..j + lanes]],
+                    sums: [&mut of_x[from..to], &mut of_y[from..to], &mut of_z[from..to]],
+                };
+                let pulls = block.pull(simd, own, ends);
+                for axis in 0..3 {
+                    add_lanes(simd, &mut of_own[axis], pulls[axis]);
+                }
+                edge += edges;
+                j += edges;
+            }
+            of_x[i - start] += total(of_own[0]);
+            of_y[i - start] += total(of_own[1]);
+            of_z[i - start] += total(of_own[2]);
+        }
+        block.finish()
+    }
+}
+
+/// Adds the pulls of all edges that are listed.
+struct AddList<'a> {
+    kernel: &'a Kernel,
+    axes: [&'a [f64]; 3],
+    sums: [&'a mut [f64]; 3],
+}
+
+impl WithSimd for AddList<'_> {
+    type Output = Result<f64, OutOfDomain>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { kernel, axes, sums } = self;
+        let mut block = Block::<LIST_BLOCK>::new(kernel.delta_m);
+        let mut first = 0;
+        while first < kernel.list.len() {
+            let list = &kernel.list[first..kernel.list.len().min(first + LIST_BLOCK)];
+            // Each edge begins at the origin, where its first vehicle is to its second.
+            let (mut ends_m, mut of_ends) = ([[NOWHERE_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
+            for axis in 0..3 {
+                for k in 0..list.len() {
+                    ends_m[axis][k] = axes[axis][list[k][1]] - axes[axis][list[k][0]];
+                }
+            }
+            let lanes = list.len().next_multiple_of(LANES);
+            let ([x, y, z], [of_x, of_y, of_z]) = (&ends_m, &mut of_ends);
+            let ends = Ends {
+                count: list.len(),
+                inverse_k_per_m: &kernel.inverse_k_per_m[first..first + lanes],
+                positions_m: [&x[..lanes], &y[..lanes], &z[..lanes]],
+                sums: [&mut of_x[..lanes], &mut of_y[..lanes], &mut of_z[..lanes]],
+            };
+            let pulls = block.pull(simd, [0.0; 3], ends);
+            for axis in 0..3 {
+                for k in 0..list.len() {
+                    sums[axis][list[k][0]] += pulls[axis][k];
+                    sums[axis][list[k][1]] -= pulls[axis][k];
+                }
+            }
+            first += list.len();
+        }
+        block.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests;

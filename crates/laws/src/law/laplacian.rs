@@ -1,0 +1,159 @@
+//! The Laplacian baseline (3): consensus on the formation, without avoidance.
+
+use serde::{Deserialize, Serialize};
+
+use super::certificate::{Certificate, Void};
+use super::consensus::{
+    add_heard, add_laplacian_product, check_observation, check_range, check_state, consensus_margin, of_errors_m,
+    of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+};
+use super::error::{LawError, ParameterError};
+use super::interface::{Law, VelocityMargin};
+use super::modes::{Linear, Mode};
+use super::pinned::PinnedConsensus;
+use super::setting::{Gain, Setting};
+use crate::formation::Formation;
+use crate::graph::{Graph, Pinning};
+use crate::observation::Observation;
+use tautline_core::swarm::{Rows, row};
+
+/// Keys of `[law]` with `kind = "laplacian"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LaplacianKeys {
+    /// Gain on positions in 1/s^2.
+    #[serde(default = "one")]
+    pub f1_per_s2: f64,
+    /// Gain on velocities in 1/s; 1 + `swarm.a22_per_s` unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f2_per_s: Option<f64>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Default for LaplacianKeys {
+    fn default() -> Self {
+        Self { f1_per_s2: one(), f2_per_s: None }
+    }
+}
+
+impl LaplacianKeys {
+    /// Puts in what follows from other keys.
+    pub(super) fn complete(self, a22_per_s: f64) -> Self {
+        Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        let f1 = Gain::positive("law.f1_per_s2", "the gain f1", self.f1_per_s2);
+        let f2 = self.f2_per_s.map(|f2_per_s| Gain::at_least_zero("law.f2_per_s", "the gain f2", f2_per_s));
+        std::iter::once(f1).chain(f2).collect()
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<LaplacianLaw, ParameterError> {
+        let f2_per_s = self.f2_per_s.unwrap_or(1.0 + setting.a22_per_s);
+        LaplacianLaw::new(setting.links, setting.formation, self.f1_per_s2, f2_per_s)
+    }
+}
+
+/// The Laplacian law on an undirected graph of N vehicles, equation (3):
+///
+/// ```text
+/// u_i = -(1/N) sum_{j in N_i} [ f1 ((p_i - h_i) - (p_j - h_j)) + f2 (v_i - v_j) ]
+/// ```
+///
+/// It reaches the slots `h_i` up to a common translation from any start on a connected graph, and does not keep
+/// vehicles apart. The source's gains are f1 = 1 and f2 = 1 + a22.
+///
+/// # Energy
+/// On the complete graph, with `e_i = p_i - h_i`,
+///
+/// ```text
+/// E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2,    dE/dt = (a22 - f2) sum |v_i - mean v|^2
+/// ```
+///
+/// For f1 > 0 this is a Lyapunov function wherever f2 >= a22. On other graphs, and for f1 <= 0, none is given.
+///
+/// # Cost
+/// O(N) a step on the complete graph, O(edges) on others, without allocation.
+#[derive(Clone, Debug)]
+pub struct LaplacianLaw {
+    graph: Graph,
+    f1_per_s2: f64,
+    f2_per_s: f64,
+}
+
+impl LaplacianLaw {
+    /// The law with position gain f1 \[1/s^2\] and velocity gain f2 \[1/s\].
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
+    /// is not finite.
+    pub fn new(graph: &Graph, formation: &Formation, f1_per_s2: f64, f2_per_s: f64) -> Result<Self, ParameterError> {
+        ParameterError::check(graph, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
+        Ok(Self { graph: graph.clone(), f1_per_s2, f2_per_s })
+    }
+}
+
+impl Law for LaplacianLaw {
+    fn name(&self) -> &'static str {
+        "laplacian"
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        &["all share a compass"]
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), at, command)?;
+        command.fill(0.0);
+        let (per_vehicle, slots_m) = (-1.0 / at.own.count().max(1) as f64, &at.target.formation.slots_m);
+        let (f1, f2) = (self.f1_per_s2 * per_vehicle, self.f2_per_s * per_vehicle);
+        if let Some(swarm) = at.shared() {
+            add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), f1, command);
+            add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), f2, command);
+        } else {
+            add_heard(at, command, |i, own, j, heard| {
+                let errors_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
+                Ok(f1 * errors_m + f2 * (own.velocity_m_s - heard.velocity_m_s))
+            })?;
+        }
+        check_range(command)
+    }
+
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        if !self.graph.is_complete() || self.f1_per_s2 <= 0.0 {
+            return None;
+        }
+        let swarm = at.own;
+        check_state(self.graph.count(), swarm).ok()?;
+        let error_m = |i| row(&swarm.positions_m, i) - row(&at.target.formation.slots_m, i);
+        let potential = 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(swarm.count(), error_m);
+        let energy = relative_kinetic_energy(swarm) + potential;
+        energy.is_finite().then_some(energy)
+    }
+
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        Certificate { energy_initial: self.energy(start), ..Certificate::void(Void::NoBarrier) }
+    }
+
+    /// The law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues 0 <= mu <= N of the
+    /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
+        Some(self.f1_per_s2.sqrt().max((self.f2_per_s - a22_per_s).abs()).max(a22_per_s.abs()))
+    }
+
+    fn linear(&self, _formation: &Formation) -> Option<Linear> {
+        let count = self.graph.count().max(1) as f64;
+        let gain = Mode { stiffness_per_s2: self.f1_per_s2, damping_per_s: self.f2_per_s }.times(1.0 / count);
+        Some(PinnedConsensus::new(&self.graph, Pinning::Nobody).linear(gain, gain))
+    }
+
+    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        Some(consensus_margin(self.graph.count(), self.f2_per_s, connectivity, a22_per_s))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,266 @@
+//! Optimal reciprocal collision avoidance: each vehicle takes the velocity nearest to the one it prefers that no other, doing
+//! the same, needs to collide with.
+
+mod obstacle;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use self::obstacle::VelocityObstacle;
+use super::carried::Carried;
+use super::certificate::{Certificate, Void};
+use super::consensus::{check_observation, check_range};
+use super::error::{LawError, ParameterError};
+use super::half_spaces::{HalfSpace, HalfSpaces};
+use super::interface::{Controls, Law};
+use super::near_lists::NearLists;
+use super::setting::{Gain, Setting};
+use crate::observation::Observation;
+use tautline_core::swarm::{Pair, Rows, row, set_row};
+
+/// The margin unless given, as a part of delta.
+const MARGIN: f64 = 0.01;
+
+/// Keys of `[law]` with `kind = "orca"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct OrcaKeys {
+    /// Preferred velocity towards the slot for each metre that it is away, in 1/s.
+    pub k_per_s: f64,
+    /// Highest speed that a vehicle prefers in m/s.
+    pub speed_m_s: f64,
+    /// Highest speed that it may take in m/s.
+    pub max_speed_m_s: f64,
+    /// For how long a velocity must be free of collisions in s.
+    pub horizon_s: f64,
+    /// Rate at which the chosen velocity is taken on in 1/s; vehicles that are too near each other part within its inverse.
+    pub tracking_per_s: f64,
+    /// Highest acceleration that is commanded in m/s^2.
+    pub max_accel_m_s2: f64,
+    /// How many others a vehicle minds at most, the nearest ones.
+    pub neighbours_max: usize,
+    /// How near others must be to be minded in m; unless given, as far as two vehicles at their highest speeds come towards
+    /// each other within the horizon, and what they keep apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_m: Option<f64>,
+    /// How much more than delta vehicles mean to keep apart in m; a hundredth of delta unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub margin_m: Option<f64>,
+}
+
+impl Default for OrcaKeys {
+    fn default() -> Self {
+        Self {
+            k_per_s: 1.0,
+            speed_m_s: 1.0,
+            max_speed_m_s: 2.0,
+            horizon_s: 2.0,
+            tracking_per_s: 5.0,
+            max_accel_m_s2: 5.0,
+            neighbours_max: 10,
+            range_m: None,
+            margin_m: None,
+        }
+    }
+}
+
+impl OrcaKeys {
+    /// No key follows from others before delta is known.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        let range = self.range_m.map(|range_m| Gain::positive("law.range_m", "the range", range_m));
+        let margin = self.margin_m.map(|margin_m| Gain::at_least_zero("law.margin_m", "the margin", margin_m));
+        let gains = [
+            Gain::positive("law.k_per_s", "the gain k", self.k_per_s),
+            Gain::positive("law.speed_m_s", "the preferred speed", self.speed_m_s),
+            Gain::positive("law.max_speed_m_s", "the highest speed", self.max_speed_m_s),
+            Gain::positive("law.horizon_s", "the horizon", self.horizon_s),
+            Gain::positive("law.tracking_per_s", "the rate of tracking", self.tracking_per_s),
+            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
+            Gain::positive("law.neighbours_max", "the number of neighbours", self.neighbours_max as f64),
+        ];
+        gains.into_iter().chain(range).chain(margin).collect()
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<OrcaLaw, ParameterError> {
+        OrcaLaw::new(setting, self.clone())
+    }
+}
+
+/// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance, 2011), with
+/// half-spaces, for vehicles of diameter D = delta + margin that track the velocities it chooses:
+///
+/// ```text
+/// V_i   = in |v| <= v_max and all half-spaces of i, the velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i|,   d_i = h_i + r - p_i
+/// u_i   = r'' + tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
+/// ```
+///
+/// The velocity obstacle of a pair is the set of relative velocities that bring the two nearer than D within the horizon: a
+/// cone with a round tip. Where w takes `v_i - v_j` to the boundary of that set the shortest way, with its outward normal n there,
+/// the half-space of i is `n . (V - v_i - w/2) >= 0`: each of the two does half. Where not all half-spaces have a point in
+/// common, the velocity that violates least is taken. Two that are nearer than D part within 1/tracking.
+///
+/// # Guarantee
+/// None. Velocities that are taken on at once, chosen anew all the time and free of conflicts, keep delta. Accelerations that are
+/// limited, velocities that are tracked, and crowds in which no velocity is free void that; without a margin, vehicles that pass come to D exactly, and rounding decides.
+///
+/// # Cost
+/// O(near pairs) a step without allocation.
+#[derive(Clone, Debug)]
+pub struct OrcaLaw {
+    keys: OrcaKeys,
+    carried: Carried,
+    count: usize,
+    delta_m: f64,
+    /// D \[m\].
+    diameter_m: f64,
+    a22_per_s: f64,
+    range_m: f64,
+    near: NearLists,
+    /// Scratch: the nearest of a vehicle's near ones \[m^2\], the first `neighbours_max` of them.
+    nearest: Vec<(f64, usize)>,
+    half_spaces: HalfSpaces,
+}
+
+impl OrcaLaw {
+    /// The law of so many vehicles; links play no part.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
+    /// finite, or where there is a reference that some do not know.
+    pub fn new(setting: &Setting<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
+        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
+        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        ParameterError::check(links, formation, &gains)?;
+        let diameter_m = delta_m + keys.margin_m.unwrap_or(MARGIN * delta_m);
+        let range_m = keys.range_m.unwrap_or(diameter_m + 2.0 * keys.max_speed_m_s * keys.horizon_s);
+        Ok(Self {
+            keys,
+            carried: Carried::new(setting)?,
+            count: links.count(),
+            delta_m,
+            diameter_m,
+            a22_per_s,
+            range_m,
+            near: NearLists::default(),
+            nearest: Vec::new(),
+            half_spaces: HalfSpaces::default(),
+        })
+    }
+
+    /// Writes the velocities V \[m/s\], N x 3, that vehicles choose into `velocities`: what ORCA is before vehicles have a limit
+    /// to their acceleration.
+    ///
+    /// # Errors
+    /// [`LawError`] where a state is not finite or two vehicles are in the same place.
+    pub fn velocities(&mut self, at: &Observation<'_>, velocities: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, at, velocities)?;
+        self.near.update(self.count, at.near);
+        for i in 0..self.count {
+            self.find_nearest(at, i);
+            self.half_spaces.clear();
+            for place in 0..self.nearest.len() {
+                let half_space = self.half_space(at, i, self.nearest[place].1)?;
+                self.half_spaces.push(half_space);
+            }
+            let preferred = self.preferred_m_s(at, i);
+            set_row(velocities, i, self.half_spaces.nearest(preferred, self.keys.max_speed_m_s).point);
+        }
+        check_range(velocities)
+    }
+
+    /// Where vehicle i would fly if it were alone.
+    fn preferred_m_s(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
+        let reference = &at.target.reference;
+        let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
+        reference.velocity_m_s + (self.keys.k_per_s * missing_m).cap_magnitude(self.keys.speed_m_s)
+    }
+
+    /// Keeps the nearest of those whom vehicle i sees within the range, the nearest first and of equals the lower index.
+    fn find_nearest(&mut self, at: &Observation<'_>, i: usize) {
+        self.nearest.clear();
+        let own_m = row(&at.own.positions_m, i);
+        for &j in self.near.of(i) {
+            let apart = (at.seen(i, j).position_m - own_m).norm_squared();
+            if apart > self.range_m * self.range_m {
+                continue;
+            }
+            let place = self.nearest.partition_point(|&(nearer, _)| nearer <= apart);
+            if place < self.keys.neighbours_max {
+                self.nearest.truncate(self.keys.neighbours_max - 1);
+                self.nearest.insert(place, (apart, j));
+            }
+        }
+    }
+
+    /// What vehicle j leaves of vehicle i's velocities.
+    fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
+        let seen = at.seen(i, j);
+        let own_m_s = row(&at.own.velocities_m_s, i);
+        let towards_m = seen.position_m - row(&at.own.positions_m, i);
+        if towards_m.norm_squared() == 0.0 {
+            return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
+        }
+        let (diameter_m, horizon_s) = (self.diameter_m, self.keys.horizon_s);
+        let obstacle = VelocityObstacle { towards_m, diameter_m, horizon_s, parting_s: 1.0 / self.keys.tracking_per_s };
+        let (normal, depth_m_s) = obstacle.way_out(own_m_s - seen.velocity_m_s);
+        Ok(HalfSpace { normal, offset: normal.dot(&own_m_s) + 0.5 * depth_m_s })
+    }
+}
+
+impl Law for OrcaLaw {
+    fn name(&self) -> &'static str {
+        "orca"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.velocities(at, command)?;
+        let fed_m_s2 = self.carried.fed_m_s2(&at.target.reference);
+        for i in 0..self.count {
+            let own_m_s = row(&at.own.velocities_m_s, i);
+            let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
+            let wanted = fed_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
+            set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
+        }
+        check_range(command)
+    }
+
+    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
+        Certificate::void(Void::CommandLimited)
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        self.carried.needs()
+    }
+
+    fn controls(&self) -> Controls {
+        self.carried.controls()
+    }
+
+    fn max_command_m_s2(&self) -> Option<f64> {
+        Some(self.keys.max_accel_m_s2)
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.range_m)
+    }
+
+    /// A vehicle alone follows x'' = -tracking (x' + k x). Nothing is known where others are within the range: the velocity that
+    /// is chosen may turn as fast as two of them pass.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
+        let OrcaKeys { tracking_per_s, k_per_s, .. } = self.keys;
+        nearest_m.filter(|nearest_m| *nearest_m > self.range_m)?;
+        Some(tracking_per_s.max((tracking_per_s * k_per_s).sqrt()))
+    }
+
+    /// Vehicles track velocities of their own, and a22 is made up for.
+    fn common_mode_rate_per_s(&self, _a22_per_s: f64) -> f64 {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+//! Consensus on slots over links, with whoever knows the reference drawn to it: the product of the pinned Laplacian.
+
+use nalgebra::Vector3;
+
+use super::consensus::{
+    add_heard, add_laplacian_product, of_errors_m, of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+};
+use super::error::LawError;
+use super::modes::{Heard, HeardLinks, Linear, Mode};
+use crate::formation::Formation;
+use crate::graph::{Graph, Pinning};
+use crate::observation::Observation;
+use crate::target::Reference;
+use tautline_core::swarm::{Rows, Swarm, columns, columns_mut, row, set_row};
+
+/// Gains on errors of position \[1/s^2\] and of velocity \[1/s\].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gains {
+    pub(super) position: f64,
+    pub(super) velocity: f64,
+}
+
+/// The links of a swarm and who knows the reference, with the errors `e_i = p_i - h_i` in mind.
+#[derive(Clone, Debug)]
+pub(super) struct PinnedConsensus {
+    pub(super) graph: Graph,
+    pub(super) pinning: Pinning,
+    /// Scratch: `k e_i + c v_i`, where links are many.
+    pulls: Rows,
+}
+
+impl PinnedConsensus {
+    pub(super) fn new(graph: &Graph, pinning: Pinning) -> Self {
+        Self { graph: graph.clone(), pinning, pulls: Rows::zeros(graph.count()) }
+    }
+
+    /// Least eigenvalue of the pinned Laplacian M; a vehicle alone, with no neighbour to be pulled by, has 1.
+    pub(super) fn connectivity(&self) -> f64 {
+        if self.graph.count() == 1 && self.pinning == Pinning::Nobody {
+            return 1.0;
+        }
+        self.graph.pinned_connectivity(&self.pinning)
+    }
+
+    /// Linear motion about the slots with these gains times the pinned Laplacian M: a leader is drawn to the reference by the
+    /// gains `lead` alone.
+    pub(super) fn linear(&self, gain: Mode, lead: Mode) -> Linear {
+        let leads = self.pinning.leader().map(|_| lead);
+        let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
+        let free = eigenvalues.iter().map(|&eigenvalue| gain.times(eigenvalue)).chain(leads).collect();
+        let links = self.heard_links(&eigenvalues);
+        Linear { free, in_contact: None, heard: links.map(|links| Heard { gain, links }) }
+    }
+
+    /// The loop over links, where own and others' parts have the same modes, and on a star.
+    fn heard_links(&self, eigenvalues: &[f64]) -> Option<HeardLinks> {
+        let own = self.graph.pinned_diagonal(&self.pinning);
+        let (&first, &last) = (own.first()?, own.last()?);
+        if own.iter().all(|&other| other == first) {
+            // M = D - A, and common motion has the eigenvalue 0 where nobody knows a reference.
+            let common = (self.pinning == Pinning::Nobody).then_some(first);
+            return Some(HeardLinks::Alike {
+                own: first,
+                others: eigenvalues.iter().map(|eigenvalue| first - eigenvalue).chain(common).collect(),
+            });
+        }
+        let (least, most) = (own.iter().copied().fold(first, f64::min), own.iter().copied().fold(last, f64::max));
+        let leaves = self.graph.edge_count();
+        let is_star = leaves + 1 == self.graph.count()
+            && matches!(self.pinning, Pinning::Nobody | Pinning::All)
+            && most - least == (leaves - 1) as f64;
+        is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
+    }
+
+    /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, and
+    /// `k (e_i - r) + c (v_i - r')` where i knows the reference.
+    pub(super) fn add_pulls(
+        &mut self,
+        at: &Observation<'_>,
+        gains: Gains,
+        scale: f64,
+        sums: &mut Rows,
+    ) -> Result<(), LawError> {
+        let (slots_m, Gains { position: k, velocity: c }) = (&at.target.formation.slots_m, gains);
+        if let Some(swarm) = at.shared() {
+            let (errors_m, velocities_m_s) = (of_errors_m(&swarm.positions_m, slots_m), columns(&swarm.velocities_m_s));
+            let pull = |axis: usize| {
+                let (error_m, velocity_m_s) = (&errors_m[axis], velocities_m_s[axis]);
+                move |i: usize| k * error_m(i) + c * velocity_m_s[i]
+            };
+            let pulls = [pull(0), pull(1), pull(2)];
+            if self.graph.is_complete() || self.graph.edge_count() <= self.graph.count() {
+                add_laplacian_product(&self.graph, &pulls, scale, sums);
+            } else {
+                // Each is wanted at several links.
+                for (pull, column) in pulls.iter().zip(columns_mut(&mut self.pulls)) {
+                    column.iter_mut().enumerate().for_each(|(i, kept)| *kept = pull(i));
+                }
+                add_laplacian_product(&self.graph, &of_table(&self.pulls), scale, sums);
+            }
+        } else {
+            add_heard(at, sums, |i, own, j, heard| {
+                let error_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
+                Ok(scale * (k * error_m + c * (own.velocity_m_s - heard.velocity_m_s)))
+            })?;
+        }
+        if matches!(self.pinning, Pinning::All | Pinning::Listed(_)) {
+            for i in (0..self.graph.count()).filter(|&i| self.pinning.pins(i)) {
+                let (error_m, velocity_m_s) = off_reference(at, i);
+                let sum = row(sums, i) + scale * (k * error_m + c * velocity_m_s);
+                set_row(sums, i, sum);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts what keeps a leader on the reference, whatever others do, in the place of its row.
+    pub(super) fn lead(&self, at: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
+        if let Some(leader) = self.pinning.leader() {
+            let (error_m, velocity_m_s) = off_reference(at, leader);
+            let back = gains.position * error_m + gains.velocity * velocity_m_s;
+            set_row(command, leader, fed_forward(&at.target.reference, a22_per_s) - back);
+        }
+    }
+
+    /// `e' M e` \[m^2\]: the sum over links of `|e_i - e_j|^2`, and of `|e_i|^2` over those who know the reference, for
+    /// errors that are counted from it.
+    pub(super) fn stretch_m2(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
+        let count = self.graph.count();
+        let links = if self.graph.is_complete() {
+            count as f64 * sum_of_squares_about_mean(count, &error_m)
+        } else {
+            self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum()
+        };
+        let pinned = (0..count).filter(|&i| self.pinning.pins(i)).map(|i| error_m(i).norm_squared());
+        links + pinned.sum::<f64>()
+    }
+
+    /// `1/2 sum |v~_i|^2` \[m^2/s^2\], relative to the mean where nobody knows a reference, to the leader where one leads, and
+    /// otherwise to the reference.
+    pub(super) fn kinetic_energy(&self, swarm: &Swarm, reference: &Reference) -> f64 {
+        let velocity_m_s = match self.pinning {
+            Pinning::Nobody => return relative_kinetic_energy(swarm),
+            Pinning::Leader(leader) => row(&swarm.velocities_m_s, leader),
+            Pinning::All | Pinning::Listed(_) => reference.velocity_m_s,
+        };
+        let square = |i: usize| (row(&swarm.velocities_m_s, i) - velocity_m_s).norm_squared();
+        0.5 * (0..swarm.count()).map(square).sum::<f64>()
+    }
+}
+
+/// `p_i - h_i - r` \[m\] and `v_i - r'` \[m/s\].
+fn off_reference(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+    let reference = &at.target.reference;
+    let error_m = error_m(&at.own.positions_m, at.target.formation, reference.position_m, i);
+    (error_m, row(&at.own.velocities_m_s, i) - reference.velocity_m_s)
+}
+
+/// `p_i - h_i` from a place \[m\].
+pub(super) fn error_m(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, i: usize) -> Vector3<f64> {
+    row(positions_m, i) - row(&formation.slots_m, i) - place_m
+}
+
+/// What holds a vehicle that is on the reference on it: `r'' - a22 r'` \[m/s^2\].
+pub(super) fn fed_forward(reference: &Reference, a22_per_s: f64) -> Vector3<f64> {
+    reference.acceleration_m_s2 - a22_per_s * reference.velocity_m_s
+}

@@ -1,0 +1,292 @@
+//! An artificial potential field: consensus on the formation, repulsion from whoever is near, each vehicle braking itself.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::certificate::{Certificate, Void};
+use super::consensus::{
+    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
+};
+use super::error::{LawError, ParameterError};
+use super::interface::{Law, VelocityMargin};
+use super::memo::Memo;
+use super::setting::{Gain, Setting};
+use super::tension::TensionError;
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::observation::Observation;
+use crate::target::Target;
+use tautline_core::swarm::{Pair, Rows, row, set_row};
+
+/// Keys of `[law]` with `kind = "potential"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PotentialKeys {
+    /// Gain on positions over links in 1/s^2.
+    pub k_per_s2: f64,
+    /// Braking of each vehicle's own velocity in 1/s.
+    pub c_per_s: f64,
+    /// Scale of the repulsion in m^4/s^2.
+    pub eta_m4_per_s2: f64,
+    /// Highest acceleration that is commanded in m/s^2; no limit unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_accel_m_s2: Option<f64>,
+}
+
+impl Default for PotentialKeys {
+    fn default() -> Self {
+        Self { k_per_s2: 1.0, c_per_s: 2.0, eta_m4_per_s2: 1.0, max_accel_m_s2: None }
+    }
+}
+
+impl PotentialKeys {
+    /// No key follows from others.
+    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
+        self
+    }
+
+    pub(super) fn gains(&self) -> Vec<Gain> {
+        let gains = [
+            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
+            Gain::positive("law.c_per_s", "the braking c", self.c_per_s),
+            Gain::positive("law.eta_m4_per_s2", "the scale eta", self.eta_m4_per_s2),
+        ];
+        let limit =
+            self.max_accel_m_s2.map(|limit| Gain::positive("law.max_accel_m_s2", "the highest acceleration", limit));
+        gains.into_iter().chain(limit).collect()
+    }
+
+    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<PotentialLaw, ParameterError> {
+        PotentialLaw::new(setting, self.clone())
+    }
+}
+
+/// The potential field of Khatib (1986) between vehicles, on an undirected graph of N vehicles: with `e_i = p_i - h_i`
+/// and the clearance rho = l - delta,
+///
+/// ```text
+/// u_i = -(k/N) sum_{j in N_i} (e_i - e_j) - c v_i - sum_{j : l_ij < R} grad_i U(l_ij)
+/// U(l) = (eta/2) (1/rho - 1/rho_R)^2,    R = smallest distance of two slots,    rho_R = R - delta
+/// ```
+///
+/// Vehicles repel each other while they are nearer than slots are, whether they are linked or not. Where an acceleration is limited,
+/// longer ones are shortened to that, and nothing is certified.
+///
+/// # Energy
+/// ```text
+/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U,   dE/dt = (a22 - c) sum |v_i|^2
+/// ```
+///
+/// # Certificate
+/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. It assumes exact knowledge of
+/// links and near pairs, no limit on the acceleration, no disturbance, continuous time.
+///
+/// # Cost
+/// O(links + near pairs) a step without allocation, and so is its energy; that of any other state compares all pairs.
+#[derive(Clone, Debug)]
+pub struct PotentialLaw {
+    graph: Graph,
+    keys: PotentialKeys,
+    delta_m: f64,
+    a22_per_s: f64,
+    /// R \[m\].
+    range_m: f64,
+    /// That of the target that R is taken from.
+    revision: u64,
+    /// Sum of U over the near pairs.
+    memo: Memo,
+}
+
+impl PotentialLaw {
+    /// The law on these links, with the smallest slot distance as its range.
+    ///
+    /// # Errors
+    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
+    /// is not finite.
+    pub fn new(setting: &Setting<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
+        let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
+        ParameterError::check(setting.links, setting.formation, &gains)?;
+        let range_m = range(setting.formation, setting.delta_m).map_err(|(pair, rest_m)| ParameterError::Tension {
+            pair,
+            source: TensionError::Rest { rest_m, delta_m: setting.delta_m },
+        })?;
+        Ok(Self {
+            graph: setting.links.clone(),
+            keys,
+            delta_m: setting.delta_m,
+            a22_per_s: setting.a22_per_s,
+            range_m,
+            revision: 0,
+            memo: Memo::new(setting.links.count()),
+        })
+    }
+
+    /// `1/rho - 1/rho_R` \[1/m\] and 1/rho at a distance \[m\] within the range.
+    fn steepness(&self, pair: Pair, separation_m: f64) -> Result<(f64, f64), LawError> {
+        if separation_m <= self.delta_m {
+            return Err(LawError::Collision { pair, separation_m, delta_m: self.delta_m });
+        }
+        let inverse = 1.0 / (separation_m - self.delta_m);
+        Ok((inverse - 1.0 / (self.range_m - self.delta_m), inverse))
+    }
+
+    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and U; nothing out of range.
+    fn repulsion(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
+        let separation_m = apart_m.norm();
+        if separation_m >= self.range_m {
+            return Ok(None);
+        }
+        let (steep, inverse) = self.steepness(Pair::new(i, j), separation_m)?;
+        let eta_m4_per_s2 = self.keys.eta_m4_per_s2;
+        let push_m_s2 = apart_m * (eta_m4_per_s2 * steep * inverse * inverse / separation_m);
+        Ok(Some((push_m_s2, 0.5 * eta_m4_per_s2 * steep * steep)))
+    }
+
+    /// Sum of U over all pairs \[m^2/s^2\].
+    fn repulsive_potential(&self, positions_m: &Rows) -> Result<f64, LawError> {
+        let mut sum = 0.0;
+        for i in 0..positions_m.nrows() {
+            for j in i + 1..positions_m.nrows() {
+                let repulsion = self.repulsion(i, j, row(positions_m, i) - row(positions_m, j))?;
+                sum += repulsion.map_or(0.0, |(_, of_pair)| of_pair);
+            }
+        }
+        Ok(sum)
+    }
+
+    fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
+        check_state(self.graph.count(), at.own)?;
+        let (positions_m, slots_m) = (&at.own.positions_m, &at.target.formation.slots_m);
+        let error_m = |i| row(positions_m, i) - row(slots_m, i);
+        let attraction: f64 = self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum();
+        let repulsion = self.memo.of(positions_m).map_or_else(|| self.repulsive_potential(positions_m), Ok)?;
+        let kinetic = 0.5 * at.own.velocities_m_s.norm_squared();
+        let energy = kinetic + 0.5 * self.keys.k_per_s2 / at.own.count().max(1) as f64 * attraction + repulsion;
+        if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
+    }
+}
+
+/// R of a formation \[m\]: the smallest distance of two slots, which must be more than delta. Where it is not, the two and
+/// their distance are the error.
+fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
+    match formation.min_distance() {
+        Some((pair, distance_m)) if distance_m <= delta_m => Err((pair, distance_m)),
+        nearest => Ok(nearest.map_or(f64::INFINITY, |(_, distance_m)| distance_m)),
+    }
+}
+
+impl Law for PotentialLaw {
+    fn name(&self) -> &'static str {
+        "potential"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), at, command)?;
+        command.copy_from(&at.own.velocities_m_s);
+        *command *= -self.keys.c_per_s;
+        let (slots_m, gain) = (&at.target.formation.slots_m, -self.keys.k_per_s2 / at.own.count().max(1) as f64);
+        if let Some(swarm) = at.shared() {
+            add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), gain, command);
+        } else {
+            add_heard(at, command, |i, own, j, heard| {
+                Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))
+            })?;
+        }
+        let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
+        if let Some(potential) = potential {
+            self.memo.keep(&at.own.positions_m, potential);
+        }
+        if let Some(limit) = self.keys.max_accel_m_s2 {
+            (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
+        }
+        check_range(command)
+    }
+
+    fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
+        if target.revision != self.revision {
+            check_count(self.graph.count(), target.formation.count())?;
+            let delta_m = self.delta_m;
+            self.range_m = range(target.formation, delta_m).map_err(|(pair, distance_m)| LawError::Target {
+                pair,
+                distance_m,
+                delta_m,
+            })?;
+            self.revision = target.revision;
+            self.memo.forget();
+        }
+        Ok(())
+    }
+
+    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+        self.try_energy(at).ok()
+    }
+
+    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+        let mut void = Vec::new();
+        if self.keys.c_per_s < self.a22_per_s {
+            void.push(Void::VelocityUndamped);
+        }
+        if self.keys.max_accel_m_s2.is_some() {
+            void.push(Void::CommandLimited);
+        }
+        let energy = self.try_energy(start).map_err(|fault| void.push(Void::StartRefused(fault))).ok();
+        let certified_m = energy.filter(|_| void.is_empty() && start.own.count() > 1).map(|energy| {
+            // U(l) = E(0) for the clearance rho.
+            let steep = (2.0 * energy / self.keys.eta_m4_per_s2).sqrt();
+            self.delta_m + 1.0 / (steep + 1.0 / (self.range_m - self.delta_m))
+        });
+        Certificate {
+            certified_m,
+            certified_until_s: None,
+            certified_room_m: None,
+            energy_initial: energy,
+            void,
+            legs: Vec::new(),
+        }
+    }
+
+    fn needs(&self) -> &'static [&'static str] {
+        &["all share a compass", "each sees who is nearer than slots are", "each knows its own velocity"]
+    }
+
+    fn barrier_m(&self) -> Option<f64> {
+        Some(self.delta_m)
+    }
+
+    fn max_command_m_s2(&self) -> Option<f64> {
+        self.keys.max_accel_m_s2
+    }
+
+    fn sensing_range_m(&self) -> Option<f64> {
+        Some(self.range_m)
+    }
+
+    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
+    /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
+    /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
+    /// vehicle.
+    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
+        let nearest_m = nearest_m?.min(self.range_m);
+        let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;
+        let curvature = self.keys.eta_m4_per_s2 * inverse.powi(3) * (2.0 * steep + inverse);
+        let packed = (1.0 + 2.0 * self.range_m / nearest_m).powi(3) - 1.0;
+        let near = packed.min(self.graph.count().saturating_sub(1) as f64);
+        let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
+        let half = 0.5 * (self.keys.c_per_s - a22_per_s).abs();
+        // A mode that the repulsion pushes apart grows at up to this rate, and no other is faster.
+        Some(half + half.hypot(omega))
+    }
+
+    fn velocity_margin(&self, _connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
+        let terms_per_s = self.keys.c_per_s + a22_per_s.abs();
+        let remedy = "Raise law.c_per_s, or reduce swarm.a22_per_s.";
+        Some(VelocityMargin { per_s: self.keys.c_per_s - a22_per_s, terms_per_s, remedy })
+    }
+
+    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
+        a22_per_s - self.keys.c_per_s
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,134 @@
+//! What every law of the list does alike.
+
+use super::*;
+use crate::formation::Formation;
+use crate::graph::Graph;
+use crate::observation::{Held, Observation, Others};
+use crate::space::NearPairs;
+use crate::target::{CurrentTarget, Leg};
+use tautline_core::swarm::{Rows, Swarm};
+
+const COUNT: usize = 6;
+
+/// Off its slots, moving, and nobody within 1 m of another.
+fn swarm() -> Swarm {
+    let stir = |i: usize, axis: usize| 0.2 * libm::sin((3 * i + axis) as f64);
+    let slots_m = Formation::grid(COUNT, 1.7).slots_m;
+    Swarm {
+        positions_m: Rows::from_fn(COUNT, |i, axis| slots_m[(i, axis)] + stir(i, axis)),
+        velocities_m_s: Rows::from_fn(COUNT, |i, axis| stir(i + 7, axis)),
+    }
+}
+
+fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
+    let setting = Setting::new(links, formation, 1.0, 0.1);
+    spec.clone().complete(0.1).build(&setting).expect("a law")
+}
+
+fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
+    let mut near = NearPairs::default();
+    near.update(&at.own.positions_m, law.sensing_range_m().unwrap_or(0.0));
+    let mut command = Rows::zeros(COUNT);
+    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");
+    command
+}
+
+#[test]
+fn a_state_that_each_holds_is_answered_like_the_same_state_shared() {
+    let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
+    let held = Held {
+        heard: vec![swarm.clone(); COUNT],
+        ages_s: vec![vec![0.0; COUNT]; COUNT],
+        seen: vec![swarm.clone(); COUNT],
+    };
+    for spec in LawSpec::all() {
+        for links in [Graph::complete(COUNT), Graph::star(COUNT)] {
+            let mut law = built(&spec, &links, &formation);
+            let shared = Observation::exact(&swarm, &links, &formation);
+            let expected = command(law.as_mut(), &shared);
+            let found = command(law.as_mut(), &Observation { others: Others::Held(&held), ..shared });
+            assert!((&found - &expected).amax() < 1e-12 * expected.amax(), "{spec:?}: {found} {expected}");
+            assert!(expected.amax() > 0.1, "{spec:?} does something");
+        }
+    }
+}
+
+#[test]
+fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
+    let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
+    let pictures = |vehicle: Option<usize>| {
+        let mut held = Held {
+            heard: vec![swarm.clone(); COUNT],
+            ages_s: vec![vec![0.0; COUNT]; COUNT],
+            seen: vec![swarm.clone(); COUNT],
+        };
+        if let Some(vehicle) = vehicle {
+            // Everybody else is a little elsewhere and dashes to the middle, as this one has it.
+            for picture in [&mut held.heard[vehicle], &mut held.seen[vehicle]] {
+                picture.positions_m.iter_mut().enumerate().for_each(|(k, x)| *x += 0.05 * libm::sin(k as f64));
+                picture.velocities_m_s -= 6.0 * &picture.positions_m;
+            }
+        }
+        held
+    };
+    for spec in LawSpec::all() {
+        for links in [Graph::complete(COUNT), Graph::star(COUNT), Graph::ring(COUNT)] {
+            let mut law = built(&spec, &links, &formation);
+            let mut asked = |vehicle: Option<usize>| {
+                let held = pictures(vehicle);
+                let at = Observation { others: Others::Held(&held), ..Observation::exact(&swarm, &links, &formation) };
+                command(law.as_mut(), &at)
+            };
+            let plain = asked(None);
+            let mut own = 0;
+            for vehicle in 0..COUNT {
+                let other = asked(Some(vehicle));
+                let changed = |i: usize| (0..3).any(|axis| other[(i, axis)] != plain[(i, axis)]);
+                own += u32::from(changed(vehicle));
+                assert!(
+                    (0..COUNT).all(|i| i == vehicle || !changed(i)),
+                    "{spec:?}: somebody looks at {vehicle}'s picture"
+                );
+            }
+            // Half-spaces may leave a vehicle what it wants whatever it sees.
+            assert!(own > 0, "{spec:?}: nobody looks at the own picture");
+        }
+    }
+}
+
+#[test]
+fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
+    let (swarm, first, next) = (swarm(), Formation::grid(COUNT, 2.0), Formation::grid(COUNT, 2.6));
+    for spec in LawSpec::all() {
+        let links = Graph::complete(COUNT);
+        let mut law = built(&spec, &links, &first);
+        let mut target = CurrentTarget::first_of(&[Leg::first(first.clone())]).expect("a leg");
+        target.begin(1, &next);
+        law.follow(&target.view()).expect("slots clear of delta");
+        let at = Observation { target: target.view(), ..Observation::exact(&swarm, &links, &next) };
+        let anew = command(built(&spec, &links, &next).as_mut(), &at);
+        assert_eq!(command(law.as_mut(), &at), anew, "{spec:?}");
+        assert_eq!(law.sensing_range_m(), built(&spec, &links, &next).sensing_range_m(), "{spec:?}");
+    }
+}
+
+#[test]
+fn who_compares_directions_needs_a_compass_and_who_senses_needs_a_sensor() {
+    for spec in LawSpec::all() {
+        let law = built(&spec, &Graph::complete(COUNT), &Formation::grid(COUNT, 2.0));
+        let needs = |what: &str| law.needs().iter().any(|need| need.contains(what));
+        assert_eq!(needs("compass"), law.controls() == Controls::Displacements, "{spec:?}");
+        assert_eq!(needs("sees"), law.sensing_range_m().is_some(), "{spec:?}");
+        assert!(law.needs().iter().all(|need| !need.is_empty()), "{spec:?}");
+        assert!(law.promise().starts_with("The certified distance holds for ") && law.promise().ends_with('.'));
+    }
+}
+
+#[test]
+fn every_law_is_named_as_its_kind_is() {
+    let (links, formation) = (Graph::complete(COUNT), Formation::grid(COUNT, 2.0));
+    let specs = LawSpec::all();
+    let names: Vec<_> = specs.iter().map(|spec| built(spec, &links, &formation).name().to_owned()).collect();
+    let kinds = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
+    assert_eq!(names, kinds);
+}

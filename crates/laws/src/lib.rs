@@ -1,0 +1,21 @@
+//! Formation control laws, and what they are about: graphs, obstacles, wind, formations, targets and what a vehicle knows.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`law`] | a file a law: its keys, bounds, energy and certificate; [`law::Law`] is the trait for one of your own |
+//! | [`observation`] | what a law is told: own state, what was heard and seen of others, target |
+//! | [`graph`] | which vehicles exchange states: Laplacians, algebraic connectivity |
+//! | [`formation`] | target shapes, desired distances, the error of a shape up to a rigid motion |
+//! | [`target`] | legs of formations, what counts as reached, which vehicle flies to which slot |
+//! | [`space`] | neighbours by distance, points that keep apart, shapes of obstacles |
+//! | [`wind`] | mean wind, gusts and turbulence by exact filters |
+
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
+pub mod formation;
+pub mod graph;
+pub mod law;
+pub mod observation;
+pub mod space;
+pub mod target;
+pub mod wind;

@@ -1,0 +1,174 @@
+//! What counts as a reached formation.
+
+use serde::{Deserialize, Serialize};
+
+use super::Reference;
+use crate::formation::{Formation, Freedom, PositionError, largest_edge_error_m};
+use crate::graph::Graph;
+use tautline_core::swarm::{Swarm, row, separation};
+
+/// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
+const TIME_ROUNDING_S: f64 = 1e-9;
+
+/// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and
+/// no vehicle is more than `edge_error_m` from its slot in the formation laid over them: turned and perhaps mirrored under a law
+/// that holds distances, moved alone under one that holds displacements, where the reference has carried it under one that
+/// follows a reference.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Arrival {
+    /// Largest error of a desired distance over the edges of the graph, and of a vehicle's place in the formation, in m.
+    pub edge_error_m: f64,
+    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, in m/s.
+    pub disagreement_m_s: f64,
+    /// Shortest time for which all of it must hold in s.
+    pub hold_s: f64,
+}
+
+impl Default for Arrival {
+    fn default() -> Self {
+        Self { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 }
+    }
+}
+
+/// How far a swarm is from its formation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distance {
+    /// Largest error of a desired distance over the graph's edges \[m\].
+    pub max_edge_error_m: f64,
+    /// Root mean square distance from the formation in its best place \[m\]: turned and perhaps mirrored where it is free to
+    /// be.
+    pub rms_position_error_m: f64,
+    /// Distance of the vehicle that is farthest from its slot in that place \[m\].
+    pub max_position_error_m: f64,
+    /// Largest speed relative to the mean velocity, or to the reference's where it is followed \[m/s\].
+    pub disagreement_m_s: f64,
+}
+
+impl Distance {
+    /// Of a swarm from a formation that is free to be moved so from where the reference has carried it: O(edges), and no more than
+    /// [`largest_edge_error_m`] looks at.
+    #[must_use]
+    pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
+        let error = PositionError::of(&swarm.positions_m, formation, reference.position_m, freedom);
+        Self {
+            max_edge_error_m: largest_edge_error_m(&swarm.positions_m, formation, graph),
+            rms_position_error_m: error.rms_m,
+            max_position_error_m: error.max_m,
+            disagreement_m_s: Self::disagreement_m_s(swarm, reference, freedom),
+        }
+    }
+
+    /// Largest speed relative to what the vehicles are meant to have in common \[m/s\].
+    fn disagreement_m_s(swarm: &Swarm, reference: &Reference, freedom: Freedom) -> f64 {
+        let relative_m_s = |i: usize| (row(&swarm.velocities_m_s, i) - reference.velocity_m_s).norm();
+        match freedom {
+            Freedom::Fixed => (0..swarm.count()).map(relative_m_s).fold(0.0, f64::max),
+            Freedom::Translation | Freedom::RigidMotion => swarm.disagreement_m_s(),
+        }
+    }
+
+    /// Of a run without samples: nothing is known.
+    #[must_use]
+    pub fn unknown() -> Self {
+        Self {
+            max_edge_error_m: f64::NAN,
+            rms_position_error_m: f64::NAN,
+            max_position_error_m: f64::NAN,
+            disagreement_m_s: f64::NAN,
+        }
+    }
+}
+
+impl Arrival {
+    /// Whether a swarm is within the limits of a formation, as [`Arrival::is_within`] says of its [`Distance::of`] it.
+    ///
+    /// Looks at speeds first, then at some edges, then at places, and at all edges only where places do not decide: vehicles within
+    /// e of their slots have distances within 2 e of those of the slots. O(N) except near the limits, and no allocation.
+    #[must_use]
+    pub fn holds(
+        &self,
+        swarm: &Swarm,
+        formation: &Formation,
+        reference: &Reference,
+        graph: &Graph,
+        freedom: Freedom,
+    ) -> bool {
+        let positions_m = &swarm.positions_m;
+        let has_length = |(i, j): (usize, usize)| {
+            (separation(positions_m, i, j) - formation.desired_distance(i, j)).abs() <= self.edge_error_m
+        };
+        let is_slow = Distance::disagreement_m_s(swarm, reference, freedom) <= self.disagreement_m_s;
+        let may_hold = is_slow && formation.count() == swarm.count();
+        if !may_hold || !graph.edges().take(swarm.count()).all(has_length) {
+            return false;
+        }
+        let error_m = PositionError::of(positions_m, formation, reference.position_m, freedom).max_m;
+        error_m <= self.edge_error_m
+            && (2.0 * error_m <= self.edge_error_m
+                || largest_edge_error_m(positions_m, formation, graph) <= self.edge_error_m)
+    }
+
+    /// Whether everything is within the limits at this instant; never where a number is not finite.
+    #[must_use]
+    pub fn is_within(&self, distance: &Distance) -> bool {
+        distance.max_edge_error_m <= self.edge_error_m
+            && distance.max_position_error_m <= self.edge_error_m
+            && distance.disagreement_m_s <= self.disagreement_m_s
+    }
+
+    /// Whether limits that have been kept from one time to another \[s\] have been kept for long enough.
+    #[must_use]
+    pub fn is_held(&self, since_s: f64, until_s: f64) -> bool {
+        until_s - since_s >= self.hold_s - TIME_ROUNDING_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_core::swarm::set_row;
+
+    #[test]
+    fn every_limit_is_a_limit_and_what_is_not_a_number_is_not_within() {
+        let arrival = Arrival::default();
+        let good = Distance {
+            max_edge_error_m: 0.01,
+            rms_position_error_m: 0.01,
+            max_position_error_m: 0.01,
+            disagreement_m_s: 0.01,
+        };
+        assert!(arrival.is_within(&good));
+        for bad in [0.011, f64::NAN] {
+            assert!(!arrival.is_within(&Distance { max_edge_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&Distance { max_position_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&Distance { disagreement_m_s: bad, ..good }));
+        }
+    }
+
+    #[test]
+    fn one_vehicle_beside_its_slot_keeps_many_from_having_arrived_on_graphs_that_do_not_feel_it() {
+        let count = 400;
+        let formation = Formation::grid(count, 2.0);
+        let graph = Graph::star(count);
+        let hub_m = row(&formation.slots_m, 0);
+        let mut swarm = Swarm::at_rest(formation.slots_m.clone());
+        // Across the edge to the hub: its length stays as it is to second order.
+        let along = (row(&swarm.positions_m, 399) - hub_m).normalize();
+        let off_m = row(&swarm.positions_m, 399) + 0.19 * nalgebra::Vector3::new(-along.y, along.x, 0.0);
+        set_row(&mut swarm.positions_m, 399, off_m);
+        let arrival = Arrival::default();
+        for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
+            let distance = Distance::of(&swarm, &formation, &Reference::at_rest(), &graph, freedom);
+            assert!(distance.max_edge_error_m < 0.01 && distance.rms_position_error_m < 0.01, "{distance:?}");
+            assert!(!arrival.is_within(&distance), "{distance:?}");
+            assert!(!arrival.holds(&swarm, &formation, &Reference::at_rest(), &graph, freedom));
+        }
+    }
+
+    #[test]
+    fn held_means_for_as_long_as_asked_but_for_rounding() {
+        let arrival = Arrival { hold_s: 0.3, ..Arrival::default() };
+        assert!(arrival.is_held(0.1, 0.1 + 0.1 + 0.2) && !arrival.is_held(0.1, 0.399));
+    }
+}

@@ -1,0 +1,195 @@
+//! Who changes the target while the swarm flies.
+
+use dyn_clone::DynClone;
+
+use super::breathing::{Breather, Breathing, Change, Settling};
+use super::{Arrival, Begins, CurrentTarget, Leg, Target, assign_anew};
+use crate::formation::{Formation, Freedom};
+use crate::graph::Graph;
+use tautline_core::swarm::Swarm;
+
+/// Reads the swarm as it is sensed and may change its target: from leg to leg, or within a leg.
+///
+/// Its memory is saved with a simulation, so it must be [`Clone`].
+pub trait Supervisor: DynClone + Send {
+    /// Called once at every instant at which the law is asked, before it.
+    fn supervise(&mut self, time_s: f64, sensed: &Swarm, target: &mut CurrentTarget);
+
+    /// Whether it never changes anything: then it is not asked.
+    fn is_idle(&self) -> bool {
+        false
+    }
+
+    /// Whether the formations that it goes through are those of these legs, in their order: what a law promises for them
+    /// holds then.
+    fn keeps_to(&self, _legs: &[Leg]) -> bool {
+        self.is_idle()
+    }
+
+    /// What it changed within a leg when it was asked last, where that breaks a promise: what the law promised is renewed
+    /// then. Told once.
+    fn take_change(&mut self) -> Option<Change> {
+        None
+    }
+
+    /// The formations that are still to come after the present target's.
+    fn ahead(&self, _target: &Target<'_>) -> Vec<&Formation> {
+        Vec::new()
+    }
+
+    /// Begins its random numbers anew.
+    fn reseed(&mut self, _seed: u64) {}
+}
+
+dyn_clone::clone_trait_object!(Supervisor);
+
+/// Goes from leg to leg by time, or when the leg before has been reached and held; and may assign interchangeable vehicles
+/// anew, or spread the slots of a leg, where the swarm is stalled ([`Breathing`]).
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    legs: Vec<Leg>,
+    links: Graph,
+    arrival: Arrival,
+    freedom: Freedom,
+    /// Since when the present leg has been within the limits \[s\].
+    within_since_s: Option<f64>,
+    breather: Option<Breather>,
+    /// Until it is taken.
+    change: Option<Change>,
+}
+
+impl Schedule {
+    /// The legs of a flight on this graph; the first is under way.
+    #[must_use]
+    pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
+        Self {
+            legs: legs.to_vec(),
+            links: links.clone(),
+            arrival,
+            freedom: Freedom::RigidMotion,
+            within_since_s: None,
+            breather: None,
+            change: None,
+        }
+    }
+
+    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    #[must_use]
+    pub fn free_by(mut self, freedom: Freedom) -> Self {
+        self.freedom = freedom;
+        self
+    }
+
+    /// The same, spreading slots (about those of a leader, where there is one) where the swarm is stalled under a law by which
+    /// errors settle so.
+    /// To be said after [`Schedule::free_by`].
+    #[must_use]
+    pub fn breathing(mut self, breathing: Breathing, settling: Settling, leader: Option<usize>) -> Self {
+        self.breather =
+            breathing.is_on().then(|| Breather::new(breathing, settling, leader, self.arrival, self.freedom));
+        self
+    }
+
+    /// The same in a wind, which moves all from their slots and keeps them there: what all have in common is no reason to spread
+    /// slots. To be said after [`Schedule::breathing`].
+    #[must_use]
+    pub fn blown(mut self, is_blown: bool) -> Self {
+        if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {
+            breather.forgive_common_errors();
+        }
+        self
+    }
+
+    fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
+        match begins {
+            Begins::At(from_s) => time_s >= from_s,
+            Begins::Reached if self.breather.as_ref().is_some_and(|breather| !breather.is_closed()) => false,
+            Begins::Reached => {
+                let Target { formation, ref reference, .. } = target.view();
+                let within = self.arrival.holds(sensed, formation, reference, &self.links, self.freedom);
+                self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
+                self.within_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, time_s))
+            }
+        }
+    }
+}
+
+impl Supervisor for Schedule {
+    fn supervise(&mut self, time_s: f64, sensed: &Swarm, target: &mut CurrentTarget) {
+        while let Some(next) = self.legs.get(target.view().leg + 1) {
+            let begins = next.begins;
+            if !self.is_due(begins, time_s, sensed, target) {
+                break;
+            }
+            let leg = target.view().leg + 1;
+            target.begin(leg, &self.legs[leg].formation);
+            self.within_since_s = None;
+            if let Some(breather) = &mut self.breather {
+                breather.begin_leg();
+            }
+        }
+        if let (Some(breather), Some(leg)) = (&mut self.breather, self.legs.get(target.view().leg)) {
+            breather.supervise(time_s, sensed, leg, target);
+            if let Some(change) = breather.take_change() {
+                if let Change::Assigned { slots } = &change {
+                    assign_anew(&mut self.legs, target.view().leg, slots);
+                }
+                self.change = Some(change);
+            }
+        }
+    }
+
+    fn is_idle(&self) -> bool {
+        self.legs.len() < 2 && self.breather.is_none()
+    }
+
+    fn keeps_to(&self, legs: &[Leg]) -> bool {
+        self.is_idle() || self.legs == legs
+    }
+
+    fn take_change(&mut self) -> Option<Change> {
+        self.change.take()
+    }
+
+    fn ahead(&self, target: &Target<'_>) -> Vec<&Formation> {
+        let from = if target.spread == 1.0 { target.leg + 1 } else { target.leg };
+        self.legs.iter().skip(from).map(|leg| &leg.formation).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn legs(begins: [Begins; 2]) -> Vec<Leg> {
+        let leg = |spacing_m, begins| Leg { begins, ..Leg::first(Formation::line(2, spacing_m)) };
+        vec![Leg::first(Formation::line(2, 1.0)), leg(2.0, begins[0]), leg(3.0, begins[1])]
+    }
+
+    /// The leg at times 0, 0.5, 1, ... while the swarm is in the formation of leg `at(time)`.
+    fn flown(legs: &[Leg], at: impl Fn(f64) -> usize) -> Vec<usize> {
+        let mut schedule = Schedule::new(legs, &Graph::complete(2), Arrival::default());
+        let mut target = CurrentTarget::first_of(legs).expect("legs");
+        (0..8)
+            .map(|k| {
+                let time_s = 0.5 * f64::from(k);
+                let swarm = Swarm::at_rest(legs[at(time_s)].formation.slots_m.clone());
+                schedule.supervise(time_s, &swarm, &mut target);
+                target.view().leg
+            })
+            .collect()
+    }
+
+    #[test]
+    fn legs_begin_at_their_times_and_two_may_be_due_at_once() {
+        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
+    }
+
+    #[test]
+    fn a_leg_that_is_reached_and_held_ends_and_one_that_is_lost_does_not() {
+        let legs = legs([Begins::Reached, Begins::Reached]);
+        assert_eq!(flown(&legs, |time_s| usize::from(time_s > 1.0)), [0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(flown(&legs, |time_s| usize::from(time_s == 0.5)), [0, 0, 0, 0, 1, 1, 1, 1]);
+    }
+}

@@ -1,0 +1,66 @@
+//! Normal random numbers, the same on every machine.
+
+use std::f64::consts::TAU;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+
+/// Normal numbers of mean 0 and variance 1: Box and Muller's pairs from `ChaCha8` words, by `libm` alone.
+#[derive(Clone, Debug)]
+pub struct Normals {
+    random: ChaCha8Rng,
+    /// The second of a pair, until it is asked for.
+    second: Option<f64>,
+}
+
+impl Normals {
+    /// Those of a seed; each stream of it is independent of the others.
+    #[must_use]
+    pub fn new(seed: u64, stream: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(stream);
+        Self { random, second: None }
+    }
+
+    /// The next number.
+    #[expect(clippy::should_implement_trait, reason = "it never ends, and is no Option")]
+    pub fn next(&mut self) -> f64 {
+        if let Some(second) = self.second.take() {
+            return second;
+        }
+        // In (0, 1], of which the logarithm is finite.
+        let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
+        let angle = TAU * self.unit();
+        self.second = Some(radius * libm::sin(angle));
+        radius * libm::cos(angle)
+    }
+
+    /// Uniform in \[0, 1), a multiple of 2^-53.
+    pub fn unit(&mut self) -> f64 {
+        const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
+        (self.random.next_u64() >> 11) as f64 * SCALE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_normal_and_streams_are_their_own() {
+        let count = 200_000_u32;
+        let (mut one, mut other) = (Normals::new(7, 1), Normals::new(7, 2));
+        let pairs: Vec<_> = (0..count).map(|_| (one.next(), other.next())).collect();
+        let mean = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(a, b)| of(a, b)).sum::<f64>() / f64::from(count);
+        // Four standard deviations of each mean.
+        let near = |found: f64, expected: f64, variance: f64| {
+            assert!((found - expected).abs() < 4.0 * (variance / f64::from(count)).sqrt(), "{found} for {expected}");
+        };
+        near(mean(&|a, _| a), 0.0, 1.0);
+        near(mean(&|a, _| a * a), 1.0, 2.0);
+        near(mean(&|a, _| a.powi(4)), 3.0, 96.0);
+        near(mean(&|a, b| a * b), 0.0, 1.0);
+        near(mean(&|a, _| f64::from(a.abs() < 1.0)), 0.682_689, 0.22);
+        assert!(pairs.windows(2).all(|next| next[0].0 != next[1].0));
+    }
+}
