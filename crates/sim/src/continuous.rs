@@ -1,0 +1,450 @@
+//! Continuous time: p'' = a22 v + u(p, v) (equation (1)) solved with the law inside the right-hand side. Nothing is sampled
+//! or held.
+//!
+//! [`solve`] is the oracle that every physics run is measured against; [`Continuous`] flies the same solution step by
+//! step, in the place of a law that is asked once a step and a plant that holds its command.
+//!
+//! # Method
+//! Dormand and Prince's explicit Runge-Kutta method of order 8 with error control (Hairer, Norsett and Wanner,
+//! *Solving Ordinary Differential Equations I*, II.5), from the crate `differential-equations`. Nothing is interpolated:
+//! solver steps end at the times asked for, and a closest approach within a step is found by solving anew from the
+//! step's beginning. (The crate's own dense output was measured to be off by 2e-8 m where its steps are by 1e-13 m.)
+//!
+//! # At the edge of the law
+//! A trial step may ask the law about states that it has no answer for, such as a pair inside delta. Such a step is
+//! refused and tried again shorter. Where no step is short enough, the solution ends with the law's reason.
+
+mod flow;
+mod quadrotors;
+
+pub use quadrotors::Quadrotors;
+
+use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
+use differential_equations::ode::OrdinaryNumericalMethod as _;
+use flow::{Flow, FreeMotion, packed};
+use nalgebra::Vector3;
+
+use crate::feedback::Feedback;
+use crate::plant::{Air, Path};
+use crate::scenario::Scenario;
+use tautline_core::record::Channel;
+use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
+use tautline_laws::law::{Law, LawError};
+use tautline_laws::observation::Observation;
+use tautline_laws::space::NearPairs;
+
+/// A law that knows the present state.
+struct Exact<'a> {
+    law: &'a mut dyn Law,
+    scenario: &'a Scenario,
+    near: NearPairs,
+}
+
+impl Feedback for Exact<'_> {
+    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        if let Some(range_m) = self.law.sensing_range_m() {
+            self.near.update(&truth.positions_m, range_m);
+        }
+        let near = self.near.pairs();
+        self.law.command(&Observation { near, ..self.scenario.observation_at(truth, time_s) }, command)
+    }
+}
+
+/// First step that is tried \[s\]: the error control lengthens it tenfold a step, or shortens it.
+const FIRST_STEP_S: f64 = 1e-3;
+/// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
+const RESOLUTION: f64 = 1e-14;
+/// Most steps of the solver that are tried for one physics step. Flights of stiff laws need some hundreds.
+const MOST_TRIALS: u32 = 100_000;
+/// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
+/// derivative, less than 1e-12 m up to 200 m/s^2.
+const CLOSEST_RESOLUTION_S: f64 = 1e-7;
+
+/// Error allowed per solver step in each coordinate: `absolute + relative * |value|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Part of the coordinate.
+    pub relative: f64,
+    /// In m for positions, in m/s for velocities.
+    pub absolute: f64,
+}
+
+impl Default for Tolerances {
+    /// 1e-12 of either kind: the reference flights change by less than 1e-11 m when it is 1e-13.
+    fn default() -> Self {
+        Self { relative: 1e-12, absolute: 1e-12 }
+    }
+}
+
+/// Why there is no solution.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum IdealError {
+    /// The law has no answer from some time on.
+    #[error("the solution ends at {time_s} s: {source}")]
+    Law {
+        /// The last time that was reached \[s\].
+        time_s: f64,
+        /// Why.
+        source: LawError,
+    },
+    /// No step is short enough for the tolerances, more than 100,000 steps are needed, or numbers overflow.
+    #[error("the solution cannot be continued at {time_s} s: its tolerances need steps that are too short")]
+    Stalled {
+        /// The last time that was reached \[s\].
+        time_s: f64,
+    },
+    /// The times do not ascend from 0, or are not finite.
+    #[error("time {} is out of order: times ascend from 0 and are finite", entry + 1)]
+    Times {
+        /// The first such entry, from 0.
+        entry: usize,
+    },
+    /// A tolerance is not a positive finite number.
+    #[error("tolerances must be positive finite numbers")]
+    Tolerances,
+}
+
+/// A solution at the times asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// The state at each time.
+    pub states: Vec<Swarm>,
+    /// The closest that any pair came from time 0 to the last time: over the whole of it, not at the times asked for
+    /// only. None for fewer than two vehicles.
+    pub closest: Option<ClosestApproach>,
+}
+
+/// Solves p'' = a22 v + u(p, v) from the scenario's start at time 0, under `law` with exact knowledge of the present
+/// state, and hands out the states at `times_s` \[s\], ascending from 0.
+///
+/// # Accuracy
+/// The error per solver step is at most that of the tolerances, and stable motion forgets it: on the reference flights
+/// positions and the closest approach are good to 1e-11 m. A pair is taken to turn from closing to opening at most once
+/// a solver step.
+///
+/// # Errors
+/// [`IdealError`]: the law has no answer on the way, the times do not ascend, or the tolerances cannot be met.
+pub fn solve(
+    scenario: &Scenario,
+    law: &mut dyn Law,
+    times_s: &[f64],
+    tolerances: Tolerances,
+) -> Result<Solution, IdealError> {
+    let in_order = |&entry: &usize| {
+        let before_s = if entry == 0 { 0.0 } else { times_s[entry - 1] };
+        times_s[entry].is_finite() && times_s[entry] >= before_s
+    };
+    if let Some(entry) = (0..times_s.len()).find(|entry| !in_order(entry)) {
+        return Err(IdealError::Times { entry });
+    }
+    let mut feedback = Exact { law, scenario, near: NearPairs::default() };
+    let mut air = Air::of(scenario);
+    let end_s = times_s.last().copied().unwrap_or_default();
+    if let Some(air) = &mut air {
+        air.advance(end_s);
+    }
+    let motion = FreeMotion { a22_per_s: scenario.velocity_coefficient_per_s(), air: air.as_ref(), end_s };
+    let flow = Flow::new(&mut feedback, &scenario.start, motion, 0.0);
+    let mut solver = Solver::begin(&flow, 0.0, &packed(&scenario.start), tolerances, FIRST_STEP_S)?;
+    let mut closest = None;
+    for (pair, approach) in pairs(solver.method.y()) {
+        offer(&mut closest, pair, approach.separation_m, 0.0);
+    }
+    let mut states = Vec::with_capacity(times_s.len());
+    for &time_s in times_s {
+        solver.advance(time_s, &mut |solver| solver.search_last_step(&mut closest))?;
+        states.push(solver.swarm());
+    }
+    Ok(Solution { states, closest })
+}
+
+/// A swarm that moves as equation (1) says, in continuous time.
+#[derive(Clone, Debug)]
+pub struct Continuous {
+    swarm: Swarm,
+    /// Drag of the air included.
+    a22_per_s: f64,
+    /// What blows, where anything does.
+    air: Option<Air>,
+    /// Solver step that the error control came to last.
+    step_s: f64,
+}
+
+impl Continuous {
+    /// At the scenario's start.
+    #[must_use]
+    pub fn new(scenario: &Scenario) -> Self {
+        let (a22_per_s, air) = (scenario.velocity_coefficient_per_s(), Air::of(scenario));
+        Self { swarm: scenario.start.clone(), a22_per_s, air, step_s: FIRST_STEP_S }
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.swarm.count()
+    }
+
+    /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
+    /// way there bends.
+    ///
+    /// The bend is from the Green's function of a second derivative, which is at most T/4: a path of duration T stays
+    /// within T/4 times the integral of |p''| of its chord. The integral is taken from the change of velocity in each
+    /// solver step.
+    ///
+    /// Where vehicles come to the barrier of a law, as they do under limited accelerations, the law has no answer beyond. They then
+    /// keep the accelerations that they have there to the end, so that their way past the barrier is judged, and the law's
+    /// reason is the result.
+    ///
+    /// # Errors
+    /// [`IdealError`]; the state is then not to be observed.
+    pub fn advance(
+        &mut self,
+        (from_s, dt_s): (f64, f64),
+        feedback: &mut dyn Feedback,
+        end: &mut Swarm,
+        path: &mut Path,
+    ) -> Result<Option<LawError>, IdealError> {
+        if let Some(air) = &mut self.air {
+            air.advance(dt_s);
+        }
+        let motion = FreeMotion { a22_per_s: self.a22_per_s, air: self.air.as_ref(), end_s: dt_s };
+        let flow = Flow::new(feedback, &self.swarm, motion, from_s);
+        let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
+        solver.most_trials = Some(MOST_TRIALS);
+        let mut turned_m_s = vec![0.0; self.swarm.count()];
+        let solved = solver.advance(dt_s, &mut |solver| {
+            solver.add_turns(&mut turned_m_s);
+            flow.accept(solver.method.t(), solver.method.y());
+            Ok(())
+        });
+        path.bend(0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max));
+        let undefined = match solved {
+            Ok(()) => {
+                self.step_s = solver.method.h();
+                self.swarm = solver.swarm();
+                None
+            }
+            Err(IdealError::Law { time_s, source }) if source.is_at_a_barrier() => {
+                let (now_s, state) = (solver.method.t(), solver.method.y());
+                let coasted = flow.coasted(now_s, state, dt_s - now_s);
+                let (after, bend_m) = coasted.ok_or(IdealError::Law { time_s, source })?;
+                if now_s > 0.0 {
+                    path.pass(now_s, &solver.swarm().positions_m);
+                }
+                path.bend(bend_m);
+                self.step_s = FIRST_STEP_S;
+                self.swarm = flow.swarm_of(&after);
+                Some(source)
+            }
+            Err(error) => return Err(error),
+        };
+        end.clone_from(&self.swarm);
+        Ok(undefined)
+    }
+
+    /// Writes the state.
+    pub fn observe(&self, swarm: &mut Swarm) {
+        swarm.clone_from(&self.swarm);
+    }
+
+    /// Goes back to a state that was observed before the last step.
+    pub fn restore(&mut self, swarm: &Swarm) {
+        self.swarm.clone_from(swarm);
+        if let Some(air) = &mut self.air {
+            air.undo();
+        }
+    }
+
+    /// What is recorded beside states, without values yet.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        self.air.iter().map(|_| Air::channel()).collect()
+    }
+
+    /// Writes the present values into [`Continuous::channels`].
+    pub fn write_channels(&self, channels: &mut [Channel]) {
+        self.air.iter().zip(channels).for_each(|(air, channel)| air.write_channel(channel));
+    }
+
+    /// Begins its random numbers anew.
+    pub fn reseed(&mut self, seed: u64) {
+        if let Some(air) = &mut self.air {
+            air.reseed(seed);
+        }
+    }
+}
+
+/// Order 8, 12 stages and 4 that go unused. A state is all positions, then all velocities, each an axis after the other.
+type Method = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Vec<f64>, 8, 12, 16>;
+
+struct Solver<'a, 'law> {
+    method: Method,
+    flow: &'a Flow<'law>,
+    tolerances: Tolerances,
+    /// Largest number of solver steps for one output time; unlimited where `None`.
+    most_trials: Option<u32>,
+}
+
+impl<'a, 'law> Solver<'a, 'law> {
+    fn begin(
+        flow: &'a Flow<'law>,
+        time_s: f64,
+        state: &[f64],
+        tolerances: Tolerances,
+        step_s: f64,
+    ) -> Result<Self, IdealError> {
+        let Tolerances { relative, absolute } = tolerances;
+        if ![relative, absolute].iter().all(|tolerance| *tolerance > 0.0 && tolerance.is_finite()) {
+            return Err(IdealError::Tolerances);
+        }
+        let longest_step_s = flow.longest_step_s();
+        let method = Method::dop853().rtol(relative).atol(absolute).h_max(longest_step_s).max_steps(usize::MAX);
+        let mut method = method.h0(step_s.min(longest_step_s));
+        // The end of the interval only tells the direction of time.
+        method.init(flow, time_s, f64::INFINITY, &state.to_vec()).map_err(|_| IdealError::Stalled { time_s })?;
+        match flow.take_failure() {
+            Some(source) => Err(IdealError::Law { time_s, source }),
+            None => Ok(Self { method, flow, tolerances, most_trials: None }),
+        }
+    }
+
+    /// Solves up to `until_s`, showing itself to `observe` after every accepted step.
+    fn advance(
+        &mut self,
+        until_s: f64,
+        observe: &mut dyn FnMut(&Self) -> Result<(), IdealError>,
+    ) -> Result<(), IdealError> {
+        if self.method.y().is_empty() {
+            // An empty state has no error to control.
+            return Ok(());
+        }
+        let (most_trials, mut undefined, mut trials) = (self.most_trials, None, 0_u32);
+        while until_s - self.method.t() > RESOLUTION * until_s {
+            trials = trials.saturating_add(1);
+            let is_spent = most_trials.is_some_and(|most| trials > most);
+            let (time_s, free_step_s) = (self.method.t(), self.method.h());
+            let step_s = free_step_s.min(until_s - time_s).min(self.flow.smooth_s(time_s));
+            if step_s <= RESOLUTION * until_s || is_spent || (undefined.is_some() && self.moves_nothing(step_s)) {
+                return Err(
+                    undefined.map_or(IdealError::Stalled { time_s }, |source| IdealError::Law { time_s, source })
+                );
+            }
+            self.method.set_h(step_s);
+            let stepped = self.method.step(self.flow);
+            undefined = self.flow.take_failure();
+            if stepped.is_err() {
+                return Err(IdealError::Stalled { time_s });
+            }
+            if self.method.t() == time_s {
+                continue;
+            }
+            if undefined.is_some() {
+                // Accepted by its error alone, on stages that the law has no answer for.
+                let before = self.method.y_prev().clone();
+                *self = Self::begin(self.flow, time_s, &before, self.tolerances, step_s / 4.0)?;
+                continue;
+            }
+            if step_s < free_step_s {
+                // Shortened to end at the time asked for, not by the error control.
+                self.method.set_h(self.method.h().max(free_step_s));
+            }
+            observe(self)?;
+        }
+        Ok(())
+    }
+
+    /// Whether no vehicle moves by more than coordinates resolve in a step \[s\].
+    fn moves_nothing(&self, step_s: f64) -> bool {
+        let (positions_m, velocities_m_s) = self.method.y().split_at(self.method.y().len() / 2);
+        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, number| most.max(number.abs()));
+        largest(velocities_m_s) * step_s <= 4.0 * f64::EPSILON * largest(positions_m)
+    }
+
+    /// The state at a time within the last step, solved anew from the beginning of that step.
+    fn within_last_step(&self, time_s: f64) -> Result<Vec<f64>, IdealError> {
+        let (from_s, before) = (self.method.t_prev(), self.method.y_prev());
+        let mut again = Self::begin(self.flow, from_s, before, self.tolerances, time_s - from_s)?;
+        again.advance(time_s, &mut |_| Ok(()))?;
+        Ok(again.method.y().clone())
+    }
+
+    /// Looks for a closer approach in the last step: at its end, and where the distance of a pair stops falling.
+    fn search_last_step(&self, closest: &mut Option<ClosestApproach>) -> Result<(), IdealError> {
+        let (from_s, to_s) = (self.method.t_prev(), self.method.t());
+        for (pair, after) in pairs(self.method.y()) {
+            offer(closest, pair, after.separation_m, to_s);
+            let before = Approach::of(self.method.y_prev(), pair);
+            // A pair that stays away even at twice its speed is not looked at closely.
+            let reach_m = 2.0 * before.speed_m_s.max(after.speed_m_s) * (to_s - from_s);
+            let nearest_m = before.separation_m.min(after.separation_m) - reach_m;
+            let may_be_closest = closest.is_none_or(|closest| nearest_m < closest.separation_m);
+            if before.is_closing && !after.is_closing && may_be_closest {
+                let (time_s, separation_m) = self.turn(pair)?;
+                offer(closest, pair, separation_m, time_s);
+            }
+        }
+        Ok(())
+    }
+
+    /// When a pair turns that closes at the beginning of the last step and opens at its end, and its distance then.
+    fn turn(&self, pair: Pair) -> Result<(f64, f64), IdealError> {
+        let (mut low_s, mut high_s) = (self.method.t_prev(), self.method.t());
+        loop {
+            let middle_s = low_s + 0.5 * (high_s - low_s);
+            let approach = Approach::of(&self.within_last_step(middle_s)?, pair);
+            if high_s - low_s <= CLOSEST_RESOLUTION_S.max(high_s * RESOLUTION) {
+                return Ok((middle_s, approach.separation_m));
+            }
+            if approach.is_closing {
+                low_s = middle_s;
+            } else {
+                high_s = middle_s;
+            }
+        }
+    }
+
+    /// Adds to each vehicle's entry by how much its velocity changed in the last step \[m/s\].
+    fn add_turns(&self, turned_m_s: &mut [f64]) {
+        let (before, after, count) = (self.method.y_prev(), self.method.y(), turned_m_s.len());
+        for (i, turned) in turned_m_s.iter_mut().enumerate() {
+            let change = |axis: usize| after[(3 + axis) * count + i] - before[(3 + axis) * count + i];
+            *turned += Vector3::from([0, 1, 2].map(change)).norm();
+        }
+    }
+
+    fn swarm(&self) -> Swarm {
+        self.flow.swarm_of(self.method.y())
+    }
+}
+
+/// How a pair moves.
+struct Approach {
+    separation_m: f64,
+    speed_m_s: f64,
+    is_closing: bool,
+}
+
+impl Approach {
+    fn of(state: &[f64], pair: Pair) -> Self {
+        let count = state.len() / 6;
+        let apart = |axis: usize| state[axis * count + pair.second()] - state[axis * count + pair.first()];
+        let (r, v) = (Vector3::from([0, 1, 2].map(apart)), Vector3::from([3, 4, 5].map(apart)));
+        Self { separation_m: r.norm(), speed_m_s: v.norm(), is_closing: r.dot(&v) < 0.0 }
+    }
+}
+
+fn pairs(state: &[f64]) -> impl Iterator<Item = (Pair, Approach)> {
+    let count = state.len() / 6;
+    (0..count)
+        .flat_map(move |i| (i + 1..count).map(move |j| Pair::new(i, j)))
+        .map(|pair| (pair, Approach::of(state, pair)))
+}
+
+fn offer(closest: &mut Option<ClosestApproach>, pair: Pair, separation_m: f64, time_s: f64) {
+    if closest.is_none_or(|closest| separation_m < closest.separation_m) {
+        *closest = Some(ClosestApproach { pair, separation_m, time_s });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,39 @@
+//! Scenarios, and the simulation of vehicles in a rigid-body engine under a control law.
+//!
+//! [`Scenario`] is a validated flight, read from TOML or made in code; [`Simulation`] is stepped, saved and loaded. A law of
+//! your own implements [`Law`], a vehicle [`Plant`](plant::Plant), an imperfection between the world and the law
+//! [`Link`](link::Link). Data flows one way:
+//!
+//! ```text
+//! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples and events
+//! ```
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`scenario`] | the validated flight; `document` holds the keys of its file |
+//! | [`preflight`] | what is known before the first step: stability, certificate, step, traps, rigidity |
+//! | [`sim`] | the loop |
+//! | [`plant`] | vehicles that hold a command over a step; `rapier` is the physics engine |
+//! | [`vehicle`] | bodies that are more than points: models, forces, rotors, the attitude loop |
+//! | [`link`] | imperfections between truth and law: radio, sensing, actuation |
+//! | [`continuous`] | the equations of motion solved, for points with the law inside |
+//! | [`feedback`] | the closed loop as vehicles see it: what they are commanded in a state |
+//! | [`metrics`] | numbers folded from recorded samples |
+//! | [`plan`] | what a flight is after: its formations, how they lie over the swarm, how hard an edge pulls |
+
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
+pub mod continuous;
+pub mod feedback;
+pub mod link;
+pub mod metrics;
+pub mod plan;
+pub mod plant;
+pub mod preflight;
+pub mod scenario;
+pub mod sim;
+pub mod vehicle;
+
+pub use scenario::Scenario;
+pub use sim::Simulation;
+pub use tautline_laws::law::Law;

@@ -1,0 +1,122 @@
+//! How commands become accelerations: limited, and late as motors are.
+
+use super::sensing::SAME_S;
+use crate::scenario::{ActuationSpec, Scenario};
+use tautline_core::swarm::{Rows, row, set_row};
+
+/// Limits commands, and follows them with a lag.
+#[derive(Clone, Debug)]
+pub(super) struct Actuation {
+    spec: ActuationSpec,
+    /// Whether commands are held in between: otherwise they go from one to the next along straight lines.
+    holds: bool,
+    lag: Option<Lag>,
+}
+
+/// Accelerations a on their way to commands u: tau a' = u - a.
+#[derive(Clone, Debug)]
+struct Lag {
+    before: Point,
+    now: Point,
+}
+
+/// What was commanded and how vehicles were accelerated at an instant.
+#[derive(Clone, Debug)]
+struct Point {
+    time_s: f64,
+    command: Rows,
+    accelerations: Rows,
+}
+
+impl Actuation {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let rest =
+            Point { time_s: 0.0, command: Rows::zeros(scenario.count()), accelerations: Rows::zeros(scenario.count()) };
+        Self {
+            spec: scenario.actuation,
+            holds: scenario.time.control_hz.is_some(),
+            lag: (scenario.actuation.lag_s > 0.0).then(|| Lag { before: rest.clone(), now: rest }),
+        }
+    }
+
+    /// Writes the accelerations at a time \[s\] over the commands that are given then. Asked again about the same time it
+    /// answers about that time again; otherwise time goes on.
+    pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
+        if let Some(most_m_s2) = self.spec.max_accel_m_s2 {
+            for i in 0..command.nrows() {
+                let limited = row(command, i).cap_magnitude(most_m_s2);
+                set_row(command, i, limited);
+            }
+        }
+        let Some(lag) = &mut self.lag else { return };
+        if time_s > lag.now.time_s + SAME_S {
+            std::mem::swap(&mut lag.before, &mut lag.now);
+            lag.now.time_s = time_s;
+        }
+        lag.now.command.copy_from(command);
+        lag.follow(self.spec.lag_s, self.holds);
+        command.copy_from(&lag.now.accelerations);
+    }
+}
+
+impl Lag {
+    /// The exact solution over the time between the two points, for a command that is held or goes along a straight line.
+    fn follow(&mut self, lag_s: f64, holds: bool) {
+        let Self { before, now } = self;
+        let passed_s = now.time_s - before.time_s;
+        let left = libm::exp(-passed_s / lag_s);
+        let entries = before.command.iter().zip(before.accelerations.iter()).zip(now.command.iter());
+        for (((&from, &was), &to), now) in entries.zip(now.accelerations.iter_mut()) {
+            let slope = if holds || passed_s == 0.0 { 0.0 } else { (to - from) / passed_s };
+            // Behind a command that goes on steadily the acceleration stays back by lag times slope.
+            *now = from + slope * (passed_s - lag_s) + (was - from + slope * lag_s) * left;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_core::swarm::Swarm;
+    use tautline_laws::formation::Formation;
+
+    fn actuation(max_accel_m_s2: Option<f64>, lag_s: f64, control_hz: Option<f64>) -> Actuation {
+        let line = Formation::line(2, 3.0);
+        let mut scenario = Scenario::new("line", Swarm::at_rest(line.slots_m.clone()), line, 1.0, 10.0);
+        scenario.actuation = ActuationSpec { max_accel_m_s2, lag_s };
+        scenario.time.control_hz = control_hz;
+        Actuation::new(&scenario)
+    }
+
+    #[test]
+    fn long_commands_are_shortened_in_their_direction_and_short_ones_are_not() {
+        let mut command = Rows::from_row_slice(&[3.0, 4.0, 0.0, 0.3, -0.4, 0.0]);
+        actuation(Some(1.0), 0.0, None).act(0.0, &mut command);
+        let expected = Rows::from_row_slice(&[0.6, 0.8, 0.0, 0.3, -0.4, 0.0]);
+        assert!((command - expected).amax() < 1e-15);
+    }
+
+    #[test]
+    fn a_lag_follows_a_step_and_a_ramp_as_the_equation_does_whatever_the_steps() {
+        for parts in [1, 7, 100] {
+            for (holds, exact) in [
+                // From 0 after a step to 1.
+                (Some(10.0), 1.0 - libm::exp(-2.0_f64)),
+                // Behind u = t.
+                (None, 0.4 - 0.2 + 0.2 * libm::exp(-2.0_f64)),
+            ] {
+                let mut actuation = actuation(None, 0.2, holds);
+                let mut acceleration = Rows::zeros(2);
+                for k in 0..=parts {
+                    let time_s = 0.4 * f64::from(k) / f64::from(parts);
+                    acceleration.fill(if holds.is_some() { 1.0 } else { time_s });
+                    let again = acceleration.clone();
+                    actuation.act(time_s, &mut acceleration);
+                    acceleration.copy_from(&again);
+                    actuation.act(time_s, &mut acceleration);
+                }
+                assert!((acceleration[(1, 2)] - exact).abs() < 1e-14, "{parts} {holds:?}: {}", acceleration[(1, 2)]);
+            }
+        }
+    }
+}

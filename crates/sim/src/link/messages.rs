@@ -1,0 +1,256 @@
+//! Messages that are sent at a rate, take their time, and may not come.
+
+use std::collections::VecDeque;
+
+use super::ages::Ages;
+use super::history::History;
+use super::links::Links;
+use super::loss::Loss;
+use super::noise::{Noise, Source};
+use super::sensing::{SAME_S, Sensing};
+use crate::scenario::{FailureKind, NearBy, NetworkSpec, Scenario};
+use tautline_core::swarm::{Rows, Swarm, row};
+use tautline_laws::graph::Graph;
+use tautline_laws::observation::Neighbour;
+
+/// Doubles that are drawn for a message on a link: for its loss, and for its jitter.
+const DRAWS: usize = 2;
+
+/// What all vehicles sent at one instant.
+#[derive(Clone, Debug)]
+struct Broadcast {
+    /// Its number from 1 on; what is known before the first is 0.
+    number: u64,
+    sent_s: f64,
+    /// When what is sent was measured \[s\].
+    measured_s: f64,
+    states: Swarm,
+    /// When it arrives over each link \[s\]; never where it is lost.
+    arrives_s: Vec<f64>,
+}
+
+/// What was heard last over a link.
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    number: u64,
+    neighbour: Neighbour,
+    measured_s: f64,
+}
+
+/// Two vehicles between which nothing gets through for a while.
+#[derive(Clone, Copy, Debug)]
+struct Down {
+    ends: [usize; 2],
+    from_s: f64,
+    to_s: f64,
+}
+
+/// The network of a flight: who sends what when, what is under way, and what was heard.
+///
+/// Message k is sent at k/`rate_hz` after the first measurement is known, by everybody to all neighbours, with what the
+/// sender knows of itself then. What becomes of it depends on the seed, the link and k alone.
+#[derive(Clone, Debug)]
+pub(super) struct Messages {
+    links: Links,
+    rate_hz: f64,
+    begins_s: f64,
+    latency_s: f64,
+    jitter_s: f64,
+    loss: Option<Loss>,
+    noise: Noise,
+    down: Vec<Down>,
+    silent_from_s: Vec<f64>,
+    /// Number of the next message, from 1.
+    next: u64,
+    under_way: VecDeque<Broadcast>,
+    spare: Vec<Broadcast>,
+    heard: Vec<Heard>,
+    /// Whether the last message on each link was lost; none before the first.
+    lost_before: Vec<Option<bool>>,
+    sent: u64,
+    lost: u64,
+    ages: Ages,
+}
+
+impl Messages {
+    pub(super) fn new(scenario: &Scenario, sensing: &Sensing, rate_hz: f64) -> Self {
+        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, near, .. } = scenario.network;
+        let count = scenario.count();
+        let links = match near {
+            NearBy::Seen => Links::of(&scenario.graph),
+            NearBy::Heard => Links::of(&Graph::complete(count)),
+        };
+        let mut known = scenario.start.clone();
+        sensing.know(&History::new(0.0), 0.0, Some(&scenario.start), &mut known);
+        let mut heard = Vec::with_capacity(links.len());
+        for sender in 0..count {
+            let start = Heard { number: 0, neighbour: Neighbour::of(&known, sender, 0.0), measured_s: 0.0 };
+            heard.extend(links.from(sender).map(|_| start));
+        }
+        let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
+        let down = scenario.network.failure.iter().map(|failure| Down {
+            ends: failure.link.map(index),
+            from_s: failure.from_s,
+            to_s: failure.to_s.unwrap_or(f64::INFINITY),
+        });
+        let mut silent_from_s = vec![f64::INFINITY; count];
+        for failure in scenario.failures.iter().filter(|failure| matches!(failure.kind, FailureKind::Silent {})) {
+            silent_from_s[failure.index()] = failure.at_s.min(silent_from_s[failure.index()]);
+        }
+        Self {
+            rate_hz,
+            begins_s: sensing.latency_s(),
+            latency_s,
+            jitter_s,
+            loss: (loss > 0.0).then(|| Loss::new(loss, loss_burst)),
+            noise: Noise::new(scenario.noise_seed, Source::Radio),
+            down: down.collect(),
+            silent_from_s,
+            next: 1,
+            under_way: VecDeque::new(),
+            spare: Vec::new(),
+            lost_before: vec![None; links.len()],
+            heard,
+            links,
+            sent: 0,
+            lost: 0,
+            ages: Ages::default(),
+        }
+    }
+
+    pub(super) fn reseed(&mut self, seed: u64) {
+        self.noise.reseed(seed, self.next - 1);
+    }
+
+    /// Messages that were sent, and how many of them were lost.
+    pub(super) fn counts(&self) -> (u64, u64) {
+        (self.sent, self.lost)
+    }
+
+    /// How old what was heard is, over all links and messages.
+    pub(super) fn ages(&self) -> &Ages {
+        &self.ages
+    }
+
+    /// Sends what is due up to a time \[s\], and delivers what has arrived by then.
+    pub(super) fn settle(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
+        loop {
+            let sent_s = self.begins_s + (self.next - 1) as f64 / self.rate_hz;
+            if sent_s > time_s + SAME_S {
+                break;
+            }
+            self.send(sent_s, sensing, history);
+        }
+        self.deliver(time_s);
+    }
+
+    fn send(&mut self, sent_s: f64, sensing: &Sensing, history: &History) {
+        let mut broadcast = self.spare.pop().unwrap_or_else(|| Broadcast {
+            number: 0,
+            sent_s,
+            measured_s: 0.0,
+            states: Swarm::at_rest(Rows::zeros(self.links.count())),
+            arrives_s: vec![f64::INFINITY; self.links.len()],
+        });
+        (broadcast.number, broadcast.sent_s) = (self.next, sent_s);
+        broadcast.measured_s = sensing.measured_s(sent_s);
+        sensing.know(history, sent_s, None, &mut broadcast.states);
+        for sender in 0..self.links.count() {
+            if sent_s + SAME_S < self.silent_from_s[sender] {
+                self.send_from(sender, &mut broadcast);
+            } else {
+                self.links.from(sender).for_each(|(link, _)| broadcast.arrives_s[link] = f64::INFINITY);
+            }
+        }
+        self.heard.iter().for_each(|heard| self.ages.take(sent_s - heard.measured_s));
+        self.next += 1;
+        self.under_way.push_back(broadcast);
+    }
+
+    fn send_from(&mut self, sender: usize, broadcast: &mut Broadcast) {
+        let hearers = self.links.from(sender).len();
+        let is_random = self.loss.is_some() || self.jitter_s > 0.0;
+        let mut draw = is_random.then(|| self.noise.draw(sender, 0, self.next, DRAWS * hearers));
+        for (link, hearer) in self.links.from(sender) {
+            let [unit, late] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
+            let by_chance = self.loss.is_some_and(|loss| {
+                let is_lost = loss.next(self.lost_before[link], unit);
+                self.lost_before[link] = Some(is_lost);
+                is_lost
+            });
+            let is_lost = by_chance || self.down.iter().any(|down| down.stops(sender, hearer, broadcast.sent_s));
+            self.sent += 1;
+            self.lost += u64::from(is_lost);
+            broadcast.arrives_s[link] =
+                if is_lost { f64::INFINITY } else { broadcast.sent_s + self.latency_s + self.jitter_s * late };
+        }
+    }
+
+    /// Takes what has arrived; of what overtook each other the later sent.
+    fn deliver(&mut self, time_s: f64) {
+        for broadcast in &self.under_way {
+            if broadcast.sent_s + self.latency_s > time_s + SAME_S {
+                break;
+            }
+            for sender in 0..self.links.count() {
+                for (link, _) in self.links.from(sender) {
+                    if broadcast.arrives_s[link] <= time_s + SAME_S && broadcast.number > self.heard[link].number {
+                        self.heard[link] = Heard {
+                            number: broadcast.number,
+                            neighbour: Neighbour::of(&broadcast.states, sender, 0.0),
+                            measured_s: broadcast.measured_s,
+                        };
+                    }
+                }
+            }
+        }
+        let longest_s = self.latency_s + self.jitter_s;
+        while self.under_way.front().is_some_and(|first| first.sent_s + longest_s <= time_s + SAME_S) {
+            self.spare.extend(self.under_way.pop_front());
+        }
+    }
+
+    /// What vehicle `i` heard last of vehicle `j`, at a time \[s\]; none without a link.
+    pub(super) fn heard(&self, i: usize, j: usize, time_s: f64) -> Option<Neighbour> {
+        let heard = self.heard[self.links.find(i, j)?];
+        Some(Neighbour { age_s: (time_s - heard.measured_s).max(0.0), ..heard.neighbour })
+    }
+
+    /// Farthest that anybody holds another from where it is \[m\], in this table.
+    pub(super) fn farthest_m(&self, positions_m: &Rows, carried: impl Fn(Neighbour) -> Neighbour, time_s: f64) -> f64 {
+        (0..self.links.count()).fold(0.0, |farthest_m, sender| {
+            let place_m = row(positions_m, sender);
+            self.links.from(sender).fold(farthest_m, |farthest_m: f64, (link, _)| {
+                let heard = self.heard[link];
+                let held = carried(Neighbour { age_s: (time_s - heard.measured_s).max(0.0), ..heard.neighbour });
+                farthest_m.max((held.position_m - place_m).norm())
+            })
+        })
+    }
+
+    /// For each vehicle the age of the oldest of what it holds, and the mean \[s\], one after the other.
+    pub(super) fn write_ages(&self, time_s: f64, oldest_and_mean_s: &mut [f64]) {
+        oldest_and_mean_s.fill(0.0);
+        for sender in 0..self.links.count() {
+            for (link, hearer) in self.links.from(sender) {
+                let age_s = (time_s - self.heard[link].measured_s).max(0.0);
+                let [oldest_s, sum_s] = [2 * hearer, 2 * hearer + 1];
+                oldest_and_mean_s[oldest_s] = oldest_and_mean_s[oldest_s].max(age_s);
+                oldest_and_mean_s[sum_s] += age_s;
+            }
+        }
+        for hearer in 0..self.links.count() {
+            // Links lead both ways: as many are heard as hear.
+            let neighbours = self.links.from(hearer).len().max(1);
+            oldest_and_mean_s[2 * hearer + 1] /= neighbours as f64;
+        }
+    }
+}
+
+impl Down {
+    fn stops(&self, sender: usize, hearer: usize, sent_s: f64) -> bool {
+        let [a, b] = self.ends;
+        let is_this = (sender, hearer) == (a, b) || (sender, hearer) == (b, a);
+        is_this && (self.from_s..self.to_s).contains(&(sent_s + SAME_S))
+    }
+}

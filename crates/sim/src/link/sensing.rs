@@ -1,0 +1,273 @@
+//! What vehicles measure: late, at a rate, with errors.
+
+use nalgebra::Vector3;
+
+use super::history::History;
+use super::noise::{Noise, Source};
+use crate::scenario::{Scenario, SensingSpec, Space};
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_laws::observation::Neighbour;
+
+/// Two instants that are less apart are the same one \[s\]: a millionth of the shortest period, and more than the rounding of
+/// times of a flight.
+pub(super) const SAME_S: f64 = 1e-9;
+
+/// The last of the periods of a rate that has begun at a time \[s\], from 0; 0 before the first too.
+pub(super) fn period(time_s: f64, rate_hz: f64) -> u64 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; a flight is bounded")]
+    let number = ((time_s + SAME_S) * rate_hz).floor().max(0.0) as u64;
+    number
+}
+
+/// When a vehicle measures: the latest instant of which it knows something at a time, and the number of that measurement.
+#[derive(Clone, Copy, Debug)]
+struct Clock {
+    rate_hz: Option<f64>,
+    latency_s: f64,
+}
+
+impl Clock {
+    fn latest(self, time_s: f64) -> (f64, u64) {
+        let late_s = (time_s - self.latency_s).max(0.0);
+        self.rate_hz.map_or((late_s, 0), |rate_hz| {
+            let number = period(late_s, rate_hz);
+            (number as f64 / rate_hz, number)
+        })
+    }
+
+    /// How far back this looks \[s\].
+    fn span_s(self) -> f64 {
+        self.latency_s + self.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz) + SAME_S
+    }
+}
+
+/// Standard deviations of errors along each axis.
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    position_m: f64,
+    velocity_m_s: f64,
+    axes: usize,
+}
+
+impl Errors {
+    fn are_none(self) -> bool {
+        self.position_m == 0.0 && self.velocity_m_s == 0.0
+    }
+
+    /// Errors of position \[m\] and velocity \[m/s\] from six normal numbers.
+    fn of(self, normals: [f64; 6]) -> (Vector3<f64>, Vector3<f64>) {
+        let along = |from: usize, deviation: f64| {
+            Vector3::from_fn(|axis, _| if axis < self.axes { deviation * normals[from + axis] } else { 0.0 })
+        };
+        (along(0, self.position_m), along(3, self.velocity_m_s))
+    }
+}
+
+/// What each vehicle knows of itself.
+#[derive(Clone, Debug)]
+pub(super) struct Sensing {
+    clock: Clock,
+    errors: Errors,
+    noise: Noise,
+    /// Errors that vehicles keep, N x 3 \[m\].
+    bias_m: Rows,
+    is_biased: bool,
+    /// Number of the measurement that vehicles know themselves by, where it is held.
+    held: Option<u64>,
+}
+
+impl Sensing {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let SensingSpec { rate_hz, latency_s, position_bias_m, .. } = scenario.sensing;
+        Self {
+            clock: Clock { rate_hz, latency_s },
+            errors: errors(scenario),
+            noise: Noise::new(scenario.noise_seed, Source::Own),
+            bias_m: bias_m(scenario, position_bias_m),
+            is_biased: position_bias_m > 0.0,
+            held: None,
+        }
+    }
+
+    /// What is measured from now on has errors of another seed; what was measured keeps its own, and so do lasting errors.
+    pub(super) fn reseed(&mut self, seed: u64) {
+        self.noise.reseed(seed, self.held.unwrap_or_default());
+    }
+
+    pub(super) fn span_s(&self) -> f64 {
+        self.clock.span_s()
+    }
+
+    pub(super) fn latency_s(&self) -> f64 {
+        self.clock.latency_s
+    }
+
+    /// Whether vehicles know their own present state.
+    pub(super) fn is_exact(&self) -> bool {
+        self.clock.rate_hz.is_none() && self.clock.latency_s == 0.0 && !self.errs()
+    }
+
+    /// Whether what a vehicle knows of itself is off the state that it was measured of.
+    fn errs(&self) -> bool {
+        !self.errors.are_none() || self.is_biased
+    }
+
+    /// When what is known at a time was measured \[s\].
+    pub(super) fn measured_s(&self, time_s: f64) -> f64 {
+        self.clock.latest(time_s).0
+    }
+
+    /// What was known after a time \[s\] was not.
+    pub(super) fn forget_after(&mut self, time_s: f64) {
+        let (_, number) = self.clock.latest(time_s);
+        self.held = self.held.filter(|&held| held <= number);
+    }
+
+    /// Writes what vehicles know of themselves now into where it was written the last time: a measurement is held.
+    pub(super) fn know_now(&mut self, history: &History, time_s: f64, now: &Swarm, known: &mut Swarm) {
+        let number = self.clock.rate_hz.map(|_| self.clock.latest(time_s).1);
+        if number.is_none() || number != self.held {
+            self.know(history, time_s, Some(now), known);
+            self.held = number;
+        }
+    }
+
+    /// Writes what vehicles know of themselves at a time at which the state is `now`, or which has passed.
+    pub(super) fn know(&self, history: &History, time_s: f64, now: Option<&Swarm>, known: &mut Swarm) {
+        let (measured_s, number) = self.clock.latest(time_s);
+        look_back(history, measured_s, now.filter(|_| measured_s >= time_s), known);
+        if !self.errs() {
+            return;
+        }
+        for vehicle in 0..known.count() {
+            let (off_m, off_m_s) = if self.errors.are_none() {
+                (Vector3::zeros(), Vector3::zeros())
+            } else {
+                self.errors.of(self.noise.draw(vehicle, 0, number, 6).six_normals())
+            };
+            let position_m = row(&known.positions_m, vehicle) + row(&self.bias_m, vehicle) + off_m;
+            let velocity_m_s = row(&known.velocities_m_s, vehicle) + off_m_s;
+            set_row(&mut known.positions_m, vehicle, position_m);
+            set_row(&mut known.velocities_m_s, vehicle, velocity_m_s);
+        }
+    }
+}
+
+/// Errors of this standard deviation \[m\] that vehicles keep, N x 3 \[m\].
+fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
+    let mut bias_m = Rows::zeros(scenario.count());
+    let bias = Noise::new(scenario.noise_seed, Source::Bias);
+    let lasting = Errors { position_m, velocity_m_s: 0.0, axes: scenario.space.dimensions() };
+    for vehicle in (0..scenario.count()).filter(|_| position_m > 0.0) {
+        let (off_m, _) = lasting.of(bias.draw(vehicle, 0, 0, 6).six_normals());
+        set_row(&mut bias_m, vehicle, off_m);
+    }
+    bias_m
+}
+
+fn errors(scenario: &Scenario) -> Errors {
+    let SensingSpec { position_noise_m, velocity_noise_m_s, .. } = scenario.sensing;
+    let axes = if scenario.space == Space::Plane { 2 } else { 3 };
+    Errors { position_m: position_noise_m, velocity_m_s: velocity_noise_m_s, axes }
+}
+
+/// Writes the state at a time that is now, or has passed.
+fn look_back(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Swarm) {
+    match now {
+        Some(now) => state.copy_from(now),
+        None => history.at(time_s, state),
+    }
+}
+
+/// What vehicles see of whoever is near, with a sensor on board: where it is from there, and how it moves.
+///
+/// An error of the vehicle's own place is none of it; errors of measurement have the deviations of the vehicle's own, and are
+/// drawn anew for each that is seen.
+#[derive(Clone, Debug)]
+pub(super) struct Sight {
+    clock: Clock,
+    errors: Errors,
+    noise: Noise,
+    /// The true state that is seen, and the number of the measurement.
+    seen: Swarm,
+    number: u64,
+    held: Option<u64>,
+    age_s: f64,
+    /// Whether vehicles see each other where they know themselves to be.
+    is_own: bool,
+}
+
+impl Sight {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let sensing = scenario.sensing;
+        Self {
+            clock: Clock { rate_hz: sensing.rate_hz, latency_s: sensing.near_s() },
+            errors: errors(scenario),
+            noise: Noise::new(scenario.noise_seed, Source::Sight),
+            seen: scenario.start.clone(),
+            number: 0,
+            held: None,
+            age_s: 0.0,
+            is_own: !sensing.is_noisy() && sensing.near_s() == sensing.latency_s,
+        }
+    }
+
+    /// What is seen from now on has errors of another seed.
+    pub(super) fn reseed(&mut self, seed: u64) {
+        self.noise.reseed(seed, self.number);
+    }
+
+    pub(super) fn span_s(&self) -> f64 {
+        self.clock.span_s()
+    }
+
+    pub(super) fn latency_s(&self) -> f64 {
+        self.clock.latency_s
+    }
+
+    /// Whether all that is seen is what vehicles know of themselves.
+    pub(super) fn is_own(&self) -> bool {
+        self.is_own
+    }
+
+    /// The true positions that are seen \[m\].
+    pub(super) fn seen_m(&self) -> &Rows {
+        &self.seen.positions_m
+    }
+
+    /// Looks, at a time at which the state is `now`.
+    pub(super) fn look(&mut self, history: &History, time_s: f64, now: &Swarm) {
+        let (seen_s, number) = self.clock.latest(time_s);
+        let measured = self.clock.rate_hz.map(|_| number);
+        if measured.is_none() || measured != self.held {
+            look_back(history, seen_s, Some(now).filter(|_| seen_s >= time_s), &mut self.seen);
+            self.held = measured;
+        }
+        (self.number, self.age_s) = (number, time_s - seen_s);
+    }
+
+    /// What was seen after a time \[s\] was not.
+    pub(super) fn forget_after(&mut self, time_s: f64) {
+        let (_, number) = self.clock.latest(time_s);
+        self.held = self.held.filter(|&held| held <= number);
+    }
+
+    /// What vehicle `i`, which knows itself to be in its row of `own`, sees of vehicle `j`.
+    pub(super) fn of(&self, own: &Swarm, i: usize, j: usize) -> Neighbour {
+        let seen = Neighbour::of(&self.seen, j, self.age_s);
+        if self.is_own {
+            return seen;
+        }
+        let from = Neighbour::of(&self.seen, i, 0.0);
+        let (off_m, off_m_s) = if self.errors.are_none() {
+            (Vector3::zeros(), Vector3::zeros())
+        } else {
+            self.errors.of(self.noise.draw(i, j, self.number, 6).six_normals())
+        };
+        Neighbour {
+            position_m: row(&own.positions_m, i) + (seen.position_m - from.position_m) + off_m,
+            velocity_m_s: row(&own.velocities_m_s, i) + (seen.velocity_m_s - from.velocity_m_s) + off_m_s,
+            age_s: self.age_s,
+        }
+    }
+}

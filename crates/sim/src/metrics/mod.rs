@@ -1,0 +1,316 @@
+//! Numbers of a run, folded from its samples one at a time.
+//!
+//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Arrival is judged at every
+//! step, and peaks are over the steps between samples too where a sample tells them, see [`tautline_core::record::Peaks`].
+
+mod strain;
+
+pub use strain::Strain;
+
+use std::borrow::Cow;
+
+use nalgebra::Vector3;
+
+use tautline_core::record::{Event, Peaks, RecordError, Sample, Sink, Step};
+use tautline_core::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
+use tautline_laws::formation::Freedom;
+use tautline_laws::graph::Graph;
+use tautline_laws::target::{Arrival, Distance, Guidance, Leg, Reference, assign_anew};
+
+/// Folds samples, in the order of time, into a [`Summary`].
+#[derive(Clone, Debug)]
+pub struct Metrics<'a> {
+    /// As vehicles are assigned to them now.
+    legs: Cow<'a, [Leg]>,
+    graph: &'a Graph,
+    guidance: Option<&'a Guidance>,
+    arrival: Arrival,
+    freedom: Freedom,
+    /// The leg under way, from 0.
+    leg: usize,
+    /// Legs that have ended.
+    ended: Vec<LegSummary>,
+    samples: u64,
+    /// First instant of the leg from which everything was within the limits up to now \[s\].
+    good_since_s: Option<f64>,
+    /// Instant up to which that is known \[s\].
+    judged_to_s: Option<f64>,
+    last_s: f64,
+    distance: Distance,
+    common_m_s: f64,
+    peak_control_m_s2: f64,
+    final_control_m_s2: f64,
+    energy: Option<EnergyRange>,
+    /// The middle of the first sample.
+    origin_m: Option<Vector3<f64>>,
+    extent_m: f64,
+    fastest_m_s: f64,
+    strain: Option<Strain>,
+}
+
+/// Energy \[m^2/s^2\] over the samples that have one.
+#[derive(Clone, Copy, Debug)]
+struct EnergyRange {
+    initial: f64,
+    last: f64,
+    max: f64,
+}
+
+/// Numbers of a run. Those of the end are of its last sample. Where a state was not finite, so are its numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Samples seen.
+    pub samples: u64,
+    /// Time of the last sample \[s\].
+    pub end_s: f64,
+    /// When the formation was reached for good, see [`Metrics::finish`] \[s\].
+    pub reached_at_s: Option<f64>,
+    /// How long all tolerances had been kept when the run ended \[s\]; none where they were not kept at the end.
+    pub held_s: Option<f64>,
+    /// Largest error of a desired distance over the graph's edges at the end \[m\].
+    pub max_edge_error_m: f64,
+    /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored where it
+    /// is free to be, at the end \[m\].
+    pub rms_position_error_m: f64,
+    /// Distance of the vehicle that is then farthest from its slot \[m\].
+    pub max_position_error_m: f64,
+    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, at the end \[m/s\].
+    pub disagreement_m_s: f64,
+    /// Speed of the mean velocity at the end \[m/s\].
+    pub common_m_s: f64,
+    /// Largest commanded acceleration of a vehicle, Euclidean norm, over all steps \[m/s^2\].
+    pub peak_control_m_s2: f64,
+    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN where the law had no answer there.
+    pub final_control_m_s2: f64,
+    /// Largest distance of a vehicle from the middle of the first sample \[m\].
+    pub extent_m: f64,
+    /// Largest speed of a vehicle \[m/s\].
+    pub fastest_m_s: f64,
+    /// Energy of the first sample that has one \[m^2/s^2\].
+    pub energy_initial: Option<f64>,
+    /// Energy of the last sample that has one \[m^2/s^2\].
+    pub energy_final: Option<f64>,
+    /// Largest energy over all steps \[m^2/s^2\].
+    pub energy_max: Option<f64>,
+    /// `energy_max` over `energy_initial`: 1 where the energy never exceeded its start; none for a start without energy.
+    pub energy_max_over_initial: Option<f64>,
+}
+
+/// A leg that was followed by another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegSummary {
+    /// When the next one began \[s\].
+    pub ended_at_s: f64,
+    /// When its formation was reached for good, if it was \[s\].
+    pub reached_at_s: Option<f64>,
+}
+
+impl<'a> Metrics<'a> {
+    /// No samples yet of a run through these legs by the limits of `arrival`.
+    #[must_use]
+    pub fn new(legs: &'a [Leg], graph: &'a Graph, arrival: Arrival) -> Self {
+        Self {
+            legs: Cow::Borrowed(legs),
+            graph,
+            guidance: None,
+            arrival,
+            freedom: Freedom::RigidMotion,
+            leg: 0,
+            ended: Vec::new(),
+            samples: 0,
+            good_since_s: None,
+            judged_to_s: None,
+            last_s: 0.0,
+            distance: Distance::unknown(),
+            common_m_s: f64::NAN,
+            peak_control_m_s2: 0.0,
+            final_control_m_s2: 0.0,
+            energy: None,
+            origin_m: None,
+            extent_m: 0.0,
+            fastest_m_s: 0.0,
+            strain: None,
+        }
+    }
+
+    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    #[must_use]
+    pub fn free_by(mut self, freedom: Freedom) -> Self {
+        self.freedom = freedom;
+        self
+    }
+
+    /// The same, with formations that a reference carries along.
+    #[must_use]
+    pub fn carried_by(mut self, guidance: Option<&'a Guidance>) -> Self {
+        self.guidance = guidance;
+        self
+    }
+
+    /// Takes one sample: O(edges), and no allocation after the first.
+    pub fn observe(&mut self, sample: &Sample<'_>) {
+        self.samples += 1;
+        self.last_s = sample.time_s;
+        let leg = self.legs.get(self.leg);
+        self.distance = leg.map_or_else(Distance::unknown, |leg| {
+            Distance::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
+        });
+        self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
+        self.observe_control(sample.control);
+        self.observe_energy(sample.energy);
+        self.observe_peaks(sample.peaks);
+        self.observe_extent(sample.swarm);
+        Strain::observe(&mut self.strain, sample);
+        if self.judged_to_s != Some(sample.time_s) {
+            self.judge(sample.time_s, sample.swarm, self.arrival.is_within(&self.distance));
+        }
+    }
+
+    /// Notes whether a true state is within the limits of arrival.
+    fn judge(&mut self, time_s: f64, swarm: &Swarm, is_within: bool) {
+        let good = is_within && swarm.first_not_finite().is_none();
+        self.good_since_s = good.then(|| self.good_since_s.unwrap_or(time_s));
+        self.judged_to_s = Some(time_s);
+    }
+
+    fn reference(&self, time_s: f64) -> Reference {
+        self.guidance.map_or_else(Reference::at_rest, |known| known.motion.at(time_s))
+    }
+
+    /// Ends the present leg, which has been reached if the true state was within the limits for long enough, whatever the
+    /// vehicles sensed.
+    fn begin_leg(&mut self, leg: usize, time_s: f64) {
+        let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, time_s));
+        self.ended.push(LegSummary { ended_at_s: time_s, reached_at_s: held_since_s });
+        (self.good_since_s, self.judged_to_s) = (None, None);
+        self.leg = leg;
+    }
+
+    /// The legs that have ended, in order. [`Metrics::finish`] is about the one after them.
+    #[must_use]
+    pub fn ended_legs(&self) -> &[LegSummary] {
+        &self.ended
+    }
+
+    /// How far vehicles tilted and how hard their rotors pushed, where they are quadrotors.
+    #[must_use]
+    pub fn strain(&self) -> Option<Strain> {
+        self.strain
+    }
+
+    /// A sample without a command has none at the end either.
+    fn observe_control(&mut self, control: &Rows) {
+        if control.nrows() == 0 {
+            self.final_control_m_s2 = f64::NAN;
+            return;
+        }
+        self.final_control_m_s2 = largest_row_norm(control);
+        self.peak_control_m_s2 = larger(self.peak_control_m_s2, self.final_control_m_s2);
+    }
+
+    fn observe_extent(&mut self, swarm: &Swarm) {
+        let origin_m = *self.origin_m.get_or_insert_with(|| mean_row(&swarm.positions_m));
+        let farthest_m = (0..swarm.count()).map(|i| (row(&swarm.positions_m, i) - origin_m).norm()).fold(0.0, larger);
+        self.extent_m = larger(self.extent_m, farthest_m);
+        self.fastest_m_s = larger(self.fastest_m_s, largest_row_norm(&swarm.velocities_m_s));
+    }
+
+    /// What was larger between the samples.
+    fn observe_peaks(&mut self, peaks: Peaks) {
+        if let Some(control_m_s2) = peaks.control_m_s2 {
+            self.peak_control_m_s2 = larger(self.peak_control_m_s2, control_m_s2);
+        }
+        if let (Some(range), Some(energy)) = (&mut self.energy, peaks.energy) {
+            range.max = larger(range.max, energy);
+        }
+    }
+
+    /// A sample without energy has none at the end either.
+    fn observe_energy(&mut self, energy: Option<f64>) {
+        match (&mut self.energy, energy) {
+            (Some(range), Some(energy)) => {
+                range.last = energy;
+                range.max = larger(range.max, energy);
+            }
+            (Some(range), None) => range.last = f64::NAN,
+            (None, Some(energy)) => self.energy = Some(EnergyRange { initial: energy, last: energy, max: energy }),
+            (None, None) => {}
+        }
+    }
+
+    /// Largest error of a desired distance at the last sample \[m\].
+    #[must_use]
+    pub fn edge_error_m(&self) -> f64 {
+        self.distance.max_edge_error_m
+    }
+
+    /// The numbers of everything seen.
+    ///
+    /// The formation counts as reached at the end of the first step from which on every step, to the last, had its
+    /// errors of edges and places and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
+    /// one. Where only samples are given, those are judged. A formation that was held for long and lost again is not reached; one
+    /// that was regained counts from when it was regained.
+    #[must_use]
+    pub fn finish(&self) -> Summary {
+        let held_s = self.good_since_s.map(|since| self.last_s - since);
+        let reached = self.good_since_s.is_some_and(|since_s| self.arrival.is_held(since_s, self.last_s));
+        Summary {
+            samples: self.samples,
+            end_s: self.last_s,
+            reached_at_s: self.good_since_s.filter(|_| reached),
+            held_s,
+            max_edge_error_m: self.distance.max_edge_error_m,
+            rms_position_error_m: self.distance.rms_position_error_m,
+            max_position_error_m: self.distance.max_position_error_m,
+            disagreement_m_s: self.distance.disagreement_m_s,
+            common_m_s: self.common_m_s,
+            peak_control_m_s2: self.peak_control_m_s2,
+            final_control_m_s2: self.final_control_m_s2,
+            extent_m: self.extent_m,
+            fastest_m_s: self.fastest_m_s,
+            energy_initial: self.energy.map(|energy| energy.initial),
+            energy_final: self.energy.map(|energy| energy.last),
+            energy_max: self.energy.map(|energy| energy.max),
+            energy_max_over_initial: self
+                .energy
+                .filter(|energy| energy.initial != 0.0)
+                .map(|energy| energy.max / energy.initial),
+        }
+    }
+}
+
+impl Sink for Metrics<'_> {
+    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
+        self.observe(sample);
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        match event {
+            &Event::LegBegan { leg, time_s } => self.begin_leg(leg, time_s),
+            Event::Assigned { slots, .. } => {
+                assign_anew(self.legs.to_mut(), self.leg, slots);
+                self.judged_to_s = None;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Judges arrival at the end of every step, recorded or not.
+    fn step(&mut self, step: &Step<'_>) {
+        let is_within = self.legs.get(self.leg).is_some_and(|leg| {
+            let reference = self.reference(step.time_s);
+            self.arrival.holds(step.swarm, &leg.formation, &reference, self.graph, self.freedom)
+        });
+        self.judge(step.time_s, step.swarm, is_within);
+    }
+}
+
+/// The larger number; NaN where either is, which `f64::max` would hide.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,151 @@
+//! What a flight is after: its formations, where they are to be, and how hard an edge of its graph pulls.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::scenario::Scenario;
+use tautline_core::record::Event;
+use tautline_core::swarm::{Pair, row};
+use tautline_core::swarm::{Rows, mean_row};
+use tautline_laws::formation::{Formation, Freedom, RigidMotion, best_rigid_motion};
+use tautline_laws::graph::Graph;
+use tautline_laws::law::LawSpec;
+use tautline_laws::law::{EdgeTension, EdgeTensionKeys};
+use tautline_laws::space::Obstacle;
+use tautline_laws::target::{Course, Guidance};
+
+/// Formations, graph and how hard an edge pulls.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    course: Course,
+    guidance: Option<Guidance>,
+    freedom: Freedom,
+    /// Who senses whom.
+    pub graph: Graph,
+    law: LawSpec,
+    delta_m: f64,
+    /// What is in the way.
+    pub obstacles: Vec<Obstacle>,
+}
+
+impl Plan {
+    /// Formations, graph and law of a scenario.
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            course: Course::new(&scenario.legs),
+            guidance: scenario.reference.clone(),
+            freedom: scenario.law().map_or(Freedom::RigidMotion, |law| law.controls().freedom()),
+            graph: scenario.graph.clone(),
+            law: scenario.law.clone(),
+            delta_m: scenario.delta_m,
+            obstacles: scenario.obstacles.clone(),
+        }
+    }
+
+    /// Takes note of what happened.
+    pub fn note(&mut self, event: &Event) {
+        match event {
+            &Event::LegBegan { leg, time_s } => self.course.begin(leg, time_s),
+            Event::Assigned { slots, time_s } => self.course.assign(slots, *time_s),
+            _ => {}
+        }
+    }
+
+    /// The leg that is under way at a time \[s\], from 0, and how many there are.
+    #[must_use]
+    pub fn leg_at(&self, time_s: f64) -> (usize, usize) {
+        (self.course.leg_at(time_s), self.course.count())
+    }
+
+    /// The slots that are to be reached at a time \[s\].
+    #[must_use]
+    pub fn formation_at(&self, time_s: f64) -> &Formation {
+        static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
+        self.course.formation_at(time_s).unwrap_or(&NOWHERE)
+    }
+
+    /// Where the reference is at a time \[s\], where there is one \[m\].
+    #[must_use]
+    pub fn reference_at(&self, time_s: f64) -> Option<Vector3<f64>> {
+        self.guidance.as_ref().map(|guidance| guidance.motion.at(time_s).position_m)
+    }
+
+    /// The vehicle that listens to nobody, from 0.
+    #[must_use]
+    pub fn leader(&self) -> Option<usize> {
+        self.guidance.as_ref()?.known_by.leader()
+    }
+
+    /// What lays the slots of a time \[s\] over the vehicles as well as the law leaves them free to be moved; none where
+    /// positions are not known.
+    pub fn laid_at(&self, time_s: f64, positions_m: &Rows) -> Option<RigidMotion> {
+        let formation = self.formation_at(time_s);
+        let moved = |translation_m| RigidMotion { rotation: Matrix3::identity(), translation_m };
+        match self.freedom {
+            Freedom::Fixed => self.reference_at(time_s).map(moved),
+            Freedom::Translation if positions_m.nrows() == formation.count() => {
+                Some(mean_row(positions_m) - mean_row(&formation.slots_m))
+                    .filter(|by_m| by_m.iter().all(|x| x.is_finite()))
+                    .map(moved)
+            }
+            Freedom::Translation => None,
+            Freedom::RigidMotion => best_rigid_motion(positions_m, formation),
+        }
+    }
+
+    /// Where the slots are at a time \[s\], laid over the vehicles \[m\]; none where positions are not known.
+    pub fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
+        let (laid, slots_m) = (self.laid_at(time_s, positions_m)?, &self.formation_at(time_s).slots_m);
+        Some((0..slots_m.nrows()).map(|k| laid.apply(row(slots_m, k))).collect())
+    }
+
+    /// From when on each of the formations is under way \[s\], in order of time; the first from the start.
+    pub fn formations(&self) -> Vec<(f64, &Formation)> {
+        self.course.formations()
+    }
+
+    /// Safety distance \[m\].
+    pub fn delta_m(&self) -> f64 {
+        self.delta_m
+    }
+
+    /// Whether edges have a tension, and are no springs.
+    pub fn has_tension(&self) -> bool {
+        matches!(self.law, LawSpec::EdgeTension(_))
+    }
+
+    /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\] and a time \[s\], from
+    /// -1 to 1.
+    ///
+    /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
+    /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
+    #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
+    pub fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
+        let tension = match self.edge_tension(pair, time_s) {
+            Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
+            None => self.elongation(pair, distance_m, time_s),
+        };
+        tension.clamp(-1.0, 1.0) as f32
+    }
+
+    /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
+    /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    pub fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
+        let vehicles = self.graph.count() as f64;
+        self.edge_tension(pair, time_s).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
+    }
+
+    /// How much longer a distance \[m\] is than the desired one, over that one.
+    pub fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
+        let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
+        (distance_m - rest_m) / rest_m
+    }
+
+    /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
+    fn edge_tension(&self, pair: Pair, time_s: f64) -> Option<(f64, EdgeTension)> {
+        let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
+        let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
+        Some((alpha, EdgeTension::new(alpha, self.delta_m, rest_m).ok()?))
+    }
+}

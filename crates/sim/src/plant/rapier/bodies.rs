@@ -1,0 +1,208 @@
+//! Points: rigid bodies without rotation that carry out commanded accelerations.
+
+use nalgebra::Vector3;
+use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+
+use super::world::{
+    copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+};
+use crate::plant::{Air, HullContact, Path, Plant, PlantError};
+use crate::scenario::{Scenario, Space};
+use tautline_core::record::Channel;
+use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
+
+/// A swarm of rigid bodies, one a vehicle, in vehicle order.
+pub(super) struct Bodies {
+    world: PhysicsWorld,
+    handles: Vec<RigidBodyHandle>,
+    /// Accelerations held over the step, and what the wind adds to them at its beginning \[m/s^2\].
+    held: Rows,
+    /// What blows, where anything does.
+    air: Option<Air>,
+    /// Velocities of the last drift, as they were before contacts changed them \[m/s\].
+    drift_m_s: Rows,
+    /// Where it began, from the engine's origin \[m\].
+    began_m: Rows,
+    /// Length of the drift that waits for the second half of its kick \[s\]; 0 for a completed state.
+    drifted_s: f64,
+    /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
+    /// wherever it flies.
+    origin_m: Vector3<f64>,
+    mass_kg: Vec<f64>,
+    /// Drag of the air included.
+    a22_per_s: f64,
+    /// Whether z is locked.
+    is_flat: bool,
+}
+
+impl Bodies {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let mut world = empty_world();
+        let origin_m = mean_row(&scenario.start.positions_m);
+        let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, origin_m, i)).collect();
+        scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
+        Self {
+            world,
+            handles,
+            held: Rows::zeros(scenario.count()),
+            air: Air::of(scenario),
+            drift_m_s: Rows::zeros(scenario.count()),
+            began_m: Rows::zeros(scenario.count()),
+            drifted_s: 0.0,
+            origin_m,
+            mass_kg: scenario.mass_kg.clone(),
+            a22_per_s: scenario.velocity_coefficient_per_s(),
+            is_flat: scenario.space == Space::Plane,
+        }
+    }
+
+    /// What half a step of free motion multiplies a velocity by: exp(a22 dt/2).
+    fn half_decay(&self, dt_s: f64) -> f64 {
+        libm::exp(0.5 * self.a22_per_s * dt_s)
+    }
+
+    /// The command with what the wind adds to it now.
+    fn hold(&mut self) {
+        if let Some(air) = &self.air {
+            air.write_held(&mut self.held);
+        }
+        if self.is_flat {
+            self.held.column_mut(2).fill(0.0);
+        }
+    }
+
+    /// Each vehicle's velocity \[m/s\] with the second half of the held acceleration's kick, where a drift waits for it.
+    fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let half_decay = self.half_decay(self.drifted_s);
+        self.handles.iter().enumerate().map(move |(i, &handle)| {
+            let drift_m_s = from_engine(self.world.bodies[handle].linvel());
+            (drift_m_s + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay
+        })
+    }
+}
+
+impl Clone for Bodies {
+    fn clone(&self) -> Self {
+        let world = copied(&self.world);
+        let (handles, mass_kg) = (self.handles.clone(), self.mass_kg.clone());
+        let (held, drift_m_s, began_m) = (self.held.clone(), self.drift_m_s.clone(), self.began_m.clone());
+        let air = self.air.clone();
+        Self { world, handles, held, air, drift_m_s, began_m, mass_kg, ..*self }
+    }
+}
+
+impl Plant for Bodies {
+    fn count(&self) -> usize {
+        self.handles.len()
+    }
+
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+        self.world.integration_parameters.dt = dt_s;
+        // A drift that waits for its command is completed with the one that is held.
+        let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            let held_m_s2 = row(&self.held, i);
+            let velocity_m_s = (from_engine(body.linvel()) + 0.5 * self.drifted_s * held_m_s2) * completing;
+            let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
+            set_row(&mut self.drift_m_s, i, drift_m_s);
+            set_row(&mut self.began_m, i, from_engine(body.translation()));
+            body.set_linvel(to_engine(drift_m_s - dt_s * held_m_s2), true);
+            body.reset_forces(false);
+            body.add_force(to_engine(held_m_s2) * self.mass_kg[i], true);
+        }
+        self.world.step();
+        self.drifted_s = dt_s;
+        if let Some(air) = &mut self.air {
+            air.advance(dt_s);
+            self.hold();
+        }
+        if let Some(lost) = self.world.quarantine().bodies().first() {
+            let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
+            return Err(PlantError::NotFinite { vehicle });
+        }
+        self.observe(predicted);
+        Ok(())
+    }
+
+    fn apply(&mut self, command: &Rows, state: &mut Swarm) {
+        self.held.copy_from(command);
+        if let Some(air) = &mut self.air {
+            air.hold(command);
+        }
+        self.hold();
+        if self.drifted_s > 0.0 {
+            for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
+                set_row(&mut state.velocities_m_s, i, from_engine(to_engine(velocity_m_s)));
+            }
+            for (i, &handle) in self.handles.iter().enumerate() {
+                self.world.bodies[handle].set_linvel(to_engine(row(&state.velocities_m_s, i)), true);
+            }
+            self.drifted_s = 0.0;
+        }
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        for (i, &handle) in self.handles.iter().enumerate() {
+            set_row(&mut swarm.positions_m, i, self.origin_m + from_engine(self.world.bodies[handle].translation()));
+        }
+        for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
+            set_row(&mut swarm.velocities_m_s, i, velocity_m_s);
+        }
+    }
+
+    fn restore(&mut self, swarm: &Swarm) {
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            body.set_translation(to_engine(row(&swarm.positions_m, i) - self.origin_m), true);
+            body.set_linvel(to_engine(row(&swarm.velocities_m_s, i)), true);
+        }
+        self.drifted_s = 0.0;
+        if let Some(air) = &mut self.air {
+            air.undo();
+            self.hold();
+        }
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        self.air.iter().map(|_| Air::channel()).collect()
+    }
+
+    fn write_channels(&self, channels: &mut [Channel]) {
+        self.air.iter().zip(channels).for_each(|(air, channel)| air.write_channel(channel));
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        if let Some(air) = &mut self.air {
+            air.reseed(seed);
+        }
+    }
+
+    fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
+        keep_out_contacts(&self.world, pairs);
+    }
+
+    fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
+        hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+    }
+}
+
+fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vector3<f64>, i: usize) -> RigidBodyHandle {
+    let locked = match scenario.space {
+        Space::Plane => LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_Z,
+        Space::Volume => LockedAxes::ROTATION_LOCKED,
+    };
+    let body = RigidBodyBuilder::dynamic()
+        .translation(to_engine(row(&scenario.start.positions_m, i) - origin_m))
+        .linvel(to_engine(row(&scenario.start.velocities_m_s, i)))
+        .locked_axes(locked)
+        .can_sleep(false);
+    let handle = world.bodies.insert(body);
+
+    let hull = hull(scenario.hull_radius_m[i], i).mass(scenario.mass_kg[i]);
+    for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
+        world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+    }
+    world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
+    handle
+}

@@ -1,0 +1,211 @@
+//! Quadrotors: rigid bodies that turn, lifted by rotors.
+
+use std::time::{Duration, Instant};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rapier3d::prelude::{MassProperties, PhysicsWorld, Real, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
+
+use super::world::{
+    copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+};
+use crate::plant::{HullContact, Path, Plant, PlantError, Quadrotors};
+use crate::scenario::Scenario;
+use crate::vehicle::{Drift, Fleet};
+use tautline_core::record::Channel;
+use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
+
+/// Friction of hulls that turn: a hit makes them tumble.
+const HULL_FRICTION: Real = 0.5;
+
+/// A swarm of quadrotors, one body each, in vehicle order. The engine moves and turns them and sees what they hit; forces and
+/// torques, and with them the velocities around its step, are those of the fleet.
+pub(super) struct Fliers {
+    world: PhysicsWorld,
+    handles: Vec<RigidBodyHandle>,
+    fleet: Fleet,
+    /// The first half of the step that is being flown.
+    drifts: Vec<Drift>,
+    /// Its velocities, and where it began from the engine's origin, for hits.
+    drift_m_s: Rows,
+    began_m: Rows,
+    origin_m: Vector3<f64>,
+    /// Spent beside the engine.
+    airframe: Duration,
+}
+
+impl Fliers {
+    pub(super) fn new(scenario: &Scenario, mut fleet: Fleet) -> Self {
+        fleet.feel();
+        let mut world = empty_world();
+        let origin_m = mean_row(&scenario.start.positions_m);
+        let (model, inertia_kg_m2) = (fleet.dynamics.model(), fleet.dynamics.inertia_kg_m2());
+        let handles = fleet.states.iter().enumerate().map(|(i, state)| {
+            let mass = MassProperties::new(Vector::ZERO, model.mass_kg, to_engine(inertia_kg_m2));
+            let body = RigidBodyBuilder::dynamic()
+                .translation(to_engine(state.position_m - origin_m))
+                .linvel(to_engine(state.velocity_m_s))
+                .additional_mass_properties(mass)
+                .gyroscopic_forces_enabled(false)
+                .allow_fast_rotation(true)
+                .can_sleep(false);
+            let handle = world.bodies.insert(body);
+            world.bodies[handle].set_rotation(rotation(&state.attitude), true);
+            let hull = hull(model.hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
+            for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
+                world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+            }
+            world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
+            handle
+        });
+        let (handles, count): (Vec<_>, _) = (handles.collect(), scenario.count());
+        scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
+        let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
+        Self {
+            world,
+            handles,
+            fleet,
+            drifts: Vec::with_capacity(count),
+            drift_m_s,
+            began_m,
+            origin_m,
+            airframe: Duration::ZERO,
+        }
+    }
+
+    /// Half of the kick, and what the engine is to drift with.
+    fn begin(&mut self, dt_s: f64) {
+        self.drifts.clear();
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let drift = self.fleet.dynamics.begin(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
+            let body = &mut self.world.bodies[handle];
+            set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
+            set_row(&mut self.began_m, i, from_engine(body.translation()));
+            body.set_linvel(to_engine(drift.velocity_m_s), true);
+            body.set_angvel(to_engine(drift.turn_rad_s), true);
+            self.drifts.push(drift);
+        }
+    }
+
+    /// Where the engine brought them, and the other half of the kick.
+    fn end(&mut self, dt_s: f64) {
+        let lag = self.fleet.dynamics.rotor_lag(dt_s);
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let (body, drift) = (&self.world.bodies[handle], &mut self.drifts[i]);
+            let asked_rpm = self.fleet.asked_rpm(i);
+            let state = &mut self.fleet.states[i];
+            state.position_m = self.origin_m + from_engine(body.translation());
+            state.attitude = attitude(*body.rotation());
+            state.rotors_rpm = lag.after(state.rotors_rpm, asked_rpm);
+            let by_m_s = from_engine(body.linvel() - to_engine(drift.velocity_m_s));
+            let by_rad_s = from_engine(body.angvel() - to_engine(drift.turn_rad_s));
+            if by_m_s != Vector3::zeros() || by_rad_s != Vector3::zeros() {
+                self.fleet.dynamics.hit(drift, &state.attitude, by_m_s, by_rad_s);
+            }
+            self.fleet.dynamics.predict(state, drift);
+        }
+        self.fleet.blow(dt_s);
+        // Also what begins the next step: it differs from what the velocities make of it by the square of the step.
+        self.fleet.feel();
+        self.fleet.complete(&self.drifts, dt_s);
+    }
+}
+
+impl Clone for Fliers {
+    fn clone(&self) -> Self {
+        Self {
+            world: copied(&self.world),
+            handles: self.handles.clone(),
+            fleet: self.fleet.clone(),
+            drifts: self.drifts.clone(),
+            drift_m_s: self.drift_m_s.clone(),
+            began_m: self.began_m.clone(),
+            origin_m: self.origin_m,
+            airframe: self.airframe,
+        }
+    }
+}
+
+impl Quadrotors for Fliers {
+    fn fleet(&self) -> &Fleet {
+        &self.fleet
+    }
+}
+
+impl Plant for Fliers {
+    fn count(&self) -> usize {
+        self.handles.len()
+    }
+
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+        self.world.integration_parameters.dt = dt_s;
+        let began = Instant::now();
+        self.fleet.remember();
+        self.fleet.run_attitude();
+        self.begin(dt_s);
+        self.airframe += began.elapsed();
+        self.world.step();
+        if let Some(lost) = self.world.quarantine().bodies().first() {
+            let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
+            return Err(PlantError::NotFinite { vehicle });
+        }
+        let began = Instant::now();
+        self.end(dt_s);
+        self.fleet.pass(dt_s);
+        self.fleet.observe(predicted);
+        self.airframe += began.elapsed();
+        Ok(())
+    }
+
+    /// The state is complete: a command changes forces only as fast as rotors follow it.
+    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+        self.fleet.command(command);
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        self.fleet.observe(swarm);
+    }
+
+    fn restore(&mut self, _swarm: &Swarm) {
+        self.fleet.go_back();
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            body.set_translation(to_engine(row(&self.began_m, i)), true);
+            body.set_rotation(rotation(&self.fleet.states[i].attitude), true);
+        }
+    }
+
+    fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
+        keep_out_contacts(&self.world, pairs);
+    }
+
+    fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
+        hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+    }
+
+    fn airframe_time(&self) -> Duration {
+        self.airframe
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        self.fleet.channels()
+    }
+
+    fn write_channels(&self, channels: &mut [Channel]) {
+        self.fleet.write_channels(channels);
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        self.fleet.reseed(seed);
+    }
+}
+
+/// As the engine has it, which keeps its length: the same numbers go back into it.
+fn attitude(rotation: Rotation) -> UnitQuaternion<f64> {
+    let [x, y, z, w] = rotation.to_array();
+    UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
+fn rotation(attitude: &UnitQuaternion<f64>) -> Rotation {
+    let q = attitude.quaternion();
+    Rotation::from_xyzw(q.i, q.j, q.k, q.w)
+}

@@ -1,0 +1,133 @@
+//! Bodies, colliders and contacts of the engine's world, as both plants of rigid bodies use them.
+
+use nalgebra::Vector3;
+use rapier3d::prelude::{
+    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real, SharedShape,
+    Vector,
+};
+
+use crate::plant::HullContact;
+use crate::scenario::CONTACT_PREDICTION_M;
+use tautline_core::swarm::{Pair, Rows, row};
+use tautline_laws::space::{Obstacle, Shape};
+
+/// Hulls meet hulls.
+const HULL: Group = Group::GROUP_1;
+/// Keep-out balls meet keep-out balls.
+const KEEP_OUT: Group = Group::GROUP_2;
+/// Share of the closing speed that two hulls keep after a bounce.
+const HULL_RESTITUTION: Real = 0.5;
+
+/// Everything that the engine carries from step to step: bodies, contacts, islands, bounding volumes. What it leaves out is
+/// working memory.
+pub(super) fn copied(world: &PhysicsWorld) -> PhysicsWorld {
+    PhysicsWorld {
+        gravity: world.gravity,
+        integration_parameters: world.integration_parameters,
+        islands: world.islands.clone(),
+        broad_phase: world.broad_phase.clone(),
+        narrow_phase: world.narrow_phase.clone(),
+        bodies: world.bodies.clone(),
+        colliders: world.colliders.clone(),
+        impulse_joints: world.impulse_joints.clone(),
+        multibody_joints: world.multibody_joints.clone(),
+        ..PhysicsWorld::default()
+    }
+}
+
+/// Appends the pairs whose keep-out balls overlap, in index order.
+pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
+    let before = pairs.len();
+    let vehicle = |handle: ColliderHandle| {
+        let collider = world.colliders.get(handle)?;
+        let keeps_out = collider.collision_groups().memberships == KEEP_OUT;
+        keeps_out.then_some(usize::try_from(collider.user_data).ok()?)
+    };
+    for contact in world.narrow_phase.contact_pairs() {
+        // A manifold also holds contacts predicted for the near future: only an overlap counts.
+        let overlaps = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.dist < 0.0));
+        if overlaps && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
+            pairs.push(Pair::new(i, j));
+        }
+    }
+    pairs[before..].sort_unstable();
+}
+
+/// Appends the pairs whose hulls pushed each other in a drift from these places \[m\] at these velocities \[m/s\], in index
+/// order.
+pub(super) fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Rows, contacts: &mut Vec<HullContact>) {
+    let before = contacts.len();
+    for contact in world.narrow_phase.contact_pairs() {
+        // Keep-out balls push nothing.
+        let pushed = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.data.impulse > 0.0));
+        let vehicle = |handle: ColliderHandle| {
+            world.colliders.get(handle).and_then(|collider| usize::try_from(collider.user_data).ok())
+        };
+        if pushed && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
+            let apart = (row(began_m, j) - row(began_m, i)).normalize();
+            let closing_m_s = -(row(drift_m_s, j) - row(drift_m_s, i)).dot(&apart);
+            contacts.push(HullContact { pair: Pair::new(i, j), closing_m_s });
+        }
+    }
+    contacts[before..].sort_unstable_by_key(|contact| contact.pair);
+}
+
+pub(super) fn empty_world() -> PhysicsWorld {
+    let mut world = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
+    let parameters = &mut world.integration_parameters;
+    // One iteration: motion within a step is a straight line (module documentation).
+    parameters.num_solver_iterations = 1;
+    // The engine would clamp speeds at 400 m/s.
+    parameters.normalized_max_linear_velocity = Real::MAX;
+    parameters.normalized_prediction_distance = CONTACT_PREDICTION_M;
+    // Reused contacts report stale distances: evidence must be of this step.
+    parameters.contact_recycling = false;
+    // Continuous collision detection would shorten motion; the audit judges what happened.
+    parameters.max_ccd_substeps = 0;
+    world
+}
+
+/// The solid ball of a vehicle.
+pub(super) fn hull(radius_m: f64, vehicle: usize) -> ColliderBuilder {
+    ColliderBuilder::ball(radius_m)
+        .restitution(HULL_RESTITUTION)
+        .friction(0.0)
+        .collision_groups(InteractionGroups::new(HULL, HULL, InteractionTestMode::And))
+        .user_data(vehicle as u128)
+}
+
+/// The ball that keeps two vehicles a distance apart, in what it sees.
+pub(super) fn keep_out(delta_m: f64, vehicle: usize) -> ColliderBuilder {
+    ColliderBuilder::ball(delta_m / 2.0)
+        .density(0.0)
+        .collision_groups(InteractionGroups::new(KEEP_OUT, KEEP_OUT, InteractionTestMode::And))
+        .solver_groups(InteractionGroups::none())
+        .user_data(vehicle as u128)
+}
+
+/// A solid that hulls meet and nothing moves. It is the hull of no vehicle.
+pub(super) fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, origin_m: Vector3<f64>) {
+    let place_m = obstacle.place_m - origin_m;
+    let collider = match obstacle.shape {
+        Shape::Ball { radius_m } => ColliderBuilder::ball(radius_m),
+        Shape::Box { half_m, yaw_deg } => ColliderBuilder::cuboid(half_m.x, half_m.y, half_m.z)
+            .rotation(to_engine(Vector3::z() * yaw_deg.to_radians())),
+        Shape::Capsule { from_m, to_m, radius_m } => {
+            ColliderBuilder::capsule_from_endpoints(to_engine(from_m), to_engine(to_m), radius_m)
+        }
+        Shape::HalfSpace { normal } => ColliderBuilder::new(SharedShape::halfspace(to_engine(normal.normalize()))),
+    };
+    let hulls = InteractionGroups::new(HULL, HULL, InteractionTestMode::And);
+    let collider = collider.translation(to_engine(place_m)).restitution(HULL_RESTITUTION).friction(0.0);
+    world.colliders.insert(collider.collision_groups(hulls).user_data(u128::MAX));
+}
+
+/// A vector in the engine's type.
+pub(super) fn to_engine(v: Vector3<f64>) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+/// A vector of the engine in ours.
+pub(super) fn from_engine(v: Vector) -> Vector3<f64> {
+    Vector3::new(v.x, v.y, v.z)
+}

@@ -1,0 +1,181 @@
+//! From the document to the scenario: numbers per vehicle, shapes into points, defaults that depend on
+//! other keys.
+//!
+//! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
+//! it; [`super::validate`] judges the rest.
+
+use super::chance;
+use super::document::{Document, PlantKind, StartShape, StartTable};
+use super::error::ScenarioError;
+use super::graph::{edge_count, graph};
+use super::legs::{check_slots, legs, listed_slots};
+use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory};
+use super::reference::ReferenceTable;
+use super::slots::is_flat;
+use super::spec::{PlantSpec, Scenario, Space};
+use super::start;
+use super::values::{PerVehicle, Point, rows};
+use crate::vehicle::Quadrotor;
+use tautline_core::swarm::{Rows, Swarm, set_row};
+use tautline_laws::wind::WindSpec;
+
+/// Completes a scenario. It still has to be validated.
+pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
+    let count = count(&document)?;
+    check_count(count)?;
+    check_memory(count, edge_count(&document.graph.kind, document.law.kind.keeps_edges(), count))?;
+    check_lists(&document, count)?;
+    let space = space(&document)?;
+    let (a22_per_s, of_velocity_per_s) = (document.a22_per_s(), document.velocity_coefficient_per_s());
+    let (delta_m, safety) = document.safety.resolve(document.law.delta_m)?;
+    let law = document.law.kind.complete(of_velocity_per_s);
+    let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
+    let mut start = start(&document.start, count, space, delta_m)?;
+    if let (Some(guidance), None) = (&reference, &document.start.velocities_m_s)
+        && let Some(leader) = guidance.known_by.leader()
+    {
+        set_row(&mut start.velocities_m_s, leader, guidance.motion.at(0.0).velocity_m_s);
+    }
+    let airframe = document.vehicle.airframe()?;
+    let (mass_kg, hull_radius_m) = match airframe.quadrotor() {
+        None => (document.swarm.mass_kg.clone(), document.swarm.hull_radius_m.clone()),
+        Some(Quadrotor { model, .. }) => (PerVehicle::All(model.mass_kg), PerVehicle::All(model.hull_radius_m)),
+    };
+    let hull_radius_m = per_vehicle(hull_radius_m, count);
+    let clearance_m =
+        hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
+    let obstacles = document.obstacle.iter().enumerate();
+    let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
+    let mut time = document.time;
+    time.control_hz = document.actuation.control_hz(time.control_hz)?;
+    let (gives_step, gives_halvings) = (time.gives_step(), time.gives_halvings());
+    let time = time.complete(count, document.arrival.hold_s, &airframe);
+    let mut scenario = Scenario {
+        start,
+        mass_kg: per_vehicle(mass_kg, count),
+        hull_radius_m,
+        a22_per_s,
+        drag_per_s: document.vehicle.drag_per_s,
+        wind: document.wind.map_or_else(|| Ok(WindSpec::default()), |table| table.wind(count))?,
+        legs: Vec::new(),
+        obstacles,
+        reference,
+        graph: graph(&document.graph.kind, count)?,
+        plant: match document.plant.kind {
+            PlantKind::Rapier => PlantSpec::Rapier,
+            PlantKind::Ideal => PlantSpec::Ideal,
+        },
+        time,
+        sensing: document.sensing,
+        network: document.network,
+        actuation: document.actuation.spec(),
+        failures: document.failure,
+        arrival: document.arrival,
+        breathing: document.breathing,
+        noise_seed: document.noise.seed,
+        name: document.name.unwrap_or_default(),
+        airframe,
+        space,
+        law,
+        delta_m,
+        safety,
+    };
+    legs(&mut scenario, &document.formation, &document.leg)?;
+    if !gives_step {
+        scenario.choose_step();
+    }
+    if !gives_halvings {
+        scenario.choose_halvings();
+    }
+    Ok(scenario)
+}
+
+/// Number of vehicles: as given, or else as many as there are points, start before formation.
+fn count(document: &Document) -> Result<usize, ScenarioError> {
+    if let Some(count) = document.swarm.count {
+        return usize::try_from(count).map_err(|_| ScenarioError::new("too many vehicles").at("swarm.count"));
+    }
+    let listed = document.start.positions_m.as_ref().map(Vec::len);
+    listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
+        ScenarioError::new("the number of vehicles is not given")
+            .with_help("add `count` to [swarm], for example count = 6")
+            .at("swarm.count")
+    })
+}
+
+/// Refuses lists that are not as long as there are vehicles.
+fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
+    let per_vehicle = |numbers: &PerVehicle| match numbers {
+        PerVehicle::All(_) => None,
+        PerVehicle::Each(list) => Some(list.len()),
+    };
+    let Document { swarm, start, formation, .. } = document;
+    check_slots(&document.leg, count)?;
+    check_lengths(
+        count,
+        [
+            ("start.positions_m", "start positions", start.positions_m.as_ref().map(Vec::len)),
+            ("start.velocities_m_s", "start velocities", start.velocities_m_s.as_ref().map(Vec::len)),
+            ("formation.points_m", "slots in the formation", listed_slots(&formation.shape)),
+            ("swarm.mass_kg", "masses", per_vehicle(&swarm.mass_kg)),
+            ("swarm.hull_radius_m", "hull radii", per_vehicle(&swarm.hull_radius_m)),
+        ],
+    )
+}
+
+/// The space asked for, or else the plane if everything lies in it.
+fn space(document: &Document) -> Result<Space, ScenarioError> {
+    let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
+    let moved = document.leg.iter().filter_map(|leg| leg.move_m).chain(document.formation.move_m);
+    let shapes = document.leg.iter().filter_map(|leg| leg.shape.as_ref()).chain([&document.formation.shape]);
+    let reference_is_flat = document.reference.as_ref().is_none_or(ReferenceTable::is_flat);
+    let formation_is_flat =
+        reference_is_flat && moved.into_iter().all(|point| flat(&[point])) && shapes.into_iter().all(is_flat);
+    match document.swarm.dimensions {
+        Some(2) => Ok(Space::Plane),
+        Some(3) => Ok(Space::Volume),
+        Some(other) => Err(ScenarioError::new(format!("a swarm of {other} dimensions"))
+            .with_help("2 is the plane z = 0, 3 is space")
+            .at("swarm.dimensions")),
+        None => {
+            let listed = [&document.start.positions_m, &document.start.velocities_m_s];
+            let start_is_flat = listed.into_iter().flatten().all(|points| flat(points))
+                && !matches!(document.start.shape, Some(StartShape::Sphere { .. }));
+            Ok(if start_is_flat && formation_is_flat { Space::Plane } else { Space::Volume })
+        }
+    }
+}
+
+/// Positions and velocities at time 0.
+fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
+    let mut random = chance::random(table.seed);
+    let mut positions_m = match (&table.positions_m, &table.shape) {
+        (Some(points), None) => rows(points),
+        (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,
+        (Some(_), Some(_)) => {
+            return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
+                .with_help("keep one of them")
+                .at("start.shape")
+                .at("start.positions_m"));
+        }
+        (None, None) => {
+            return Err(ScenarioError::new("no start positions are given")
+                .with_help("add positions_m = [[x, y], ...] or a shape, for example shape = \"line\", spacing_m = 3.0")
+                .at("start"));
+        }
+    };
+    start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
+    let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
+    let mut swarm = Swarm { positions_m, velocities_m_s };
+    if table.shuffle {
+        start::shuffle(&mut swarm, &mut random);
+    }
+    Ok(swarm)
+}
+
+fn per_vehicle(numbers: PerVehicle, count: usize) -> Vec<f64> {
+    match numbers {
+        PerVehicle::All(number) => vec![number; count],
+        PerVehicle::Each(list) => list,
+    }
+}

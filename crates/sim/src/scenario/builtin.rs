@@ -1,0 +1,87 @@
+//! The scenarios that the program carries with it.
+
+/// A scenario embedded in the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Builtin {
+    /// Its name, as [`super::Source::resolve`] takes it.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub summary: &'static str,
+    /// Its file, comments included: what to copy for a scenario of one's own.
+    pub toml: &'static str,
+}
+
+const ALL: &[Builtin] = &[
+    Builtin {
+        name: "pentagon",
+        summary: "five vehicles from a line to a pentagon under the edge-tension law: clear and reached",
+        toml: include_str!("../../../../assets/pentagon.toml"),
+    },
+    Builtin {
+        name: "circle",
+        summary: "six vehicles from a line to a circle under the edge-tension law: clear and reached",
+        toml: include_str!("../../../../assets/circle.toml"),
+    },
+    Builtin {
+        name: "pentagon-laplacian",
+        summary: "the pentagon's start under the Laplacian baseline, which avoids nothing: a violation",
+        toml: include_str!("../../../../assets/pentagon-laplacian.toml"),
+    },
+    Builtin {
+        name: "pentagon-collinear",
+        summary: "the pentagon from an exactly straight line, which no force leaves: clear but never reached",
+        toml: include_str!("../../../../assets/pentagon-collinear.toml"),
+    },
+    Builtin {
+        name: "pentagon-leader",
+        summary: "the pentagon around a leader that listens to nobody, over a star: clear and reached",
+        toml: include_str!("../../../../assets/pentagon-leader.toml"),
+    },
+    Builtin {
+        name: "leader-lossy",
+        summary: "a leader that flies on, heard over a radio that loses one in ten: carried along what is old does no harm",
+        toml: include_str!("../../../../assets/leader-lossy.toml"),
+    },
+    Builtin {
+        name: "swap",
+        summary: "twelve vehicles change places across a circle under the displacement law: clear and reached",
+        toml: include_str!("../../../../assets/swap.toml"),
+    },
+    Builtin {
+        name: "show",
+        summary: "a hundred vehicles write two words and end in rings, certified through all legs: clear and reached",
+        toml: include_str!("../../../../assets/show.toml"),
+    },
+    Builtin {
+        name: "obstacles",
+        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of each other and of them, reached",
+        toml: include_str!("../../../../assets/obstacles.toml"),
+    },
+    Builtin {
+        name: "crazyflies",
+        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear and reached, nothing certified",
+        toml: include_str!("../../../../assets/crazyflies.toml"),
+    },
+    Builtin {
+        name: "gusts",
+        summary: "rings in a turbulent wind with gusts on some of them: what all feel alike changes no distance, reached",
+        toml: include_str!("../../../../assets/gusts.toml"),
+    },
+    Builtin {
+        name: "thousand",
+        summary: "a thousand vehicles draw together in space: clear and reached",
+        toml: include_str!("../../../../assets/thousand.toml"),
+    },
+];
+
+/// All built-in scenarios, the default first.
+#[must_use]
+pub fn all() -> &'static [Builtin] {
+    ALL
+}
+
+/// The built-in scenario of this name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static Builtin> {
+    ALL.iter().find(|builtin| builtin.name == name)
+}

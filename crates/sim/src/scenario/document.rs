@@ -1,0 +1,388 @@
+//! The scenario file: its keys, units and defaults.
+//!
+//! Read by `deserializer`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
+//! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::actuation::ActuationTable;
+use super::failure::Failure;
+use super::graph::GraphTable;
+use super::laws::Laws;
+use super::network::NetworkSpec;
+use super::noise::NoiseTable;
+use super::obstacles::ObstacleTable;
+use super::reference::ReferenceTable;
+use super::safety::SafetyTable;
+use super::sensing::SensingSpec;
+use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
+use super::shapes::{HelixKeys, SpacingKeys, VKeys};
+use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG};
+use super::time_table::TimeTable;
+use super::values::{LegStart, PerVehicle, Point};
+use super::vehicle_table::VehicleTable;
+use super::wind::WindTable;
+use tautline_laws::law::LawSpec;
+use tautline_laws::target::{Arrival, Breathing};
+
+/// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
+/// entries of every list, are counted from 1.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(title = "tautline scenario")]
+#[serde(deny_unknown_fields)]
+pub(super) struct Document {
+    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`. The file's name unless given.
+    #[schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$"))]
+    pub(super) name: Option<String>,
+    /// The vehicles.
+    #[serde(default)]
+    pub(super) swarm: SwarmTable,
+    /// What kind of body they are: points unless given.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) vehicle: VehicleTable,
+    /// Air that moves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "WindTable")]
+    pub(super) wind: Option<WindTable>,
+    /// What must stay empty around each: a ball unless given.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) safety: SafetyTable,
+    /// Where they start.
+    pub(super) start: StartTable,
+    /// The slots that they shall reach.
+    pub(super) formation: FormationTable,
+    /// The formations after it, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) leg: Vec<LegTable>,
+    /// Solids at rest that are in the way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) obstacle: Vec<ObstacleTable>,
+    /// A motion that the formations are carried along with; slots are places then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "ReferenceTable")]
+    pub(super) reference: Option<ReferenceTable>,
+    /// The control law.
+    pub(super) law: LawTable,
+    /// Laws that `tautline compare` flies by name: `[laws.NAME]` holds the keys of a law, where NAME is its kind or any other
+    /// name with a `kind` beside the keys.
+    #[serde(default, skip_serializing_if = "Laws::is_empty")]
+    pub(super) laws: Laws,
+    /// Which vehicles sense each other: all of them unless given.
+    #[serde(default)]
+    pub(super) graph: GraphTable,
+    /// The bodies that carry out the commands.
+    #[serde(default)]
+    pub(super) plant: PlantTable,
+    /// Duration and rates.
+    pub(super) time: TimeTable,
+    /// What counts as a reached formation.
+    #[serde(default, rename(serialize = "judge"))]
+    pub(super) arrival: Arrival,
+    /// When slots are spread for a while, so that vehicles that stand in each other's way get past; under the displacement
+    /// law.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) breathing: Breathing,
+    /// What vehicles measure of themselves and of whoever is near.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) sensing: SensingSpec,
+    /// What vehicles hear of each other, and when.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) network: NetworkSpec,
+    /// How commands become accelerations.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) actuation: ActuationTable,
+    /// Vehicles of which a part fails.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) failure: Vec<Failure>,
+    /// Chance in flight.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) noise: NoiseTable,
+}
+
+impl Document {
+    /// What a vehicle's own velocity accelerates it by \[1/s\].
+    pub(super) fn velocity_coefficient_per_s(&self) -> f64 {
+        self.a22_per_s() - self.vehicle.drag_per_s
+    }
+}
+
+/// The vehicles.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct SwarmTable {
+    /// Number of vehicles N. Needed where neither the start nor the formation lists points; checked against them
+    /// where they do.
+    #[schemars(range(min = 2))]
+    pub(super) count: Option<u64>,
+    /// 2 keeps the swarm in the plane z = 0, 3 lets it use all axes. Without it: 2 when every position, velocity and
+    /// slot has z = 0, otherwise 3.
+    #[schemars(range(min = 2, max = 3))]
+    pub(super) dimensions: Option<u64>,
+    /// Mass of points in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
+    /// motion until hulls touch; the ideal plant's vehicles are points and have no use for it.
+    pub(super) mass_kg: PerVehicle,
+    /// Radius of the solid hull of points in m, for all vehicles or for each. The hulls of any two vehicles must fit within
+    /// `law.delta_m`, so they change no motion until a pair is closer than that; the ideal plant has no hulls.
+    pub(super) hull_radius_m: PerVehicle,
+    /// Velocity coefficient a22 of points, p'' = a22 v + u, in 1/s: negative is drag against the ground, whatever blows, positive
+    /// feeds energy in. Drag in the air is `vehicle.drag_per_s`.
+    pub(super) a22_per_s: f64,
+}
+
+/// Where the vehicles start: `positions_m`, or a `shape` with its parameters.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct StartTable {
+    /// Position of each vehicle in m.
+    pub(super) positions_m: Option<Vec<Point>>,
+    /// Velocity of each vehicle in m/s; at rest unless given.
+    pub(super) velocities_m_s: Option<Vec<Point>>,
+    /// Largest random offset along each axis in m, uniform, added to every position. Along z only in three
+    /// dimensions.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0))]
+    pub(super) jitter_m: f64,
+    /// Seed of the random numbers (`ChaCha8`, the same on every machine).
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0))]
+    pub(super) seed: u64,
+    /// Whether vehicles take the start's places in an order that is drawn by `seed`.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = false))]
+    pub(super) shuffle: bool,
+    #[schemars(flatten)]
+    pub(super) shape: Option<StartShape>,
+}
+
+/// A start without a list of positions.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "shape")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) enum StartShape {
+    /// Vehicles 1, 2, ... along x.
+    Line {
+        /// Distance between neighbours in m.
+        spacing_m: f64,
+    },
+    /// A near-square grid in the plane z = 0, row by row.
+    Grid {
+        /// Distance between neighbours in m.
+        spacing_m: f64,
+    },
+    /// A circle in the plane z = 0.
+    Circle {
+        /// Radius in m.
+        radius_m: f64,
+    },
+    /// Points spread evenly over a sphere.
+    Sphere {
+        /// Radius in m.
+        radius_m: f64,
+    },
+    /// Uniformly random positions in a square, or in a cube in three dimensions, that keep a distance.
+    Random {
+        /// Half the side of the square or cube around the origin in m.
+        half_extent_m: f64,
+        /// Smallest distance between two vehicles in m: more than `law.delta_m`, and 1.5 times that unless given.
+        min_separation_m: Option<f64>,
+    },
+}
+
+/// The slots of the formation. Laws that control distances reach it up to rotation, reflection and translation.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FormationTable {
+    /// Who flies to which slot.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = "given"))]
+    pub(super) assignment: Assignment,
+    /// The slots are scaled by this about their centre.
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    #[schemars(extend("default" = 1.0))]
+    pub(super) scale: f64,
+    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0))]
+    pub(super) yaw_deg: f64,
+    /// Then they are moved by this in m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Point")]
+    pub(super) move_m: Option<Point>,
+    #[schemars(flatten)]
+    pub(super) shape: FormationShape,
+}
+
+/// A formation after the first: a `shape`, or the one before it, placed anew.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LegTable {
+    /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
+    /// unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "LegStart")]
+    pub(super) start_s: Option<LegStart>,
+    /// Who flies to which slot, from the slots before.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = "given"))]
+    pub(super) assignment: Assignment,
+    /// The slots are scaled by this about their centre.
+    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
+    #[schemars(extend("default" = 1.0))]
+    pub(super) scale: f64,
+    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0))]
+    pub(super) yaw_deg: f64,
+    /// Then they are moved by this in m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Point")]
+    pub(super) move_m: Option<Point>,
+    #[schemars(flatten)]
+    pub(super) shape: Option<FormationShape>,
+}
+
+/// Who flies to which slot.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Assignment {
+    /// Each vehicle to the slot of its number.
+    #[default]
+    Given,
+    /// Vehicles are interchangeable: the sum of squared ways is least, once the formation is moved as the law leaves it free, or
+    /// around a leader, who keeps its slot; and so again where the swarm is stalled. For up to 5000 vehicles, and 500 under a law
+    /// that holds distances.
+    Optimal,
+    /// Vehicles are interchangeable where the swarm is stalled; up to then each goes to the slot of its number. Under the
+    /// displacement law.
+    WhenStalled,
+}
+
+/// A formation and its size.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "shape")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) enum FormationShape {
+    /// Five slots: the corners of a house of side d, (0,0) (d,0) (d/2, sqrt3 d/2) (0, sqrt3 d) (d, sqrt3 d).
+    Pentagon {
+        /// Side d in m.
+        side_m: f64,
+    },
+    /// Equal angles on a circle in the plane z = 0.
+    #[serde(alias = "ring")]
+    Circle {
+        /// Radius in m.
+        radius_m: f64,
+    },
+    /// Along x.
+    Line {
+        /// Distance between neighbours in m.
+        spacing_m: f64,
+    },
+    /// A near-square grid in the plane z = 0, row by row.
+    Grid {
+        /// Distance between neighbours in m.
+        spacing_m: f64,
+    },
+    /// Points spread evenly over a sphere.
+    Sphere {
+        /// Radius in m.
+        radius_m: f64,
+    },
+    /// Two arms that meet at the first slot, in the plane z = 0.
+    V(VKeys),
+    /// A filled triangle in the plane z = 0: rows of 1, 2, 3, ... slots.
+    Wedge(SpacingKeys),
+    /// Circles in the plane z = 0: 1, 6, 12, 18, ... slots.
+    Rings(SpacingKeys),
+    /// A screw about the z axis.
+    Helix(HelixKeys),
+    /// A cubic grid, as near to a cube as the number allows.
+    Cube(SpacingKeys),
+    /// Letters, in the plane z = 0.
+    Text(TextKeys),
+    /// An SVG drawing, in the plane z = 0.
+    Svg(SvgKeys),
+    /// The dark or opaque part of a picture, in the plane z = 0.
+    #[serde(alias = "mask")]
+    Image(ImageKeys),
+    /// A list of slots in a file.
+    #[serde(alias = "points-file")]
+    File(FileKeys),
+    /// A list of slots.
+    Points {
+        /// Slot of each vehicle in m.
+        points_m: Vec<Point>,
+    },
+}
+
+/// The kinds of tables that name none.
+pub(super) const DEFAULT_KINDS: [(&str, &str); 2] = [("law", "edge-tension"), ("reference", "rest")];
+
+/// The control law and the safety distance.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LawTable {
+    #[schemars(flatten)]
+    pub(super) kind: LawSpec,
+    /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64")]
+    pub(super) delta_m: Option<f64>,
+}
+
+/// The bodies that carry out the commands.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct PlantTable {
+    /// What moves the vehicles.
+    pub(super) kind: PlantKind,
+}
+
+/// A plant.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum PlantKind {
+    /// Rapier rigid bodies, the command held over each step.
+    Rapier,
+    /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
+    Ideal,
+}
+
+impl Document {
+    /// Velocity coefficient a22 \[1/s\] that laws know of: 0 for other bodies than points.
+    pub(super) fn a22_per_s(&self) -> f64 {
+        if self.vehicle.is_point() { self.swarm.a22_per_s } else { 0.0 }
+    }
+}
+
+impl Default for SwarmTable {
+    fn default() -> Self {
+        Self {
+            count: None,
+            dimensions: None,
+            mass_kg: PerVehicle::All(DEFAULT_MASS_KG),
+            hull_radius_m: PerVehicle::All(DEFAULT_HULL_RADIUS_M),
+            a22_per_s: 0.0,
+        }
+    }
+}
+
+impl Default for PlantTable {
+    fn default() -> Self {
+        Self { kind: PlantKind::Rapier }
+    }
+}
+
+fn unscaled() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_unscaled(scale: &f64) -> bool {
+    *scale == 1.0
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

@@ -1,0 +1,142 @@
+//! `[graph]` of the scenario file: its keys, and the graph that they mean.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::chance;
+use super::error::ScenarioError;
+use super::limits::pair_count;
+use super::values::Edge;
+use tautline_laws::graph::{Graph, GraphError};
+
+/// Links of a vehicle of a random graph, in the mean, unless given.
+const DEFAULT_DEGREE: u64 = 4;
+
+/// Which vehicles sense each other.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GraphTable {
+    #[schemars(flatten)]
+    pub(super) kind: GraphKind,
+}
+
+/// An undirected, connected graph.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) enum GraphKind {
+    /// Every pair.
+    Complete {},
+    /// One vehicle with every other.
+    Star {
+        /// That vehicle.
+        #[serde(default = "first")]
+        #[schemars(extend("default" = 1), range(min = 1))]
+        hub: u64,
+    },
+    /// Each vehicle with the next, and the last with the first.
+    Ring {},
+    /// Each vehicle with the next.
+    Path {},
+    /// A random tree, and as many random pairs more as it takes.
+    Random {
+        /// Links of a vehicle in the mean, but at least those of a tree; 4 unless given, or as many as there are others.
+        #[schemars(range(min = 1))]
+        degree: Option<u64>,
+        /// Seed of the random numbers (`ChaCha8`, the same on every machine). Every run of a campaign has the same graph unless
+        /// its `[vary]` says `"graph.seed" = "run"`.
+        #[serde(default)]
+        #[schemars(extend("default" = 0))]
+        seed: u64,
+    },
+    /// A list of pairs.
+    Edges {
+        /// Pairs of vehicles, counted from 1.
+        edges: Vec<Edge>,
+    },
+}
+
+impl Default for GraphTable {
+    fn default() -> Self {
+        Self { kind: GraphKind::Complete {} }
+    }
+}
+
+fn first() -> u64 {
+    1
+}
+
+/// Number of edges, at most, that memory will be taken for, without making them.
+pub(super) fn edge_count(kind: &GraphKind, law_keeps_edges: bool, count: usize) -> u128 {
+    match kind {
+        GraphKind::Complete {} if !law_keeps_edges => 0,
+        GraphKind::Complete {} => pair_count(count),
+        GraphKind::Star { .. } | GraphKind::Ring {} | GraphKind::Path {} => count as u128,
+        GraphKind::Random { degree, .. } => {
+            random_edge_count(degree.unwrap_or(DEFAULT_DEGREE), count).min(pair_count(count))
+        }
+        GraphKind::Edges { edges } => edges.len() as u128,
+    }
+}
+
+/// The graph of so many vehicles.
+pub(super) fn graph(kind: &GraphKind, count: usize) -> Result<Graph, ScenarioError> {
+    match *kind {
+        GraphKind::Complete {} => Ok(Graph::complete(count)),
+        GraphKind::Star { hub } => star(hub, count),
+        GraphKind::Ring {} => Ok(Graph::ring(count)),
+        GraphKind::Path {} => Ok(Graph::path(count)),
+        GraphKind::Random { degree, seed } => drawn(degree, seed, count),
+        GraphKind::Edges { ref edges } => listed(edges, count),
+    }
+}
+
+/// That of so many links of a vehicle in the mean, rounded up.
+fn random_edge_count(degree: u64, count: usize) -> u128 {
+    (u128::from(degree) * count as u128).div_ceil(2)
+}
+
+fn index(number: u64) -> Option<usize> {
+    usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1)
+}
+
+fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
+    index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
+        ScenarioError::new(format!("there is no vehicle {hub}: they are counted from 1 to {count}"))
+            .with_help("name a vehicle of the swarm as the middle of the star")
+            .at("graph.hub")
+    })
+}
+
+fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, ScenarioError> {
+    let most = count.saturating_sub(1).max(1) as u64;
+    let degree = degree.unwrap_or(DEFAULT_DEGREE.min(most));
+    if !(1..=most).contains(&degree) {
+        let others = if most == 1 { "1 other".to_owned() } else { format!("{most} others") };
+        return Err(ScenarioError::new(format!("{degree} links of a vehicle in the mean, where each has {others}"))
+            .with_help(format!("it is from 1 to {most}; a graph has at least the links of a tree, about 2 in the mean"))
+            .at("graph.degree"));
+    }
+    let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);
+    let mut numbers = chance::random(seed);
+    Ok(Graph::random(count, edges, |end| chance::below(end as u64, &mut numbers)))
+}
+
+fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
+    let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
+        index(*a).zip(index(*b)).ok_or_else(|| {
+            ScenarioError::new(format!("edge {} names vehicle 0", entry + 1))
+                .with_help("vehicles are counted from 1")
+                .at_entry("graph.edges", entry)
+        })
+    });
+    let indices = indices.collect::<Result<Vec<_>, _>>()?;
+    Graph::from_edges(count, &indices).map_err(|error| {
+        let (GraphError::SelfLoop { edge, .. }
+        | GraphError::OutOfRange { edge, .. }
+        | GraphError::Duplicate { edge, .. }) = error;
+        ScenarioError::new(error.to_string())
+            .with_help("list each pair of different vehicles once, in either order")
+            .at_entry("graph.edges", edge)
+    })
+}

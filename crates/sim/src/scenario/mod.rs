@@ -1,0 +1,78 @@
+//! What is to be flown: the validated scenario.
+//!
+//! A [`Scenario`] is plain data, complete and checked: everything downstream may rely on what [`Scenario::validate`]
+//! promises. It is read from TOML by [`Scenario::read`], or built in code from [`Scenario::new`]. `document` holds the
+//! keys of the TOML; [`Scenario::resolved_toml`] writes the same document with nothing left to be derived. `builtin`
+//! holds the embedded scenarios.
+
+mod actuation;
+mod breathing;
+mod build;
+pub mod builtin;
+mod chance;
+mod columns;
+mod deserializer;
+mod document;
+mod drawn;
+mod error;
+mod failure;
+mod files;
+mod graph;
+mod imperfections;
+mod laws;
+mod legs;
+mod limits;
+mod network;
+mod noise;
+mod obstacles;
+mod overrides;
+mod points;
+mod reference;
+mod resolution;
+mod resolved;
+mod safety;
+mod schema;
+mod sensing;
+mod shape_of_safety;
+mod shapes;
+mod slots;
+mod source;
+mod spec;
+mod start;
+mod step;
+mod suggest;
+mod surroundings;
+mod template;
+mod text;
+mod time;
+mod time_table;
+mod unicycle;
+mod validate;
+mod values;
+mod vehicle;
+mod vehicle_table;
+mod weather;
+mod whole;
+mod wind;
+
+pub use actuation::ActuationSpec;
+pub use chance::random;
+pub use error::{Field, Place, ScenarioError};
+pub use failure::{Failure, FailureKind};
+pub use limits::{
+    BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
+    MAX_STEPS, SMALLEST,
+};
+pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
+pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
+pub use overrides::Override;
+pub use resolution::Drift;
+pub use schema::schema;
+pub use sensing::SensingSpec;
+pub use source::{MAX_FILE_BYTES, Source};
+pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
+pub use start::{offset, scatter};
+pub use template::{Draw, NamedLaw, Template};
+pub use time::TimeSpec;
+pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
+pub use whole::takes_whole_numbers_alone;

@@ -1,0 +1,185 @@
+//! `[[obstacle]]`: a solid that is in the way, in a scenario and in a file of obstacles.
+//!
+//! ```toml
+//! [[obstacle]]
+//! name = "tower"
+//! box = { size_m = [2.0, 2.0, 30.0], yaw_deg = 15.0 }
+//! at_m = [10.0, 4.0, 15.0]
+//! clearance_m = 1.5
+//!
+//! [[obstacle]]
+//! name = "truck"
+//! ball = { radius_m = 3.0 }
+//! path = [[0.0, -20.0, 0.0, 1.0], [8.0, 20.0, 0.0, 1.0]]   # t [s], x, y, z [m]
+//!
+//! [[obstacle]]
+//! name = "cable"
+//! capsule = { from_m = [0.0, 0.0, 8.0], to_m = [30.0, 0.0, 9.0], radius_m = 0.05 }
+//!
+//! [[obstacle]]
+//! name = "ground"
+//! half_space = { normal = [0.0, 0.0, 1.0] }
+//! ```
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::ScenarioError;
+use tautline_laws::space::{Obstacle, Shape};
+
+/// What an obstacle is made of, for messages.
+pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and a place \
+                                        at_m = [x, y, z] or, in a file for an audit, a path = [[t, x, y, z], ...]";
+
+/// A solid that is in the way: a name, one shape and where it is.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleTable {
+    /// What it is called.
+    pub name: String,
+    /// A ball around its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Ball")]
+    ball: Option<Ball>,
+    /// A box around its place, upright.
+    #[serde(rename = "box", default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Cuboid")]
+    cuboid: Option<Cuboid>,
+    /// Everything within a radius of a straight line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Capsule")]
+    capsule: Option<Capsule>,
+    /// Everything behind a plane through its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "HalfSpace")]
+    half_space: Option<HalfSpace>,
+    /// Its place in m; the origin for a capsule or a half-space unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_m: Option<[f64; 3]>,
+    /// Times in s and places in m of one that moves, which a scenario has none of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(skip)]
+    path: Option<Vec<[f64; 4]>>,
+    /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02
+    /// m more than the radius of the largest hull where that is more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clearance_m: Option<f64>,
+}
+
+/// A ball.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Ball {
+    /// Its radius in m.
+    radius_m: f64,
+}
+
+/// An upright box.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Cuboid {
+    /// Its lengths along x, y and z in m, before it is turned.
+    size_m: [f64; 3],
+    /// How far it is turned about the vertical in degrees, counterclockwise seen from above.
+    #[serde(default)]
+    yaw_deg: f64,
+}
+
+/// A line with a radius.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
+struct Capsule {
+    /// One end of the line, from its place, in m.
+    from_m: [f64; 3],
+    /// The other end in m.
+    to_m: [f64; 3],
+    /// The radius in m.
+    radius_m: f64,
+}
+
+/// What lies behind a plane.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct HalfSpace {
+    /// Points out of it; of any length but zero.
+    normal: [f64; 3],
+}
+
+/// What an `[[obstacle]]` table means.
+pub struct Solid {
+    /// Its shape, around its place.
+    pub shape: Shape,
+    /// Times \[s\] and places \[m\]; one entry where it stands still.
+    pub path: Vec<(f64, Vector3<f64>)>,
+    /// Distance \[m\] that the centre of a vehicle must keep from its surface, if given.
+    pub clearance_m: Option<f64>,
+}
+
+impl ObstacleTable {
+    /// What it means, or what is missing in it, in a sentence.
+    pub fn solid(self) -> Result<Solid, String> {
+        let Self { name, ball, cuboid, capsule, half_space, at_m, path, clearance_m } = self;
+        let in_space = capsule.is_some() || half_space.is_some();
+        let shapes = [
+            ball.map(|ball| Shape::Ball { radius_m: ball.radius_m }),
+            cuboid.map(|cuboid| Shape::Box { half_m: Vector3::from(cuboid.size_m) * 0.5, yaw_deg: cuboid.yaw_deg }),
+            capsule.map(|capsule| Shape::Capsule {
+                from_m: capsule.from_m.into(),
+                to_m: capsule.to_m.into(),
+                radius_m: capsule.radius_m,
+            }),
+            half_space.map(|half_space| Shape::HalfSpace { normal: half_space.normal.into() }),
+        ];
+        let mut shapes = shapes.into_iter().flatten();
+        let (Some(shape), None) = (shapes.next(), shapes.next()) else {
+            return Err(format!("obstacle `{name}` needs one shape and no more"));
+        };
+        let path = match (at_m, path) {
+            (Some(at_m), None) => vec![(0.0, at_m.into())],
+            (None, Some(path)) => path.into_iter().map(|[t, x, y, z]| (t, Vector3::new(x, y, z))).collect(),
+            (None, None) if in_space => vec![(0.0, Vector3::zeros())],
+            (None, None) => return Err(format!("obstacle `{name}` has no place")),
+            (Some(_), Some(_)) => return Err(format!("obstacle `{name}` has a place and a path")),
+        };
+        Ok(Solid { shape, path, clearance_m })
+    }
+
+    /// The obstacle at rest that it means, with a clearance \[m\] where it has none.
+    pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
+        let wrong = |said: String| ScenarioError::new(said).at_entry("obstacle", number);
+        let Solid { shape, path, clearance_m: own_m } =
+            self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
+        let [(_, place_m)] = path[..] else {
+            return Err(wrong(format!("obstacle `{}` moves", self.name)).with_help(
+                "the obstacles of a flight stand: give at_m = [x, y, z]; `tautline audit --obstacles` judges ones that move",
+            ));
+        };
+        Ok(Obstacle { name: self.name.clone(), place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
+    }
+}
+
+impl From<&Obstacle> for ObstacleTable {
+    fn from(obstacle: &Obstacle) -> Self {
+        let mut table = Self {
+            name: obstacle.name.clone(),
+            ball: None,
+            cuboid: None,
+            capsule: None,
+            half_space: None,
+            at_m: Some(obstacle.place_m.into()),
+            path: None,
+            clearance_m: Some(obstacle.clearance_m),
+        };
+        match obstacle.shape {
+            Shape::Ball { radius_m } => table.ball = Some(Ball { radius_m }),
+            Shape::Box { half_m, yaw_deg } => table.cuboid = Some(Cuboid { size_m: (half_m * 2.0).into(), yaw_deg }),
+            Shape::Capsule { from_m, to_m, radius_m } => {
+                table.capsule = Some(Capsule { from_m: from_m.into(), to_m: to_m.into(), radius_m });
+            }
+            Shape::HalfSpace { normal } => table.half_space = Some(HalfSpace { normal: normal.into() }),
+        }
+        table
+    }
+}

@@ -1,0 +1,350 @@
+//! `[reference]` of the scenario file: its keys, and the motion that they mean.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::ScenarioError;
+use super::limits::{SMALLEST, at_least_zero, positive, require_finite};
+use super::values::{All, Point, Vehicles};
+use tautline_laws::graph::Pinning;
+use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
+
+/// Largest speed of a way from rest to rest over its mean.
+const PEAK_OVER_MEAN: f64 = 15.0 / 8.0;
+
+/// A step from point to point is a jump where it is this many times as fast as the ones before and after it.
+const JUMP: f64 = 10.0;
+
+/// A motion that the formations are carried along with, and who knows it.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReferenceTable {
+    /// Who knows where the reference is: `"all"`, or a list of vehicles; all unless this or `leader` is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Vehicles")]
+    pub(super) known_by: Option<Vehicles>,
+    /// A vehicle that flies the reference and listens to nobody: the others follow it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) leader: Option<u64>,
+    /// Whether all vehicles are told how the reference accelerates.
+    #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
+    #[schemars(extend("default" = true))]
+    pub(super) feed_forward: bool,
+    #[schemars(flatten)]
+    pub(super) kind: ReferenceKind,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// A motion.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) enum ReferenceKind {
+    /// Always in one place: slots are where they are given, moved there.
+    Rest {
+        /// The place in m; the origin unless given.
+        #[serde(default = "origin")]
+        position_m: Point,
+    },
+    /// Straight on at one speed.
+    Velocity {
+        /// Place at time 0 in m; the origin unless given.
+        #[serde(default = "origin")]
+        position_m: Point,
+        /// Velocity in m/s.
+        velocity_m_s: Point,
+    },
+    /// Around a circle at constant z, counterclockwise seen from above, from the point of largest x.
+    Circle {
+        /// Its middle in m; the origin unless given.
+        #[serde(default = "origin")]
+        centre_m: Point,
+        /// Radius in m.
+        radius_m: f64,
+        /// Time of one turn in s; below zero clockwise.
+        period_s: f64,
+    },
+    /// From rest to rest between points along straight lines.
+    #[serde(alias = "waypoints")]
+    WayPoints {
+        /// The points in m.
+        points_m: Vec<Point>,
+        /// When it is at each of them in s. Without it each way begins when the one before ends, the first at time 0, and
+        /// takes as long as `speed_m_s` asks.
+        times_s: Option<Vec<f64>>,
+        /// Largest speed on a way in m/s, in the place of `times_s`.
+        speed_m_s: Option<f64>,
+    },
+    /// Through points without a stop: a natural cubic spline in time, from time 0 or before to the end of the flight.
+    Spline {
+        /// The points in m.
+        points_m: Vec<Point>,
+        /// When it is at each of them in s.
+        times_s: Vec<f64>,
+    },
+    /// The same through the points of a file.
+    File {
+        /// A text file with a line for each point: t in s, x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
+        /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
+        file: PathBuf,
+    },
+}
+
+fn origin() -> Point {
+    Point::Space([0.0; 3])
+}
+
+impl ReferenceTable {
+    /// The motion and who knows it, in a flight of so many vehicles that lasts so long.
+    pub(super) fn guidance(&self, count: usize, duration_s: f64) -> Result<Guidance, ScenarioError> {
+        Ok(Guidance {
+            motion: self.kind.motion(duration_s)?,
+            known_by: self.pinning(count)?,
+            feed_forward: self.feed_forward,
+        })
+    }
+
+    /// Puts the points of its file, named relative to a folder, in the place of the file.
+    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        if let ReferenceKind::File { file } = &self.kind {
+            self.kind = ReferenceKind::of_file(&folder.join(file))?;
+        }
+        Ok(())
+    }
+
+    /// Whether it stays in the plane z = 0.
+    pub(super) fn is_flat(&self) -> bool {
+        let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
+        match &self.kind {
+            ReferenceKind::Rest { position_m } => flat(&[*position_m]),
+            ReferenceKind::Velocity { position_m, velocity_m_s } => flat(&[*position_m, *velocity_m_s]),
+            ReferenceKind::Circle { centre_m, .. } => flat(&[*centre_m]),
+            ReferenceKind::WayPoints { points_m, .. } | ReferenceKind::Spline { points_m, .. } => flat(points_m),
+            ReferenceKind::File { .. } => true,
+        }
+    }
+
+    fn pinning(&self, count: usize) -> Result<Pinning, ScenarioError> {
+        let index = |number: u64, key: &'static str| {
+            let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+            index.filter(|&index| index < count).ok_or_else(|| {
+                ScenarioError::new(format!("there is no vehicle {number}: they are counted from 1 to {count}"))
+                    .with_help("name a vehicle of the swarm")
+                    .at(key)
+            })
+        };
+        match (&self.known_by, self.leader) {
+            (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
+                .with_help("a leader knows the reference alone: keep one of them")
+                .at("reference.leader")
+                .at("reference.known_by")),
+            (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
+            (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
+            (Some(Vehicles::Listed(listed)), None) => {
+                let listed = listed.iter().map(|&number| index(number, "reference.known_by"));
+                let mut listed = listed.collect::<Result<Vec<_>, _>>()?;
+                listed.sort_unstable();
+                listed.dedup();
+                if listed.is_empty() {
+                    return Err(ScenarioError::new("no vehicle knows the reference")
+                        .with_help("list at least one, or leave out `known_by`: then all know it")
+                        .at("reference.known_by"));
+                }
+                Ok(if listed.len() == count { Pinning::All } else { Pinning::Listed(listed) })
+            }
+        }
+    }
+}
+
+impl ReferenceKind {
+    fn of_file(file: &Path) -> Result<Self, ScenarioError> {
+        let (times_s, points_m) = super::points::places(file)?;
+        Ok(Self::Spline { points_m, times_s })
+    }
+
+    fn motion(&self, duration_s: f64) -> Result<ReferenceMotion, ScenarioError> {
+        Ok(match self {
+            &Self::Rest { position_m } => {
+                ReferenceMotion::Rest { position_m: place("reference.position_m", position_m)? }
+            }
+            &Self::Velocity { position_m, velocity_m_s } => ReferenceMotion::Velocity {
+                from_m: place("reference.position_m", position_m)?,
+                velocity_m_s: place("reference.velocity_m_s", velocity_m_s)?,
+            },
+            &Self::Circle { centre_m, radius_m, period_s } => {
+                require_finite("the time of a turn", period_s).map_err(|error| error.at("reference.period_s"))?;
+                if period_s.abs() < SMALLEST {
+                    return Err(ScenarioError::new(format!("one turn in {period_s} s is too fast to compute with"))
+                        .with_help(format!("a turn takes at least {SMALLEST:e} s; below zero it is clockwise"))
+                        .at("reference.period_s"));
+                }
+                ReferenceMotion::Circle {
+                    centre_m: place("reference.centre_m", centre_m)?,
+                    radius_m: positive("reference.radius_m", "the radius", radius_m)?,
+                    period_s,
+                }
+            }
+            Self::WayPoints { points_m, times_s, speed_m_s } => {
+                let mut points_m = places(points_m)?;
+                if times_s.is_none() {
+                    // Two points in one place are one.
+                    points_m.dedup();
+                }
+                let times_s = match (times_s, speed_m_s) {
+                    (Some(times_s), None) => times_s.clone(),
+                    (None, Some(speed_m_s)) => {
+                        timed(&points_m, positive("reference.speed_m_s", "the speed", *speed_m_s)?)
+                    }
+                    _ => {
+                        return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
+                            .with_help("give the time at each point, or the largest speed between them")
+                            .at("reference.times_s")
+                            .at("reference.speed_m_s")
+                            .at("reference.points_m"));
+                    }
+                };
+                ReferenceMotion::WayPoints { points: in_time(&points_m, &times_s)? }
+            }
+            Self::Spline { points_m, times_s } => {
+                let points = in_time(&places(points_m)?, times_s)?;
+                check_span(&points, duration_s)?;
+                check_steady(&points)?;
+                let spline = Spline::through(&points)
+                    .ok_or_else(|| ScenarioError::new("no curve goes through the points").at("reference.points_m"))?;
+                ReferenceMotion::Table(spline)
+            }
+            Self::File { file } => Self::of_file(file)?.motion(duration_s)?,
+        })
+    }
+}
+
+fn place(key: &'static str, point: Point) -> Result<Vector3<f64>, ScenarioError> {
+    for (axis, x) in ["x", "y", "z"].into_iter().zip(point.coordinates()) {
+        require_finite(format_args!("{axis} of the reference"), x).map_err(|error| error.at(key))?;
+    }
+    Ok(point.coordinates().into())
+}
+
+fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
+    if points_m.is_empty() {
+        return Err(ScenarioError::new("the reference has no points")
+            .with_help("give points_m = [[x, y], ...]")
+            .at("reference.points_m"));
+    }
+    points_m.iter().map(|&point| place("reference.points_m", point)).collect()
+}
+
+/// When each point is reached at this largest speed \[s\]: each at another place than the one before.
+fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
+    let mut time_s = 0.0;
+    let ways = points_m.windows(2).map(|way| PEAK_OVER_MEAN * (way[1] - way[0]).norm() / speed_m_s);
+    std::iter::once(0.0)
+        .chain(ways.map(|length_s| {
+            time_s += length_s;
+            time_s
+        }))
+        .collect()
+}
+
+/// Points with their times, which grow.
+fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vector3<f64>)>, ScenarioError> {
+    if points_m.len() != times_s.len() {
+        return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
+            .with_help("give a time for each point")
+            .at("reference.times_s")
+            .at("reference.points_m"));
+    }
+    for (k, &time_s) in times_s.iter().enumerate() {
+        require_finite(format_args!("time {} of the reference", k + 1), time_s)
+            .map_err(|error| error.at_entry("reference.times_s", k))?;
+        if k > 0 && time_s <= times_s[k - 1] {
+            let (before_s, moves) = (times_s[k - 1], points_m[k] != points_m[k - 1]);
+            let said = if time_s == before_s && moves {
+                format!("the reference jumps at {time_s} s: it is in two places, points {k} and {}", k + 1)
+            } else {
+                format!("time {} of the reference is {time_s} s, not after {before_s} s", k + 1)
+            };
+            return Err(ScenarioError::new(said)
+                .with_help("times must grow from point to point; a formation jumps by a [[leg]]")
+                .at_entry("reference.times_s", k));
+        }
+    }
+    Ok(times_s.iter().copied().zip(points_m.iter().copied()).collect())
+}
+
+/// Refuses a curve that does not cover the flight.
+fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), ScenarioError> {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(()) };
+    at_least_zero("time.duration_s", "the duration", duration_s)?;
+    if first.0 > 0.0 || last.0 < duration_s {
+        return Err(ScenarioError::new(format!(
+            "the reference is given from {} to {} s, and the flight lasts from 0 to {duration_s} s",
+            first.0, last.0
+        ))
+        .with_help("give points from time 0 to the end of the flight, or shorten time.duration_s")
+        .at("reference.times_s")
+        .at("time.duration_s"));
+    }
+    Ok(())
+}
+
+/// Refuses a step between points that is far faster than its neighbours: a jump that a curve would swing around.
+fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
+    let speeds_m_s: Vec<f64> =
+        points.windows(2).map(|way| (way[1].1 - way[0].1).norm() / (way[1].0 - way[0].0)).collect();
+    let is_jump = |k: &usize| {
+        let before = k.checked_sub(1).map(|before| speeds_m_s[before]);
+        let around = before.into_iter().chain(speeds_m_s.get(k + 1).copied()).reduce(f64::max);
+        around.is_some_and(|around| speeds_m_s[*k] > JUMP * around)
+    };
+    let Some(k) = (0..speeds_m_s.len()).find(is_jump) else { return Ok(()) };
+    Err(ScenarioError::new(format!(
+        "the reference jumps between {} and {} s: it moves at {:.3e} m/s there, more than {JUMP} times as fast as before and after",
+        points[k].0,
+        points[k + 1].0,
+        speeds_m_s[k]
+    ))
+    .with_help("give points in between, or a motion of the kind \"way-points\", which begins and ends each way at rest")
+    .at_entry("reference.points_m", k + 1))
+}
+
+impl From<&Guidance> for ReferenceTable {
+    fn from(guidance: &Guidance) -> Self {
+        let point = |v: Vector3<f64>| Point::Space([v.x, v.y, v.z]);
+        let split = |points: &mut dyn Iterator<Item = (f64, Vector3<f64>)>| -> (Vec<f64>, Vec<Point>) {
+            points.map(|(time_s, place_m)| (time_s, point(place_m))).unzip()
+        };
+        let kind = match &guidance.motion {
+            &ReferenceMotion::Rest { position_m } => ReferenceKind::Rest { position_m: point(position_m) },
+            &ReferenceMotion::Velocity { from_m, velocity_m_s } => {
+                ReferenceKind::Velocity { position_m: point(from_m), velocity_m_s: point(velocity_m_s) }
+            }
+            &ReferenceMotion::Circle { centre_m, radius_m, period_s } => {
+                ReferenceKind::Circle { centre_m: point(centre_m), radius_m, period_s }
+            }
+            ReferenceMotion::WayPoints { points } => {
+                let (times_s, points_m) = split(&mut points.iter().copied());
+                ReferenceKind::WayPoints { points_m, times_s: Some(times_s), speed_m_s: None }
+            }
+            ReferenceMotion::Table(spline) => {
+                let (times_s, points_m) = split(&mut spline.points());
+                ReferenceKind::Spline { points_m, times_s }
+            }
+        };
+        let (known_by, leader) = match &guidance.known_by {
+            Pinning::Nobody => (Some(Vehicles::Listed(Vec::new())), None),
+            Pinning::All => (None, None),
+            Pinning::Listed(listed) => {
+                (Some(Vehicles::Listed(listed.iter().map(|&vehicle| vehicle as u64 + 1).collect())), None)
+            }
+            &Pinning::Leader(leader) => (None, Some(leader as u64 + 1)),
+        };
+        Self { known_by, leader, feed_forward: guidance.feed_forward, kind }
+    }
+}

@@ -1,0 +1,152 @@
+//! Whether the numbers that a plant computes in tell positions apart.
+//!
+//! A plant counts positions from the middle of the start. Whatever moves the swarm as a whole (its mean velocity, which no
+//! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
+
+use super::actuation::ActuationSpec;
+use super::failure::Failure;
+use super::spec::{PlantSpec, Scenario};
+use tautline_core::swarm::{Rows, mean_row, row};
+use tautline_laws::law::{Certificate, Law, Void};
+use tautline_laws::target::BreathingMode;
+
+/// How far the swarm as a whole is carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// Speed of its mean at the end \[m/s\].
+    pub speed_m_s: f64,
+    /// Distance of its mean from the start at the end \[m\].
+    pub distance_m: f64,
+    /// Distance between neighbouring numbers there \[m\], for the vehicle farthest out.
+    pub spacing_m: f64,
+}
+
+impl PlantSpec {
+    /// Whether the plant holds a command over a step; continuous time chooses its own steps.
+    #[must_use]
+    pub fn holds_commands(self) -> bool {
+        matches!(self, Self::Rapier)
+    }
+}
+
+impl Scenario {
+    /// What the mean velocity, and with it a rounding error of [`f64::EPSILON`] m/s, comes to by the end of the flight
+    /// where it grows at this rate \[1/s\] and the wind adds to it, and how far the reference goes.
+    #[must_use]
+    pub fn drift(&self, rate_per_s: f64) -> Drift {
+        let (epsilon, duration_s) = (f64::EPSILON, self.time.duration_s);
+        let seed_m_s = self.start.mean_velocity_m_s().norm() + epsilon;
+        let carried_m = self.carried_m(duration_s);
+        let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
+        let is_held = self.reference.is_some();
+        let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
+        let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
+        // The largest number stands for what none counts, be it infinite or nothing times infinity: `min` takes what is a number.
+        let counted = |value: f64| value.min(f64::MAX);
+        let distance_m = counted(carried_m + seed_m_s * gained_s(rate_per_s) + blown_m_s * duration_s);
+        let speed_m_s = counted(seed_m_s * (rate_per_s * duration_s).exp() + blown_m_s);
+        Drift { speed_m_s, distance_m, spacing_m: epsilon * (self.extent_m() + distance_m) }
+    }
+
+    /// How far from the middle of the start a reference carries the middle of a formation \[m\].
+    fn carried_m(&self, duration_s: f64) -> f64 {
+        let Some(guidance) = &self.reference else { return 0.0 };
+        let begins_m = guidance.motion.at(0.0).position_m - mean_row(&self.start.positions_m);
+        let away_m = self.legs.iter().map(|leg| (mean_row(&leg.formation.slots_m) + begins_m).norm());
+        away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
+    }
+
+    /// What a law promises from the start of this scenario on through all of its legs, as far as the scenario itself lets it: with
+    /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
+    #[must_use]
+    pub fn certificate(&self, law: &dyn Law) -> Certificate {
+        let ignored = !self.obstacles.is_empty() && !law.keeps_clear_of_obstacles();
+        let is_uncounted = !self.wind.is_still() && !law.reckons_with_wind();
+        self.as_far_as_told(self.promised(law))
+            .void_where(ignored, Void::ObstaclesUnknown)
+            .void_where(is_uncounted, Void::Windblown)
+    }
+
+    /// Of every leg, with the breath that it begins with where it does.
+    fn promised(&self, law: &dyn Law) -> Certificate {
+        let start = self.observation(&self.start);
+        if self.breathing.mode != BreathingMode::Start || law.settling().is_none() {
+            let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
+            return law.certificate_through(&start, &ahead);
+        }
+        let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
+        let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
+        let mut promised = law.certificate_through(&start, &ahead);
+        // What holds on a leg is what holds once its slots have come together.
+        promised.legs = promised.legs.into_iter().skip(2).step_by(2).collect();
+        if self.legs.len() < 2 {
+            promised.legs.clear();
+        }
+        promised
+    }
+
+    /// A promise as far as this scenario lets it hold: not with commands that are held, nor where numbers do not tell it from
+    /// delta.
+    #[must_use]
+    pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
+        let promised =
+            self.imperfections().into_iter().fold(promised, |promised, (is, void)| promised.void_where(is, void));
+        let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
+        promised.void_where(unresolved, Void::Unresolved)
+    }
+
+    /// What voids any promise, and whether it is there.
+    fn imperfections(&self) -> [(bool, Void); 9] {
+        let Self { sensing, network, actuation, .. } = self;
+        let is_late = sensing.latency_s > 0.0 || sensing.near_s() > 0.0 || sensing.rate_hz.is_some();
+        let is_silent = self.failures.iter().any(Failure::is_silent);
+        [
+            (self.time.control_hz.is_some(), Void::CommandsHeld),
+            (is_late, Void::KnownLate),
+            (sensing.is_noisy(), Void::KnownWrongly),
+            (network.latency_s > 0.0 || network.rate_hz.is_some(), Void::HeardLate),
+            (network.loses() || is_silent, Void::MessagesLost),
+            (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
+            (actuation.lag_s > 0.0, Void::AccelerationLate),
+            (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
+            (!self.airframe.is_point(), Void::NotAPoint),
+        ]
+    }
+
+    /// Whether vehicles know the true present state, and are accelerated as they are commanded.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.sensing.is_exact()
+            && self.network.is_exact()
+            && self.actuation == ActuationSpec::default()
+            && self.failures.is_empty()
+    }
+
+    /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
+    fn is_unresolved(&self, distance_m: f64) -> bool {
+        distance_m - self.delta_m <= self.resolution_m()
+    }
+
+    /// Distance between neighbouring numbers where the swarm is meant to be \[m\].
+    fn resolution_m(&self) -> f64 {
+        f64::EPSILON * (self.extent_m() + self.carried_m(self.time.duration_s))
+    }
+
+    /// A distance from delta that is told for certain \[m\].
+    pub(super) fn told_apart_m(&self) -> f64 {
+        2.0 * self.resolution_m()
+    }
+
+    /// Largest distance of a start or a slot from the middle of its swarm \[m\].
+    fn extent_m(&self) -> f64 {
+        let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
+        slots_m.fold(extent_m(&self.start.positions_m), f64::max)
+    }
+}
+
+/// Largest distance of a row from the mean of all rows \[m\].
+fn extent_m(rows: &Rows) -> f64 {
+    let mean = mean_row(rows);
+    (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)
+}

@@ -1,0 +1,199 @@
+//! A scenario as a document with nothing left to be derived: every default written out, every shape as points, random
+//! numbers drawn.
+
+use std::fmt::{self, Write as _};
+
+use sha2::{Digest, Sha256};
+use toml::{Table, Value};
+
+use super::document::{
+    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, PlantKind, PlantTable, StartTable,
+    SwarmTable,
+};
+use super::graph::{GraphKind, GraphTable};
+use super::laws::Laws;
+use super::noise::NoiseTable;
+use super::obstacles::ObstacleTable;
+use super::reference::ReferenceTable;
+use super::safety::SafetyTable;
+use super::spec::{PlantSpec, Scenario, Space};
+use super::values::{Edge, LegStart, PerVehicle, Point};
+use super::vehicle_table::VehicleTable;
+use super::wind::WindTable;
+use tautline_core::swarm::Rows;
+use tautline_laws::target::{Begins, Leg};
+
+impl Scenario {
+    /// The scenario as TOML with every default written out; reading it gives an equal scenario, bit for bit.
+    ///
+    /// Start and formations are lists of points, so the text depends on no random number, no shape and no version of
+    /// either. Equal scenarios have equal texts.
+    #[must_use]
+    pub fn resolved_toml(&self) -> String {
+        // Every key of the document has a form in TOML.
+        let tables = Table::try_from(Document::from(self)).unwrap_or_default();
+        let mut out = String::new();
+        // Writing to a string cannot fail.
+        let _ = write_document(&mut out, &tables);
+        out
+    }
+
+    /// SHA-256 of [`Scenario::resolved_toml`] in hexadecimal: what was flown, in 64 characters.
+    #[must_use]
+    pub fn sha256_hex(&self) -> String {
+        Sha256::digest(self.resolved_toml()).iter().fold(String::with_capacity(64), |mut hex, byte| {
+            let _ = write!(hex, "{byte:02x}");
+            hex
+        })
+    }
+
+    fn leg_table(&self, leg: &Leg) -> LegTable {
+        LegTable {
+            start_s: match leg.begins {
+                Begins::At(start_s) => Some(LegStart::At(start_s)),
+                Begins::Reached => None,
+            },
+            assignment: assignment(leg),
+            scale: 1.0,
+            yaw_deg: 0.0,
+            move_m: None,
+            shape: Some(FormationShape::Points { points_m: self.points(&leg.formation.slots_m) }),
+        }
+    }
+
+    fn points(&self, rows: &Rows) -> Vec<Point> {
+        rows.row_iter()
+            .map(|row| match self.space {
+                Space::Plane => Point::Plane([row[0], row[1]]),
+                Space::Volume => Point::Space([row[0], row[1], row[2]]),
+            })
+            .collect()
+    }
+}
+
+impl From<&Scenario> for Document {
+    fn from(scenario: &Scenario) -> Self {
+        let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
+        let kind = match scenario.plant {
+            PlantSpec::Rapier => PlantKind::Rapier,
+            PlantSpec::Ideal => PlantKind::Ideal,
+        };
+        Self {
+            name: Some(scenario.name.clone()),
+            swarm: SwarmTable {
+                count: Some(scenario.count() as u64),
+                dimensions: Some(scenario.space.dimensions() as u64),
+                mass_kg: per_vehicle(&scenario.mass_kg),
+                hull_radius_m: per_vehicle(&scenario.hull_radius_m),
+                a22_per_s: scenario.a22_per_s,
+            },
+            vehicle: VehicleTable::from(scenario),
+            wind: WindTable::of(&scenario.wind),
+            safety: SafetyTable::of(scenario),
+            start: StartTable {
+                positions_m: Some(scenario.points(&scenario.start.positions_m)),
+                velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
+                jitter_m: 0.0,
+                seed: 0,
+                shuffle: false,
+                shape: None,
+            },
+            formation: FormationTable {
+                assignment: scenario.legs.first().map_or(Assignment::Given, assignment),
+                scale: 1.0,
+                yaw_deg: 0.0,
+                move_m: None,
+                shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
+            },
+            leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
+            obstacle: scenario.obstacles.iter().map(ObstacleTable::from).collect(),
+            reference: scenario.reference.as_ref().map(ReferenceTable::from),
+            law: LawTable { kind: law, delta_m: Some(scenario.delta_m) },
+            laws: Laws::new(),
+            graph: GraphTable {
+                kind: if scenario.graph.is_complete() {
+                    GraphKind::Complete {}
+                } else {
+                    let edges = scenario.graph.edges().map(|(i, j)| Edge([i as u64 + 1, j as u64 + 1])).collect();
+                    GraphKind::Edges { edges }
+                },
+            },
+            plant: PlantTable { kind },
+            time: scenario.time.into(),
+            arrival: scenario.arrival,
+            breathing: scenario.breathing,
+            sensing: scenario.sensing,
+            network: scenario.network.clone(),
+            actuation: scenario.actuation.into(),
+            failure: scenario.failures.clone(),
+            noise: NoiseTable { seed: scenario.noise_seed },
+        }
+    }
+}
+
+/// Slots are in the order in which vehicles were assigned to them.
+fn assignment(leg: &Leg) -> Assignment {
+    if leg.interchangeable { Assignment::WhenStalled } else { Assignment::Given }
+}
+
+/// One number if all are the same, otherwise the list.
+fn per_vehicle(numbers: &[f64]) -> PerVehicle {
+    match numbers {
+        [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => PerVehicle::All(*first),
+        _ => PerVehicle::Each(numbers.to_vec()),
+    }
+}
+
+fn write_document(out: &mut String, document: &Table) -> fmt::Result {
+    for (key, value) in document {
+        match value {
+            Value::Table(table) => {
+                writeln!(out, "\n[{key}]")?;
+                write_keys(out, table)?;
+            }
+            Value::Array(tables) => {
+                for table in tables.iter().filter_map(Value::as_table) {
+                    writeln!(out, "\n[[{key}]]")?;
+                    write_keys(out, table)?;
+                }
+            }
+            _ => writeln!(out, "{key} = {value}")?,
+        }
+    }
+    Ok(())
+}
+
+/// Writes the keys of a table, those of a choice after it.
+fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
+    for (key, value) in table {
+        match value {
+            Value::Table(choice) if choice.values().all(Value::is_table) => {
+                for (name, keys) in choice {
+                    writeln!(out, "{key} = \"{name}\"")?;
+                    write_keys(out, keys.as_table().unwrap_or(&Table::new()))?;
+                }
+            }
+            Value::Array(rows) if rows.iter().all(Value::is_array) => {
+                writeln!(out, "{key} = [")?;
+                rows.iter().try_for_each(|row| writeln!(out, "    {},", inline(row)))?;
+                writeln!(out, "]")?;
+            }
+            _ => writeln!(out, "{key} = {}", inline(value))?,
+        }
+    }
+    Ok(())
+}
+
+/// A value in one line; a number as the shortest decimal that reads back to the same bits.
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        Value::Table(keys) => {
+            let keys: Vec<_> = keys.iter().map(|(key, value)| format!("{key} = {}", inline(value))).collect();
+            format!("{{ {} }}", keys.join(", "))
+        }
+        Value::Float(x) if x.is_nan() => "nan".to_owned(),
+        Value::Float(x) => format!("{x:?}"),
+        _ => value.to_string(),
+    }
+}

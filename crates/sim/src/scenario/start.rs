@@ -1,0 +1,114 @@
+//! Start positions from a shape and from random numbers.
+
+use nalgebra::Vector3;
+use rand_chacha::ChaCha8Rng;
+
+use super::chance::{below, unit};
+use super::document::StartShape;
+use super::error::ScenarioError;
+use super::limits::positive;
+use super::spec::Space;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_laws::formation::Formation;
+use tautline_laws::space::Spaced;
+
+/// Smallest distance of random positions unless given, as a multiple of delta.
+const DEFAULT_SEPARATION: f64 = 1.5;
+
+/// Random positions tried for one vehicle before the square or cube is called full.
+const TRIES: u32 = 1000;
+
+/// Positions \[m\] of a shape.
+pub(super) fn positions(
+    shape: &StartShape,
+    count: usize,
+    space: Space,
+    delta_m: f64,
+    random: &mut ChaCha8Rng,
+) -> Result<Rows, ScenarioError> {
+    let radius = |radius_m| positive("start.radius_m", "the radius", radius_m);
+    let spacing = |spacing_m| positive("start.spacing_m", "the spacing", spacing_m);
+    let formation = match *shape {
+        StartShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
+        StartShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
+        StartShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
+        StartShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
+        StartShape::Random { half_extent_m, min_separation_m } => {
+            let half_extent_m = positive("start.half_extent_m", "the half extent", half_extent_m)?;
+            let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
+            let min_separation_m = positive("start.min_separation_m", "the smallest separation", min_separation_m)?;
+            if min_separation_m <= delta_m {
+                return Err(ScenarioError::new(format!(
+                    "a smallest separation of {min_separation_m} m is not more than delta = {delta_m} m"
+                ))
+                .with_help("enlarge start.min_separation_m or reduce law.delta_m")
+                .at("start.min_separation_m")
+                .at("law.delta_m"));
+            }
+            return scatter(count, space, half_extent_m, min_separation_m, random);
+        }
+    };
+    Ok(formation.slots_m)
+}
+
+/// Adds a uniform offset of at most `jitter_m` along each axis, along z only in space.
+pub(super) fn jitter(
+    positions_m: &mut Rows,
+    jitter_m: f64,
+    space: Space,
+    random: &mut ChaCha8Rng,
+) -> Result<(), ScenarioError> {
+    if jitter_m == 0.0 {
+        return Ok(());
+    }
+    let jitter_m = positive("start.jitter_m", "the jitter", jitter_m)?;
+    for i in 0..positions_m.nrows() {
+        let moved = row(positions_m, i) + offset(jitter_m, space, random);
+        set_row(positions_m, i, moved);
+    }
+    Ok(())
+}
+
+/// Puts the vehicles into a random order, every one as likely as any other, each with its position and velocity.
+pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
+    for last in (1..swarm.count()).rev() {
+        let other = below(last as u64 + 1, random);
+        swarm.positions_m.swap_rows(last, other);
+        swarm.velocities_m_s.swap_rows(last, other);
+    }
+}
+
+/// Uniform positions, one after the other, each tried again until it keeps its distance from those before it.
+pub fn scatter(
+    count: usize,
+    space: Space,
+    half_extent_m: f64,
+    min_separation_m: f64,
+    random: &mut ChaCha8Rng,
+) -> Result<Rows, ScenarioError> {
+    let mut placed = Spaced::new(min_separation_m);
+    let mut positions_m = Rows::zeros(count);
+    for i in 0..count {
+        let free = (0..TRIES).map(|_| offset(half_extent_m, space, random)).find(|&p| placed.insert(p).is_ok());
+        let Some(position) = free else {
+            return Err(ScenarioError::new(format!(
+                "there is no room for vehicle {} of {count}: {TRIES} random positions were all within \
+                 {min_separation_m} m of another",
+                i + 1
+            ))
+            .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
+            .at("start.half_extent_m")
+            .at("start.min_separation_m")
+            .at("swarm.count"));
+        };
+        set_row(&mut positions_m, i, position);
+    }
+    Ok(positions_m)
+}
+
+/// Uniform in the square or cube of half side `half_extent_m` around the origin.
+pub fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) -> Vector3<f64> {
+    let mut along = || half_extent_m * (2.0 * unit(random) - 1.0);
+    let (x, y) = (along(), along());
+    Vector3::new(x, y, if space == Space::Volume { along() } else { 0.0 })
+}

@@ -1,0 +1,158 @@
+//! A scenario file as the pattern of many flights: under other laws, from other starts.
+
+use std::path::PathBuf;
+
+use super::document::{Document, StartShape, StartTable};
+use super::error::ScenarioError;
+use super::laws::{kind, law_overrides};
+use super::overrides::Override;
+use super::source::{Source, decoded, finish};
+use super::spec::Scenario;
+use super::suggest::suggest;
+use super::text::Text;
+use tautline_laws::law::LawSpec;
+
+/// A scenario file that has been read and found right, to be flown many times: [`Template::scenario`] makes each flight from
+/// the file anew, so that whatever depends on the law or the start (an assignment, the step) is that of a file which
+/// says so itself.
+#[derive(Clone, Debug)]
+pub struct Template {
+    name: String,
+    toml: String,
+    folder: PathBuf,
+    overrides: Vec<Override>,
+    own: Scenario,
+    start_is_random: bool,
+    laws: Vec<(String, LawSpec)>,
+}
+
+/// A law to be flown, under the name that it has in a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedLaw {
+    /// That of its kind, or of its table `[laws.NAME]`.
+    pub name: String,
+    /// The law and its keys, with nothing left to be derived.
+    pub law: LawSpec,
+}
+
+impl NamedLaw {
+    /// The name of its kind.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        kind(&self.law)
+    }
+
+    /// The overrides that fly it, one for its kind and one for each key.
+    #[must_use]
+    pub fn overrides(&self) -> Vec<String> {
+        law_overrides(&self.law)
+    }
+}
+
+/// What is drawn for one flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Draw {
+    /// In the place of `start.seed`, and where the flight is random, of `noise.seed`.
+    pub seed: u64,
+    /// In the place of `start.jitter_m` \[m\], where given.
+    pub jitter_m: Option<f64>,
+}
+
+impl Template {
+    /// Reads a scenario and the laws that it names.
+    ///
+    /// # Errors
+    /// As [`Scenario::read`].
+    pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
+        let (name, toml) = source.text()?;
+        let text = Text { name: &name, toml: &toml, overrides };
+        let document = decoded(&text, source.folder())?;
+        let a22_per_s = document.velocity_coefficient_per_s();
+        let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
+        let laws = named.collect();
+        let start_is_random = is_random(&document);
+        let own = finish(document, &text)?;
+        let folder = source.folder().to_owned();
+        Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), folder, name, toml })
+    }
+
+    /// The scenario as the file has it.
+    #[must_use]
+    pub fn own(&self) -> &Scenario {
+        &self.own
+    }
+
+    /// Whether another seed gives another start.
+    #[must_use]
+    pub fn start_is_random(&self) -> bool {
+        self.start_is_random
+    }
+
+    /// Whether another seed of noise gives another flight.
+    #[must_use]
+    pub fn flight_is_random(&self) -> bool {
+        self.own.is_random_in_flight()
+    }
+
+    /// The file's own law.
+    #[must_use]
+    pub fn own_law(&self) -> NamedLaw {
+        NamedLaw { name: kind(&self.own.law), law: self.own.law.clone() }
+    }
+
+    /// Names of all laws that can be flown: those of `[laws.NAME]`, then every kind that is not among them.
+    #[must_use]
+    pub fn law_names(&self) -> Vec<String> {
+        let named: Vec<_> = self.laws.iter().map(|(name, _)| name.clone()).collect();
+        let kinds = LawSpec::all().iter().map(kind).filter(|kind| !named.contains(kind)).collect::<Vec<_>>();
+        named.into_iter().chain(kinds).collect()
+    }
+
+    /// Names of the laws that are compared where none are named: those of `[laws.NAME]`, and where there are none, every kind.
+    #[must_use]
+    pub fn compared(&self) -> Vec<String> {
+        let listed: Vec<_> = self.laws.iter().map(|(name, _)| name.clone()).collect();
+        if listed.is_empty() { self.law_names() } else { listed }
+    }
+
+    /// The law of `[laws.NAME]`; else the file's own, if that is its kind; else the law of this kind with its default keys.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where there is no law of that name.
+    pub fn law(&self, name: &str) -> Result<NamedLaw, ScenarioError> {
+        let listed = self.laws.iter().find(|(listed, _)| listed == name).map(|(_, law)| law.clone());
+        let own = || (kind(&self.own.law) == name).then(|| self.own.law.clone());
+        let default = || LawSpec::all().into_iter().find(|law| kind(law) == name);
+        let Some(law) = listed.or_else(own).or_else(default) else {
+            let known = self.law_names();
+            let known: Vec<_> = known.iter().map(String::as_str).collect();
+            let help = format!(
+                "{}; a law of another name has its kind and its keys in a table [laws.NAME] of the scenario",
+                suggest(name, &known)
+            );
+            return Err(ScenarioError::new(format!("there is no law named `{name}`")).with_help(help));
+        };
+        Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
+    }
+
+    /// The scenario under this law, from this start.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where that cannot be flown, such as a start of two vehicles too near each other.
+    pub fn scenario(&self, law: &NamedLaw, draw: Draw) -> Result<Scenario, ScenarioError> {
+        let text = Text { name: &self.name, toml: &self.toml, overrides: &self.overrides };
+        let mut document = decoded(&text, &self.folder)?;
+        document.law.kind = law.law.clone();
+        document.start.seed = draw.seed;
+        if self.flight_is_random() {
+            document.noise.seed = draw.seed;
+        }
+        document.start.jitter_m = draw.jitter_m.unwrap_or(document.start.jitter_m);
+        finish(document, &text)
+    }
+}
+
+fn is_random(document: &Document) -> bool {
+    let StartTable { jitter_m, shuffle, .. } = document.start;
+    shuffle || jitter_m != 0.0 || matches!(document.start.shape, Some(StartShape::Random { .. }))
+}

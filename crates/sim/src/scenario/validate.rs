@@ -1,0 +1,421 @@
+//! What a scenario must be for it to be flown.
+
+use super::error::ScenarioError;
+use super::limits::{
+    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, at_least_zero, check_count,
+    check_lengths, check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero,
+    require_positive,
+};
+use super::spec::{Scenario, Space};
+use super::time::TimeSpec;
+use tautline_core::swarm::{Pair, row};
+use tautline_laws::graph::{Graph, Pinning};
+use tautline_laws::law::{Controls, Gain, LawSpec, ParameterError};
+use tautline_laws::target::{Begins, Guidance, Leg};
+
+/// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
+const LEADER_ROUNDING: f64 = 1e-9;
+
+/// Steps that a reference takes for any of its turns at least: it is followed from step to step.
+const STEPS_A_TURN: f64 = 10.0;
+
+/// Vehicles that a message names before it counts the rest.
+const NAMED_VEHICLES: usize = 8;
+
+impl Scenario {
+    /// Checks that the scenario can be flown. [`Scenario::read`] has done so; a scenario built or changed in code is
+    /// to be checked before it is flown.
+    ///
+    /// What holds afterwards: at least two vehicles, and one row or entry for each everywhere; expected memory, steps
+    /// and magnitudes within [`MAX_MEMORY_BYTES`](super::MAX_MEMORY_BYTES), [`MAX_STEPS`](super::MAX_STEPS),
+    /// [`SMALLEST`](super::SMALLEST) and [`LARGEST`](super::LARGEST); all numbers finite;
+    /// every two starts and every two slots more than delta apart; any two hulls fit within delta; the graph
+    /// connected; z = 0 everywhere in the plane.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for the first that does not hold, with the key that says so and the remedy, and without a
+    /// place in a text.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        check_name(&self.name)?;
+        check_count(self.count())?;
+        self.check_legs()?;
+        self.check_lengths()?;
+        let takes_none = self.graph.is_complete() && !self.law.keeps_edges();
+        check_memory(self.count(), if takes_none { 0 } else { self.graph.edge_count() as u128 })?;
+        self.check_law()?;
+        self.check_safety()?;
+        self.check_vehicles()?;
+        self.check_airframe()?;
+        self.check_motion()?;
+        self.check_separations()?;
+        self.check_reference()?;
+        self.check_hulls()?;
+        self.check_obstacles()?;
+        check_connected(&self.graph)?;
+        self.check_time()?;
+        self.check_wind()?;
+        self.check_arrival()?;
+        self.check_breathing()?;
+        self.check_noise()?;
+        self.check_sensing()?;
+        self.check_network()?;
+        self.check_actuation()?;
+        self.check_failures()
+    }
+
+    fn check_noise(&self) -> Result<(), ScenarioError> {
+        if i64::try_from(self.noise_seed).is_ok() {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("a seed of {}, which a scenario file cannot hold", self.noise_seed))
+            .with_help(format!("it is at most {}", i64::MAX))
+            .at("noise.seed"))
+    }
+
+    fn check_arrival(&self) -> Result<(), ScenarioError> {
+        let (arrival, time) = (self.arrival, self.time);
+        positive("arrival.edge_error_m", "the edge error", arrival.edge_error_m)?;
+        positive("arrival.disagreement_m_s", "the disagreement", arrival.disagreement_m_s)?;
+        at_least_zero("arrival.hold_s", "the hold time", arrival.hold_s)?;
+        if arrival.hold_s > time.duration_s {
+            return Err(ScenarioError::new(format!(
+                "the formation is to be held for {} s in a flight of {} s",
+                arrival.hold_s, time.duration_s
+            ))
+            .with_help("enlarge time.duration_s or reduce arrival.hold_s")
+            .at("arrival.hold_s")
+            .at("time.duration_s"));
+        }
+        Ok(())
+    }
+
+    fn check_legs(&self) -> Result<(), ScenarioError> {
+        if self.legs.is_empty() {
+            return Err(ScenarioError::new("there is no formation to fly to").with_help("give one").at("formation"));
+        }
+        let mut from_s = 0.0;
+        for (number, leg) in self.legs.iter().enumerate().skip(1) {
+            let slots = leg.formation.count();
+            if slots != self.count() {
+                return Err(ScenarioError::new(format!(
+                    "leg {} has {slots} slots for {} vehicles",
+                    number + 1,
+                    self.count()
+                ))
+                .with_help("every leg needs a slot for each vehicle")
+                .at_leg(number, "formation.points_m"));
+            }
+            let Begins::At(start_s) = leg.begins else { continue };
+            if !(start_s >= from_s && start_s < self.time.duration_s) {
+                return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
+                    .with_help(format!(
+                        "legs begin one after the other, from {from_s} s on and before the end of the flight at {} s",
+                        self.time.duration_s
+                    ))
+                    .at_leg(number, "formation.start_s")
+                    .at("time.duration_s"));
+            }
+            from_s = start_s;
+        }
+        Ok(())
+    }
+
+    /// A reference that its law follows and that begins where its leader is.
+    fn check_reference(&self) -> Result<(), ScenarioError> {
+        let Some(guidance) = &self.reference else { return Ok(()) };
+        self.check_followed(guidance)?;
+        let start = guidance.motion.at(0.0);
+        let shortest_s = STEPS_A_TURN * self.time.dt_s;
+        if guidance.motion.shortest_s() < shortest_s {
+            return Err(ScenarioError::new(format!(
+                "the reference turns within {} s, too fast to be followed in steps of {} s",
+                guidance.motion.shortest_s(),
+                self.time.dt_s
+            ))
+            .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
+            .at("reference.kind")
+            .at("time.dt_s"));
+        }
+        if self.space == Space::Plane && !guidance.motion.is_level() {
+            return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
+                .with_help("set its z to 0, or swarm.dimensions to 3")
+                .at("reference.kind")
+                .at("swarm.dimensions"));
+        }
+        let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
+        let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
+        let off_m = self.legs.iter().map(|leg| {
+            let slot_m = row(&leg.formation.slots_m, leader) + start.position_m;
+            (row(&self.start.positions_m, leader) - slot_m).norm()
+        });
+        let off_m = off_m.fold(0.0, f64::max);
+        // Not by more than rounding: what is certified is certified around a leader that is on the reference.
+        let rounding = LEADER_ROUNDING * (1.0 + start.position_m.norm() + start.velocity_m_s.norm());
+        if off_m_s.norm() <= rounding && off_m <= rounding {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!(
+            "vehicle {} leads, and does not start on the reference: {off_m} m and {} m/s off",
+            leader + 1,
+            off_m_s.norm()
+        ))
+        .with_help("leave out its start velocity: it then starts as the reference does")
+        .at_entry("start.velocities_m_s", leader)
+        .at("reference.leader"))
+    }
+
+    /// A reference that the law follows, known by whom it must be.
+    fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
+        let refuse = |said: String, help: &str, key: &'static str| {
+            Err(ScenarioError::new(said).with_help(help).at(key).at("law.kind"))
+        };
+        match self.law() {
+            Ok(law) if law.controls() != Controls::Places => {
+                let follows = |spec: &LawSpec| {
+                    let guidance = Guidance { known_by: Pinning::All, ..guidance.clone() };
+                    let other = Self { law: spec.clone(), reference: Some(guidance), ..self.clone() };
+                    Some(other.law().ok().filter(|law| law.controls() == Controls::Places)?.name().to_owned())
+                };
+                let laws: Vec<_> = LawSpec::all().iter().filter_map(follows).collect();
+                let help = format!("set law.kind to one that does ({}), or leave out [reference]", laws.join(", "));
+                refuse(format!("the law `{}` follows no reference", law.name()), &help, "reference.kind")
+            }
+            Err(error @ ParameterError::ReferenceNotHeard) => {
+                let key = if guidance.known_by.leader().is_some() { "reference.leader" } else { "reference.known_by" };
+                let help = "leave it out: then all know the reference; or set law.kind to \"displacement\"";
+                refuse(error.to_string(), help, key)
+            }
+            // What is wrong with a law is told of its keys.
+            _ => Ok(()),
+        }
+    }
+
+    fn check_lengths(&self) -> Result<(), ScenarioError> {
+        check_lengths(
+            self.count(),
+            [
+                ("start.velocities_m_s", "start velocities", Some(self.start.velocities_m_s.nrows())),
+                ("formation.points_m", "slots in the formation", Some(self.formation().count())),
+                ("swarm.mass_kg", "masses", Some(self.mass_kg.len())),
+                ("swarm.hull_radius_m", "hull radii", Some(self.hull_radius_m.len())),
+                ("graph.edges", "vehicles in the graph", Some(self.graph.count())),
+            ],
+        )
+    }
+
+    fn check_law(&self) -> Result<(), ScenarioError> {
+        positive("law.delta_m", "the safety distance delta", self.delta_m)?;
+        check_gains(&self.law)
+    }
+
+    fn check_vehicles(&self) -> Result<(), ScenarioError> {
+        let numbers = [
+            ("swarm.mass_kg", "the mass", &self.mass_kg),
+            ("swarm.hull_radius_m", "the hull radius", &self.hull_radius_m),
+        ];
+        for (key, what, numbers) in numbers {
+            for (i, &number) in numbers.iter().enumerate() {
+                require_positive(format_args!("{what} of vehicle {}", i + 1), number)
+                    .map_err(|error| error.at_entry(key, i))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_motion(&self) -> Result<(), ScenarioError> {
+        require_finite("a22", self.a22_per_s).map_err(|error| error.at("swarm.a22_per_s"))?;
+        let start = [
+            ("start.positions_m", "the start position", &self.start.positions_m),
+            ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
+        ];
+        let slots = self.legs.iter().map(|leg| ("formation.points_m", "the slot", &leg.formation.slots_m));
+        let slots = slots.enumerate();
+        for (leg, (key, what, rows)) in start.into_iter().map(|rows| (0, rows)).chain(slots) {
+            for i in 0..rows.nrows() {
+                for axis in 0..3 {
+                    let name = ["x", "y", "z"][axis];
+                    require_finite(format_args!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
+                        .map_err(|error| error.at_leg_entry(leg, key, i))?;
+                }
+                if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
+                    let z = rows[(i, 2)];
+                    return Err(ScenarioError::new(format!(
+                        "z of {what} of vehicle {} is {z}, but the swarm lives in the plane z = 0",
+                        i + 1
+                    ))
+                    .with_help("set z to 0, or swarm.dimensions to 3")
+                    .at_leg_entry(leg, key, i)
+                    .at("swarm.dimensions"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_separations(&self) -> Result<(), ScenarioError> {
+        let delta_m = self.delta_m;
+        let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
+            Err(ScenarioError::new(said)
+                .with_help(help)
+                .at_leg_entry(leg, key, pair.second())
+                .at_leg_entry(leg, key, pair.first())
+                .at("law.delta_m"))
+        };
+        let metric = self.metric();
+        let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
+        if let Some((pair, separation_m)) = first_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
+            let said = if separation_m == 0.0 {
+                format!("vehicles {pair} start at the same point")
+            } else {
+                format!("vehicles {pair} start {separation_m} m {apart} not more than delta = {delta_m} m")
+            };
+            let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
+            return refuse(said, help, (0, "start.positions_m"), pair);
+        }
+        let least_m = delta_m * (1.0 + SLOT_MARGIN);
+        let too_near = |(number, leg): (usize, &Leg)| {
+            Some((number, first_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
+        };
+        if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
+            let [a, b] = pair.numbers();
+            let said = if distance_m == 0.0 {
+                format!("the slots of vehicles {a} and {b} are the same point")
+            } else if distance_m <= delta_m {
+                format!("a desired distance of {distance_m} m (vehicles {pair}) is not more than delta = {delta_m} m")
+            } else {
+                format!(
+                    "a desired distance of {distance_m} m (vehicles {pair}) exceeds delta = {delta_m} m by less than a \
+                     billionth of it"
+                )
+            };
+            let help = "enlarge the formation, or reduce law.delta_m: slots must be more than delta apart";
+            return refuse(said, help, (leg, "formation.points_m"), pair);
+        }
+        Ok(())
+    }
+
+    fn check_hulls(&self) -> Result<(), ScenarioError> {
+        let mut order: Vec<usize> = (0..self.count()).collect();
+        order.sort_by(|&i, &j| self.hull_radius_m[j].total_cmp(&self.hull_radius_m[i]));
+        let &[i, j, ..] = &order[..] else { return Ok(()) };
+        let touching_m = self.hull_radius_m[i] + self.hull_radius_m[j];
+        let least_m = self.metric().shortest_m(self.delta_m);
+        if touching_m + CONTACT_PREDICTION_M <= least_m {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!(
+            "the hulls of vehicles {} touch at {touching_m} m, not {CONTACT_PREDICTION_M} m before the safety distance \
+             delta = {} m, and would disturb the flight",
+            Pair::new(i, j),
+            self.delta_m
+        ))
+        .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
+            _ if self.airframe.quadrotor().is_some() => {
+                format!(
+                    "enlarge law.delta_m to at least {}: the hulls are those of the model",
+                    touching_m + CONTACT_PREDICTION_M
+                )
+            }
+            largest_m if largest_m > 0.0 => {
+                format!("set swarm.hull_radius_m to at most {largest_m}, or enlarge law.delta_m")
+            }
+            _ => format!("law.delta_m must be more than {CONTACT_PREDICTION_M} m"),
+        })
+        .at_entry("swarm.hull_radius_m", i)
+        .at_entry("swarm.hull_radius_m", j)
+        .at("law.delta_m"))
+    }
+
+    fn check_time(&self) -> Result<(), ScenarioError> {
+        let TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = self.time;
+        positive("time.dt_s", "the time step", dt_s)?;
+        require_more_than_zero("the duration", duration_s).map_err(|error| error.at("time.duration_s"))?;
+        if dt_s > duration_s {
+            return Err(ScenarioError::new(format!(
+                "one step of {dt_s} s is longer than the flight of {duration_s} s"
+            ))
+            .with_help("enlarge time.duration_s or reduce time.dt_s")
+            .at("time.duration_s"));
+        }
+        let steps = duration_s / dt_s;
+        if steps > MAX_STEPS {
+            return Err(ScenarioError::new(format!(
+                "{duration_s} s in steps of {dt_s} s are {steps:.2e} steps; at most {MAX_STEPS:e} are flown"
+            ))
+            .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
+            .at("time.duration_s")
+            .at("time.dt_s"));
+        }
+        if self.a22_per_s.abs() * dt_s > 1.0 {
+            return Err(ScenarioError::new(format!(
+                "one step of {dt_s} s is longer than the time 1/|a22| = {} s in which velocities change by themselves",
+                1.0 / self.a22_per_s.abs()
+            ))
+            .with_help("reduce time.dt_s or swarm.a22_per_s")
+            .at("swarm.a22_per_s")
+            .at("time.dt_s"));
+        }
+        positive("time.record_hz", "the recording rate", record_hz)?;
+        positive("time.max_rate_dt", "the largest product of step and rate", max_rate_dt)?;
+        if let Some(control_hz) = control_hz {
+            positive("time.control_hz", "the control rate", control_hz)?;
+            if control_hz * dt_s > 1.0 + 1e-6 {
+                return Err(ScenarioError::new(format!(
+                    "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
+                ))
+                .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
+                .at("time.control_hz")
+                .at("time.dt_s"));
+            }
+        }
+        if max_halvings > MAX_HALVINGS {
+            return Err(ScenarioError::new(format!(
+                "a step is halved at most {MAX_HALVINGS} times, not {max_halvings}"
+            ))
+            .with_help("the default is 10")
+            .at("time.max_halvings"));
+        }
+        Ok(())
+    }
+}
+
+/// Refuses numbers among a law's keys that it cannot have.
+pub(super) fn check_gains(law: &LawSpec) -> Result<(), ScenarioError> {
+    for Gain { key, name, value, may_be_zero } in law.gains() {
+        if may_be_zero {
+            at_least_zero(key, name, value)?
+        } else {
+            positive(key, name, value)?
+        };
+    }
+    Ok(())
+}
+
+fn check_name(name: &str) -> Result<(), ScenarioError> {
+    let said = if name.is_empty() {
+        "the name is empty".to_owned()
+    } else if name.chars().count() > MAX_NAME_CHARS {
+        format!("the name has more than {MAX_NAME_CHARS} characters")
+    } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
+        format!("the name holds {bad:?}")
+    } else {
+        return Ok(());
+    };
+    Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
+}
+
+/// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
+fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
+    let apart = graph.unreachable();
+    if apart.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
+    let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
+    Err(ScenarioError::new(format!(
+        "the graph is not connected: no path joins vehicle 1 to {}{more}",
+        named.join(", ")
+    ))
+    .with_help("add edges until every vehicle can be reached from every other")
+    .at("graph.edges"))
+}

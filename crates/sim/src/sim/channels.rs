@@ -1,0 +1,33 @@
+//! What is recorded of vehicles and link beside states and commands.
+
+use super::motion::Motion;
+use crate::link::Link;
+use tautline_core::record::Channel;
+
+/// The channels of a flight, vehicles' before link's, in memory that is used again for each sample.
+#[derive(Clone)]
+pub(super) struct Channels {
+    all: Vec<Channel>,
+    /// How many of them are the vehicles'.
+    vehicles: usize,
+}
+
+impl Channels {
+    pub(super) fn of(motion: &Motion, link: &dyn Link) -> Self {
+        let mut all = motion.channels();
+        let vehicles = all.len();
+        all.extend(link.channels());
+        Self { all, vehicles }
+    }
+
+    /// Takes the present values.
+    pub(super) fn write(&mut self, motion: &Motion, link: &dyn Link) {
+        let (vehicles, links) = self.all.split_at_mut(self.vehicles);
+        motion.write_channels(vehicles);
+        link.write_channels(links);
+    }
+
+    pub(super) fn all(&self) -> &[Channel] {
+        &self.all
+    }
+}

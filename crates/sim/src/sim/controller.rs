@@ -1,0 +1,138 @@
+//! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
+
+use super::ending::SimError;
+use crate::feedback::Feedback;
+use crate::link::Link;
+use crate::scenario::Scenario;
+use tautline_core::swarm::{Rows, Swarm};
+use tautline_laws::graph::Graph;
+use tautline_laws::law::{Certificate, Law, LawError};
+use tautline_laws::observation::{Observation, Others};
+use tautline_laws::space::{KeptPairs, Metric, Obstacle};
+use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
+
+/// Everything between the true state and the vehicles' actuators, with all of its memory.
+#[derive(Clone)]
+pub(super) struct Controller {
+    pub(super) law: Box<dyn Law>,
+    pub(super) link: Box<dyn Link>,
+    pub(super) supervisor: Box<dyn Supervisor>,
+    pub(super) target: CurrentTarget,
+    guidance: Option<Guidance>,
+    pub(super) links: Graph,
+    pub(super) obstacles: Vec<Obstacle>,
+    /// Lengths in which vehicles are kept apart.
+    metric: Metric,
+    near: KeptPairs,
+    /// What the law commanded last, N x 3 \[m/s^2\].
+    commanded: Rows,
+}
+
+impl Controller {
+    pub(super) fn new(
+        scenario: &Scenario,
+        law: Box<dyn Law>,
+        link: Box<dyn Link>,
+        supervisor: Box<dyn Supervisor>,
+    ) -> Result<Self, SimError> {
+        let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
+        let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
+        let (obstacles, near) = (scenario.obstacles.clone(), KeptPairs::default());
+        let commanded = Rows::zeros(scenario.count());
+        let metric = scenario.metric();
+        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, commanded })
+    }
+
+    /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
+    /// target, which the law follows; then the law is asked, where there is a `command` to be written.
+    pub(super) fn act(&mut self, time_s: f64, truth: &Swarm, command: Option<&mut Rows>) -> Result<(), LawError> {
+        self.respond(time_s, truth, true, command)
+    }
+
+    fn respond(
+        &mut self,
+        time_s: f64,
+        truth: &Swarm,
+        supervised: bool,
+        command: Option<&mut Rows>,
+    ) -> Result<(), LawError> {
+        if let Some(guidance) = &self.guidance {
+            self.target.set_reference(guidance.motion.at(time_s));
+        }
+        let sensed = self.link.sense(time_s, truth);
+        if supervised && !self.supervisor.is_idle() {
+            self.supervisor.supervise(time_s, sensed.own, &mut self.target);
+            self.law.follow(&self.target.view())?;
+        }
+        let Some(command) = command else { return Ok(()) };
+        if let Some(range_m) = self.law.sensing_range_m() {
+            let from = match sensed.others {
+                Others::Shared => None,
+                Others::Held(picture) => picture.near_from(),
+            };
+            let (positions_m, slack_m) = from.unwrap_or((&sensed.own.positions_m, 0.0));
+            self.near.update(positions_m, range_m + slack_m);
+        }
+        let at = Observation {
+            time_s,
+            own: sensed.own,
+            others: sensed.others,
+            target: self.target.view(),
+            links: &self.links,
+            near: self.near.pairs(),
+            obstacles: &self.obstacles,
+        };
+        let commanded = self.law.command(&at, &mut self.commanded);
+        commanded.map_err(|error| error.against_truth(truth, self.metric, &self.obstacles))?;
+        self.actuate(time_s, command);
+        Ok(())
+    }
+
+    /// Writes what becomes at a time \[s\] of the law's last command.
+    pub(super) fn actuate(&mut self, time_s: f64, command: &mut Rows) {
+        command.copy_from(&self.commanded);
+        self.link.actuate(time_s, command);
+    }
+
+    /// What the supervisor has changed within a leg, and what the law promises anew from this true state on.
+    pub(super) fn change(&mut self, time_s: f64, truth: &Swarm) -> Option<(Change, Certificate)> {
+        let change = self.supervisor.take_change()?;
+        let target = self.target.view();
+        let exact = Observation::exact(truth, &self.links, target.formation);
+        let mut ahead = self.supervisor.ahead(&target);
+        if matches!(change, Change::Assigned { .. }) {
+            // The slots of the leg, which are still to come where they are spread, are there.
+            ahead.insert(0, target.formation);
+        }
+        let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
+        Some((change, self.law.certificate_through(&start, &ahead)))
+    }
+
+    /// All random numbers begin anew.
+    pub(super) fn reseed(&mut self, seed: u64) {
+        self.law.reseed(seed);
+        self.link.reseed(seed);
+        self.supervisor.reseed(seed);
+    }
+
+    /// The law's energy of a true state, against the target that was looked at last.
+    pub(super) fn energy(&self, time_s: f64, truth: &Swarm) -> Option<f64> {
+        let exact = Observation::exact(truth, &self.links, self.target.view().formation);
+        let (target, obstacles) = (self.target.view(), self.obstacles.as_slice());
+        self.law.energy(&Observation { time_s, target, obstacles, ..exact })
+    }
+}
+
+impl Feedback for Controller {
+    fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        self.respond(time_s, truth, false, Some(command))
+    }
+
+    fn accept(&mut self, time_s: f64, truth: &Swarm) {
+        self.link.accept(time_s, truth);
+    }
+
+    fn longest_step_s(&self) -> f64 {
+        self.link.longest_step_s()
+    }
+}

@@ -1,0 +1,46 @@
+//! What a flight is made of beside its scenario.
+
+use super::ending::SimError;
+use super::motion::Motion;
+use crate::link::{self, Link};
+use crate::scenario::Scenario;
+use tautline_laws::law::Law;
+use tautline_laws::target::{Schedule, Supervisor};
+
+/// What a flight is made of beside its scenario.
+pub struct Parts {
+    /// The control law.
+    pub law: Box<dyn Law>,
+    /// What moves the vehicles.
+    pub motion: Motion,
+    /// What lies between truth and law.
+    pub link: Box<dyn Link>,
+    /// Who changes the target.
+    pub supervisor: Box<dyn Supervisor>,
+}
+
+impl Parts {
+    /// What the scenario asks for.
+    ///
+    /// # Errors
+    /// [`SimError::Law`] where its law does not exist, which a validated scenario rules out but for memory.
+    pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
+        Ok(Self::under(scenario, scenario.law()?))
+    }
+
+    /// What the scenario asks for, under another law.
+    #[must_use]
+    pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
+        let link = link::of(scenario, law.sensing_range_m().is_some());
+        let supervisor =
+            Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
+        let supervisor = match law.settling() {
+            Some(settling) => {
+                let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+                supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())
+            }
+            None => supervisor,
+        };
+        Self { law, motion: Motion::of(scenario), link, supervisor: Box::new(supervisor) }
+    }
+}

@@ -1,0 +1,275 @@
+//! One step: as many parts as are honest, each moved, judged and answered by the law.
+
+use std::time::{Duration, Instant};
+
+use super::super::controller::Controller;
+use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
+use super::super::integration::Part;
+use super::super::judge::longest_move_m;
+use super::Simulation;
+use crate::feedback::Feedback as _;
+use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
+use tautline_core::record::Event;
+use tautline_core::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
+use tautline_laws::law::{Law, LawError, Void};
+
+/// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
+/// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
+const SIDE_BY_SIDE_FROM: usize = 512;
+
+/// Into how many parts a step had to be cut, and whether that was enough.
+struct Fineness {
+    /// The fewest parts that were flown at once.
+    shortest: u64,
+    /// A part that cannot be halved was still too long for the law.
+    is_overlong: bool,
+}
+
+/// Product of a part of a step and the fastest rate that the law has anywhere on its way above which it is refused: where it
+/// began, the law was slower by [`TimeSpec::max_rate_dt`]; a part that is stable for what it lands in is no leap.
+const MAX_RATE_DT_ON_THE_WAY: f64 = 1.0;
+
+impl Simulation {
+    /// Flies one step, in halves where it is refused.
+    pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
+        let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
+        let mut parts = Fineness { shortest: whole, is_overlong: false };
+        let flown = self.fly_parts(step, whole, &mut parts);
+        let Fineness { shortest, is_overlong } = parts;
+        if shortest < whole && shortest != self.shortest {
+            let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
+            let dt_s = length_s * (shortest as f64 / whole as f64);
+            self.events.push(Event::StepRefined { time_s, dt_s });
+        }
+        self.shortest = shortest;
+        self.refined_steps += u64::from(shortest < whole);
+        if is_overlong && self.overlong_steps == 0 {
+            self.certificate = self.certificate.clone().void_where(true, Void::StepsTooLong);
+        }
+        self.overlong_steps += u64::from(is_overlong);
+        flown
+    }
+
+    /// Fastest rate of the law at the present state \[1/s\]. It is 0 in continuous time, which chooses its own steps, and
+    /// under commands from outside, for which the law is not asked.
+    fn rate_per_s(&self, length_s: f64) -> f64 {
+        if self.overruled || !self.motion.holds_commands() {
+            return 0.0;
+        }
+        let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.room_m));
+        let of_any_pair = rate(judge.nearest_m);
+        // The nearest pair may be one that the law does not act on: the exact distance costs a look at every edge.
+        if of_any_pair * length_s <= scenario.time.honest_rate_dt() {
+            return of_any_pair;
+        }
+        rate(judge.nearest_acted_on_m(law.as_ref(), links, state))
+    }
+
+    /// Whether every part that the law asks for changes the motion: where a command is held for a period of its own, or
+    /// comes from outside, the vehicles move as they are commanded however long a part is.
+    fn follows_the_law(&self) -> bool {
+        !self.overruled && self.scenario.time.control_hz.is_none()
+    }
+
+    /// Flies the `whole` parts of a step, as many at once as are honest and not refused.
+    fn fly_parts(&mut self, step: u64, whole: u64, fineness: &mut Fineness) -> Result<(), Ending> {
+        let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
+        let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
+        let (mut flown, mut part) = (0, whole);
+        while flown < whole {
+            let rate_per_s = self.rate_per_s(seconds(part));
+            while part > 1 && seconds(part) * rate_per_s > self.scenario.time.max_rate_dt {
+                part /= 2;
+                fineness.shortest = part.min(fineness.shortest);
+            }
+            let undefined = self.move_vehicles(step, seconds(part))?;
+            let bend_m = self.path.bend_m();
+            let (is_refused, on_the_way_per_s) = self.refuses(seconds(part), rate_per_s);
+            if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
+                self.motion.restore(&self.state);
+                self.controller.link.forget_after(self.time_s);
+                part /= 2;
+                fineness.shortest = part.min(fineness.shortest);
+                continue;
+            }
+            if bend_m > MAX_BEND_M {
+                return Err(undefined.map_or(Breakdown::Bent { step, bend_m }.into(), Ending::LawUndefined));
+            }
+            let [begun, way] = [rate_per_s.min(on_the_way_per_s), on_the_way_per_s].map(|rate| seconds(part) * rate);
+            let is_honest = begun <= TimeSpec::DEFAULT_MAX_RATE_DT && way <= MAX_RATE_DT_ON_THE_WAY;
+            let is_overlong = !is_honest && self.follows_the_law();
+            fineness.is_overlong |= is_overlong;
+            self.note_error(seconds(part), rate_per_s.max(on_the_way_per_s), is_overlong);
+            flown += part;
+            let from_s = self.time_s;
+            if flown == whole {
+                self.steps = step;
+                self.time_s = self.scenario.time.end_s(step);
+            } else {
+                self.time_s = begin_s + seconds(flown);
+            }
+            std::mem::swap(&mut self.state, &mut self.next);
+            self.resolution.take(&self.state, seconds(part), step)?;
+            self.judge_and_command(Some((step, from_s)), flown == whole)?;
+            while part < whole && flown.is_multiple_of(2 * part) {
+                part *= 2;
+            }
+        }
+        Ok(())
+    }
+
+    /// Bounds the error of integration after a part of a step, and lets the judge know of it, from the first part on that is
+    /// too long for the law.
+    fn note_error(&mut self, length_s: f64, rate_per_s: f64, is_overlong: bool) {
+        // Commands that are made of late or wrong states do not change at the rate that the law has in the true one.
+        if !self.controller.link.is_exact() || (!is_overlong && self.error.is_none()) {
+            return;
+        }
+        let moved_m = longest_move_m(&self.state, &self.path, &self.next);
+        let limits_m_s2 = [self.controller.law.max_command_m_s2(), self.scenario.actuation.max_accel_m_s2];
+        let limit_m_s2 = limits_m_s2.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let part = Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
+        let error = self.error.unwrap_or_default().after(part);
+        self.error = Some(error);
+        self.judge.may_err_by(error.position_m());
+    }
+
+    /// Moves the vehicles from `state` to `next`. The result is why the law had no answer on the way, where they moved on without.
+    fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Option<LawError>, Ending> {
+        let began = Instant::now();
+        let is_held = self.overruled || self.scenario.time.control_hz.is_some();
+        let held = is_held.then_some(&self.control);
+        let interval = (step, self.time_s, dt_s);
+        let undefined = self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
+        self.performance.physics += began.elapsed();
+        match self.next.first_not_finite() {
+            Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
+            None => Ok(undefined),
+        }
+    }
+
+    /// Whether the move that was just made is to be made in halves: it comes too near to the barrier, or to where the law is
+    /// too fast for a step of this length \[s\]. Behind it the fastest rate that the law had on the way \[1/s\], at most; that at
+    /// its start where the law has no barrier, or is not asked.
+    fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
+        let Self {
+            controller: Controller { law, links, link, .. },
+            judge,
+            state,
+            path,
+            next,
+            scenario,
+            motion,
+            overruled,
+            ..
+        } = self;
+        let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
+        let Some(barrier_m) = law.barrier_m().filter(|_| !*overruled) else { return (false, at_start_per_s) };
+        let moved_m = longest_move_m(state, path, next);
+        if !motion.holds_commands() {
+            return (judge.refuses(of, moves, moved_m), at_start_per_s);
+        }
+        let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
+        let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
+        let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
+        let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
+        let on_the_way_per_s = rate(nearest_m);
+        let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
+        let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
+        // A law may know no rate at or inside its barrier, and no part is short enough to leap it.
+        let leaps = may_leap && nearest_m <= barrier_m;
+        (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
+    }
+
+    /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
+    /// Between whole steps a command that is held for a period of its own is kept.
+    pub(super) fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
+        let (number, from_s) = step.unwrap_or((0, self.time_s));
+        let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
+        let bend_m = self.path.bend_m() + self.resolution.rounding_m();
+        for (after_s, positions_m) in self.path.passed() {
+            self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
+        }
+        self.controller.accept(self.time_s, &self.state);
+        self.controller.link.settle(self.time_s);
+        let time = &self.scenario.time;
+        let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
+        if time.control_hz.is_some() {
+            if !self.overruled && step.is_some() {
+                self.controller.actuate(self.time_s, &mut self.control);
+            }
+            self.motion.apply(&self.control, &mut self.state);
+        }
+        let Self { judge, controller, state, control, time_s, events, .. } = self;
+        let may_move = !controller.law.stays_in_its_thread();
+        let (state, time_s): (&Swarm, f64) = (state, *time_s);
+        let mut audit = || {
+            let began = Instant::now();
+            let positions_m = &state.positions_m;
+            let judged = match step {
+                None => judge.start(time_s, positions_m, events),
+                Some(_) => judge.sweep(time_s, positions_m, bend_m, events),
+            };
+            (judged, began.elapsed())
+        };
+        let mut act = || {
+            let began = Instant::now();
+            (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
+        };
+        let side_by_side = may_move && state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
+        let ((judged, audit_time), (commanded, law_time)) =
+            if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
+        self.performance.audit += audit_time;
+        let Self { watch, scenario, controller, state, certificate, events, .. } = self;
+        watch.look(scenario, controller, (time_s, state), certificate, events);
+        let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
+        judged.map_err(refused)?;
+        self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
+        self.judge.note_bounces(&self.motion, from_s, &mut self.events);
+        commanded
+    }
+
+    /// Asks the law about the present state.
+    pub(super) fn ask(&mut self) -> Result<(), Ending> {
+        let began = Instant::now();
+        let commanded = self.controller.command(self.time_s, &self.state, &mut self.control);
+        self.hold(self.steps, commanded.map_err(Ending::from), began.elapsed())
+    }
+
+    /// Lets the vehicles hold the command from now on, where there is one.
+    fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
+        self.performance.law += took;
+        let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
+            Some(vehicle) if self.control.row(vehicle).iter().all(|x| x.is_finite()) => {
+                Err(Breakdown::CommandOutOfRange { step, vehicle }.into())
+            }
+            Some(vehicle) => Err(Breakdown::CommandNotFinite { step, vehicle }.into()),
+            None => Ok(()),
+        });
+        if checked.is_err() {
+            (self.control, self.energy) = (Rows::zeros(0), None);
+            return checked;
+        }
+        self.motion.apply(&self.control, &mut self.state);
+        if let Some(vehicle) = self.state.first_not_finite() {
+            return Err(Breakdown::StateNotFinite { step, vehicle }.into());
+        }
+        let began = Instant::now();
+        self.energy = self.controller.energy(self.time_s, &self.state);
+        self.performance.energy += began.elapsed();
+        self.watch.take(self.controller.target.view().revision, self.energy);
+        self.peaks.take(largest_row_norm(&self.control), self.energy);
+        Ok(())
+    }
+}
+
+/// The fastest rate of a law \[1/s\] where no two are nearer and no obstacle leaves less room \[m\].
+fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, room_m): (f64, f64)) -> f64 {
+    let of_pairs = law.fastest_rate_per_s(Some(nearest_m), scenario.velocity_coefficient_per_s()).unwrap_or(0.0);
+    match law.obstacle_rate_squared(room_m) {
+        0.0 => of_pairs,
+        squared => (of_pairs.powi(2) + squared).sqrt(),
+    }
+}

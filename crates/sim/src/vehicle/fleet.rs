@@ -1,0 +1,303 @@
+//! Quadrotors with everything that they hold from step to step.
+
+use nalgebra::{Vector3, Vector4};
+
+use super::downwash::Downwash;
+use super::dynamics::{Drift, Dynamics, Ground, State, Wrench};
+use super::model::Quadrotor;
+use tautline_core::record::Channel;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_laws::wind::Wind;
+
+/// Frequency of the loop that holds the height of a swarm in the plane z = 0 \[rad/s\]; it is critically damped.
+pub const HEIGHT_RAD_S: f64 = 2.0;
+
+/// Part of a period of the attitude loop that is rounding of a sum of steps.
+const ROUNDING: f64 = 1e-6;
+
+/// A swarm of quadrotors: states, rotor speeds that are asked for, commands that are held, the wind.
+///
+/// Its attitude loops run at instants that are multiples of their period: with the first state at or after each.
+#[derive(Clone, Debug)]
+pub struct Fleet {
+    /// The equations of their motion.
+    pub dynamics: Dynamics,
+    /// A state for each.
+    pub states: Vec<State>,
+    /// Velocity of the air around each, without what rotors blow \[m/s\].
+    pub wind_m_s: Rows,
+    /// What makes it, where it is not the same all the time.
+    wind: Option<Wind>,
+    asked_rpm: Vec<Vector4<f64>>,
+    /// Accelerations that are commanded \[m/s^2\].
+    commands: Rows,
+    /// Whether the height z = 0 is held whatever is commanded.
+    holds_height: bool,
+    attitude_hz: f64,
+    clock: Clock,
+    jets: Vec<Downwash>,
+    wrenches: Vec<Wrench>,
+    failures: Vec<RotorFailure>,
+    /// As it was before the last [`Fleet::remember`].
+    before: Before,
+}
+
+/// Rotors of which some or all thrust is lost, for the rest of the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorFailure {
+    /// The vehicle, from 0.
+    pub vehicle: usize,
+    /// The rotor, from 0; where none is named all of them stop, as slowly as they follow anything.
+    pub rotor: Option<usize>,
+    /// From when on \[s\].
+    pub at_s: f64,
+    /// Share of its thrust that a rotor still gives.
+    pub share: f64,
+}
+
+/// What goes back where a step is taken back.
+#[derive(Clone, Debug, Default)]
+struct Before {
+    states: Vec<State>,
+    asked_rpm: Vec<Vector4<f64>>,
+    wrenches: Vec<Wrench>,
+    clock: Clock,
+}
+
+/// Time flown, and how many attitude samples have been taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Clock {
+    time_s: f64,
+    samples: f64,
+}
+
+impl Fleet {
+    /// Trimmed for hover: level, rotors at the speed that carries the weight, at the places and velocities of a start. With
+    /// `holds_height` the height z = 0 is held, whatever is commanded.
+    #[must_use]
+    pub fn trimmed(quadrotor: &Quadrotor, grounds: &[Ground], start: &Swarm, holds_height: bool) -> Self {
+        let (dynamics, count) = (Dynamics::new(quadrotor, grounds), start.count());
+        let state = |i: usize| dynamics.trimmed(row(&start.positions_m, i), row(&start.velocities_m_s, i));
+        let states: Vec<_> = (0..count).map(state).collect();
+        let asked_rpm = vec![Vector4::repeat(dynamics.hover_rpm()); count];
+        let mut fleet = Self {
+            before: Before::default(),
+            wrenches: vec![Wrench::default(); count],
+            failures: Vec::new(),
+            states,
+            wind_m_s: Rows::zeros(count),
+            wind: None,
+            asked_rpm,
+            commands: Rows::zeros(count),
+            holds_height,
+            attitude_hz: quadrotor.attitude_hz,
+            clock: Clock::default(),
+            jets: Vec::with_capacity(if quadrotor.downwash { 4 * count } else { 0 }),
+            dynamics,
+        };
+        fleet.feel();
+        fleet.remember();
+        fleet
+    }
+
+    /// The same in a wind that is at the same instant.
+    #[must_use]
+    pub fn blown(mut self, wind: Wind) -> Self {
+        wind.write(&mut self.wind_m_s);
+        self.wind = Some(wind);
+        self.feel();
+        self
+    }
+
+    /// The same with rotors that fail.
+    #[must_use]
+    pub fn failing(mut self, failures: Vec<RotorFailure>) -> Self {
+        self.failures = failures;
+        self
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.states.len()
+    }
+
+    /// Accelerations \[m/s^2\], N x 3, that are commanded from now on.
+    pub fn command(&mut self, accelerations_m_s2: &Rows) {
+        self.commands.copy_from(accelerations_m_s2);
+    }
+
+    /// Keeps what there is, for [`Fleet::go_back`].
+    pub fn remember(&mut self) {
+        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+        before.states.clone_from(states);
+        before.asked_rpm.clone_from(asked_rpm);
+        before.wrenches.clone_from(wrenches);
+        before.clock = *clock;
+    }
+
+    /// Becomes again what it was at the last [`Fleet::remember`].
+    pub fn go_back(&mut self) {
+        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+        states.clone_from(&before.states);
+        asked_rpm.clone_from(&before.asked_rpm);
+        wrenches.clone_from(&before.wrenches);
+        *clock = before.clock;
+        if let Some(wind) = &mut self.wind {
+            wind.undo();
+            wind.write(&mut self.wind_m_s);
+        }
+    }
+
+    /// The wind at the end of a step \[s\], which [`Fleet::go_back`] takes back.
+    pub fn blow(&mut self, dt_s: f64) {
+        if let Some(wind) = &mut self.wind {
+            wind.advance(dt_s);
+            wind.write(&mut self.wind_m_s);
+        }
+    }
+
+    /// The wind at an instant of the step that [`Fleet::blow`] came to the end of, so many seconds before it.
+    pub fn blow_before(&mut self, before_s: f64) {
+        if let Some(wind) = &self.wind {
+            let time_s = wind.now_s() - before_s;
+            (0..self.states.len()).for_each(|i| set_row(&mut self.wind_m_s, i, wind.air_at_m_s(i, time_s)));
+        }
+    }
+
+    /// How long the wind is smooth from that instant on \[s\].
+    #[must_use]
+    pub fn smooth_s(&self, before_s: f64) -> f64 {
+        self.wind.as_ref().map_or(f64::INFINITY, |wind| {
+            let time_s = wind.now_s() - before_s;
+            wind.next_turn_s(time_s) - time_s
+        })
+    }
+
+    /// Begins its random numbers anew.
+    pub fn reseed(&mut self, seed: u64) {
+        if let Some(wind) = &mut self.wind {
+            wind.reseed(seed);
+        }
+    }
+
+    /// Lets rotors fail whose time has come and the attitude loops run where they are due; says after how many seconds either is
+    /// due again.
+    pub fn run_attitude(&mut self) -> f64 {
+        let Clock { time_s, samples } = self.clock;
+        let now_s = time_s + ROUNDING / self.attitude_hz;
+        let next_s = self.fail(now_s) - time_s;
+        if time_s * self.attitude_hz + ROUNDING >= samples {
+            self.clock.samples = (time_s * self.attitude_hz + ROUNDING).floor() + 1.0;
+            for i in 0..self.count() {
+                let command_m_s2 = self.acceleration_m_s2(i);
+                self.asked_rpm[i] = self.dynamics.asked_rpm(&self.states[i], command_m_s2);
+            }
+        }
+        for failure in self.failures.iter().filter(|failure| failure.rotor.is_none() && failure.at_s <= now_s) {
+            self.asked_rpm[failure.vehicle].fill(0.0);
+        }
+        next_s.min(self.clock.samples / self.attitude_hz - time_s)
+    }
+
+    /// Takes their thrust from rotors that have failed by a time \[s\], and says when the next does.
+    fn fail(&mut self, time_s: f64) -> f64 {
+        let (mut next_s, mut changed) = (f64::INFINITY, false);
+        for &RotorFailure { vehicle, rotor, at_s, share } in &self.failures {
+            if at_s > time_s {
+                next_s = next_s.min(at_s);
+            } else if let Some(rotor) = rotor
+                && self.states[vehicle].shares[rotor] > share
+            {
+                self.states[vehicle].shares[rotor] = share;
+                changed = true;
+            }
+        }
+        if changed {
+            self.feel();
+        }
+        next_s
+    }
+
+    /// Asks the rotors of each for these speeds from now on \[rpm\]: attitude loops run no more.
+    pub fn open_loop(&mut self, asked_rpm: &[Vector4<f64>]) {
+        self.asked_rpm.copy_from_slice(asked_rpm);
+        self.clock.samples = f64::INFINITY;
+    }
+
+    /// What a vehicle's attitude loop is to carry out \[m/s^2\].
+    fn acceleration_m_s2(&self, i: usize) -> Vector3<f64> {
+        let mut command_m_s2 = row(&self.commands, i);
+        if self.holds_height {
+            let State { position_m, velocity_m_s, .. } = &self.states[i];
+            command_m_s2.z = -HEIGHT_RAD_S * (HEIGHT_RAD_S * position_m.z + 2.0 * velocity_m_s.z);
+        }
+        command_m_s2
+    }
+
+    /// Time has passed \[s\].
+    pub fn pass(&mut self, dt_s: f64) {
+        self.clock.time_s += dt_s;
+    }
+
+    /// Rotor speeds \[rpm\] that a vehicle's attitude loop asks for.
+    #[must_use]
+    pub fn asked_rpm(&self, vehicle: usize) -> Vector4<f64> {
+        self.asked_rpm[vehicle]
+    }
+
+    /// What acts on each beside gravity at the present states.
+    pub fn feel(&mut self) {
+        let Self { dynamics, states, wind_m_s, jets, wrenches, .. } = self;
+        dynamics.jets(states.iter(), jets);
+        for (i, (state, wrench)) in states.iter().zip(wrenches).enumerate() {
+            *wrench = dynamics.wrench(state, row(wind_m_s, i), dynamics.down_m_s(i, state, jets));
+        }
+    }
+
+    /// What acted on a vehicle beside gravity at the last [`Fleet::feel`].
+    #[must_use]
+    pub fn wrench(&self, vehicle: usize) -> &Wrench {
+        &self.wrenches[vehicle]
+    }
+
+    /// The second half of a step that began with these drifts, with what acts now.
+    pub fn complete(&mut self, drifts: &[Drift], dt_s: f64) {
+        let Self { dynamics, states, wrenches, .. } = self;
+        for ((state, wrench), drift) in states.iter_mut().zip(wrenches).zip(drifts) {
+            dynamics.end(state, drift, wrench, dt_s);
+        }
+    }
+
+    /// Writes where they are and how fast they move.
+    pub fn observe(&self, swarm: &mut Swarm) {
+        for (i, state) in self.states.iter().enumerate() {
+            set_row(&mut swarm.positions_m, i, state.position_m);
+            set_row(&mut swarm.velocities_m_s, i, state.velocity_m_s);
+        }
+    }
+
+    /// The channels `attitude`, the quaternion that turns body into world, `rotors`, the thrust of each \[N\], and the wind's,
+    /// where one blows.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        let attitude = Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
+        let rotors = Channel::new("rotors", &["thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n"]);
+        [attitude, rotors].into_iter().chain(self.wind.as_ref().map(|_| Wind::channel())).collect()
+    }
+
+    /// Writes the values of [`Fleet::channels`].
+    pub fn write_channels(&self, channels: &mut [Channel]) {
+        let [attitude, rotors, rest @ ..] = channels else { return };
+        attitude.values.clear();
+        rotors.values.clear();
+        for state in &self.states {
+            let q = state.attitude.quaternion();
+            attitude.values.extend([q.w, q.i, q.j, q.k]);
+            rotors.values.extend(self.dynamics.thrusts_n(state).iter());
+        }
+        if let (Some(wind), [channel]) = (&self.wind, rest) {
+            wind.write_channel(channel);
+        }
+    }
+}
