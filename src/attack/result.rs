@@ -175,7 +175,7 @@ impl Attack {
         Self {
             schema_version: SCHEMA_VERSION,
             scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
-            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: scenario.delta_m,
             method: asked.method,
             seed: asked.seed,

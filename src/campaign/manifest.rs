@@ -72,8 +72,8 @@ impl Program {
         let path = path.map_err(|error| CampaignError::reading(Path::new("the program"), error))?;
         let program = fs::read(&path).map_err(|error| CampaignError::reading(&path, error))?;
         Ok(Self {
-            name: env!("CARGO_PKG_NAME").to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
+            name: tautline_core::PROGRAM.to_owned(),
+            version: tautline_core::VERSION.to_owned(),
             sha256: base16(&Sha256::digest(program)),
         })
     }

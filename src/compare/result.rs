@@ -111,7 +111,7 @@ impl Comparison {
         Self {
             schema_version: SCHEMA_VERSION,
             scenario: ScenarioIdentity { name: own.name.clone(), sha256: own.sha256_hex() },
-            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: own.delta_m,
             runs: flights.first().map_or(0, |rows| rows.len() as u64),
             runs_asked: plan.runs(),

@@ -148,7 +148,7 @@ impl Margin {
         Self {
             schema_version: SCHEMA_VERSION,
             scenario: ScenarioIdentity { name: own.name.clone(), sha256: own.sha256_hex() },
-            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: own.delta_m,
             key: plan.key().to_owned(),
             range: [range.from, range.to],

@@ -42,7 +42,7 @@ impl Validation {
     pub(super) fn new(groups: Vec<Group>, convergence: Vec<Refinement>, figures: Vec<Figure>, wall_s: f64) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
-            tool: Tool { name: env!("CARGO_PKG_NAME").to_owned(), version: env!("CARGO_PKG_VERSION").to_owned() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             pass: groups.iter().flat_map(|group| &group.claims).all(|claim| claim.pass),
             groups,
             convergence,

@@ -1,0 +1,204 @@
+//! Distances of pairs over time.
+
+use super::axis::{Axis, Scale};
+use super::chart::{Band, Chart, Line, Mark};
+use super::figure::Figure;
+use super::history::{FEW_VEHICLES, RunHistory, Span, evenly, pairs};
+use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
+use tautline_core::text::{at_least, counted};
+
+/// Pairs whose distances are ranked at one instant: of more pairs, so many of them are.
+const RANKED_PAIRS: usize = 20_000;
+/// Instants at which they are: one for each pixel.
+const RANKED_INSTANTS: usize = 400;
+/// Pairs of a large swarm that are drawn one by one: those that come closest.
+const CLOSEST_PAIRS: usize = 5;
+/// Colour of what marks a hit.
+const HIT: usize = 1;
+/// More pairs than this are not told apart by colour.
+const TOLD_APART: usize = 15;
+
+/// Distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one: every pair of up to
+/// 12 vehicles; of more vehicles the smallest distance, bands of quantiles, and the five pairs that come closest. The
+/// quantiles are those of 20 000 pairs, spread evenly over all, where there are more.
+///
+/// The closest approach is marked with what the recording says of the time between samples too.
+#[must_use]
+pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, title: &str) -> Figure {
+    let closest = history.closest();
+    let mut chart = Chart::new(history.time_axis(), Axis::distances("m", &[], delta_m));
+    let note = if history.vehicles() <= FEW_VEHICLES {
+        chart.lines = of_all_pairs(history);
+        String::new()
+    } else {
+        of_many_pairs(history, &mut chart)
+    };
+    let drawn = chart.lines.iter().flat_map(|line| line.points.iter().map(|&(_, y)| y));
+    let bands = chart.bands.iter().flat_map(|band| band.points.iter().map(|&(_, _, high)| high));
+    let marked = closest.map(|closest| closest.separation_m);
+    let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
+    chart.y = Axis::distances("m", &numbers, delta_m);
+    chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
+    if let Some(certified_m) = certified_m {
+        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
+    }
+    let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
+    let of = if history.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
+    let mut description = format!(
+        "Distances between {} vehicles{of} over time{scale}; the safety distance is {delta_m} m.",
+        history.vehicles()
+    );
+    if let Some(closest) = closest {
+        let metres = at_least(closest.separation_m, 3);
+        let words = format!("{metres} m, vehicles {} at {:.2} s", closest.pair, closest.time_s);
+        description.extend([" Closest: ", &words, "."]);
+        let at = (closest.time_s, closest.separation_m);
+        chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
+    }
+    for (k, at) in history.hits().enumerate() {
+        let label = (k == 0).then(|| format!("hulls hit, {}", counted(history.hit_count() as u64, "time", "times")));
+        chart.marks.push(Mark::cross(at, PALETTE[HIT], label));
+    }
+    if history.hit_count() > 0 {
+        description.extend([" Hulls hit ", &counted(history.hit_count() as u64, "time", "times"), "."]);
+    }
+    chart.figure("distances", title, &(description + &note))
+}
+
+fn of_all_pairs(history: &RunHistory) -> Vec<Line> {
+    let count = pairs(history.vehicles()).count();
+    let lines = pairs(history.vehicles()).enumerate().map(|(k, (i, j))| {
+        let points = history.spans().map(|span| (span.time_s, span.pair_min_m[k])).collect();
+        let (stroke, label) = if count <= TOLD_APART {
+            (Stroke::of_line(k), Some(Pair::new(i, j).to_string()))
+        } else {
+            (Stroke::solid(PALETTE[0], 0.9).faint(0.55), (k == 0).then(|| format!("all {count} pairs")))
+        };
+        Line { points, stroke, label }
+    });
+    lines.collect()
+}
+
+/// Draws the pairs of a large swarm; says what is drawn of all that could be, as a sentence behind a space.
+fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
+    let (ranked_pairs, all) = ranked_pairs(history.vehicles());
+    let instants = history.spread(RANKED_INSTANTS);
+    let mut scratch = Vec::new();
+    let scaled = |span: &Span| history.metric().scaled_rows(&span.positions_m);
+    let ranks: Vec<_> = instants.iter().map(|span| quantiles_m(&scaled(span), &ranked_pairs, &mut scratch)).collect();
+    let times_s = || instants.iter().map(|span| span.time_s);
+    let band = |low: usize, high: usize, opacity: f64, label: &str| Band {
+        points: times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[low], ranks[high])).collect(),
+        colour: PALETTE[0],
+        opacity,
+        label: Some(label.to_owned()),
+    };
+    chart.bands = vec![band(0, 4, 0.16, "5 to 95 %"), band(1, 3, 0.28, "25 to 75 %")];
+    let median = times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[2])).collect();
+    chart.line(median, Stroke::solid(PALETTE[0], 1.6), "median");
+
+    // Between samples too, where the recording knows.
+    let swept: Vec<_> = history.spans().filter_map(|span| Some((span.time_s, span.closest?))).collect();
+    let closest: Vec<_> = if swept.is_empty() && ranked_pairs.len() == all {
+        instants.iter().filter_map(|span| Some((span.time_s, nearest(&scaled(span), span.time_s)?))).collect()
+    } else {
+        swept
+    };
+    for (k, pair) in closest_pairs(&closest, history.vehicles()).into_iter().enumerate() {
+        let apart_m = |span: &Span| separation(&scaled(span), pair.first(), pair.second());
+        let apart = history.spans().map(|span| (span.time_s, apart_m(span))).collect();
+        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string());
+    }
+    let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
+    chart.line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest");
+    match (ranked_pairs.len(), ranks.len()) {
+        (ranked, instants) if ranked < all => {
+            format!(" Median and bands are those of {ranked} of the {all} pairs, evenly chosen at {instants} instants.")
+        }
+        _ => String::new(),
+    }
+}
+
+/// The pairs whose distances are ranked, and how many there are in all.
+fn ranked_pairs(count: usize) -> (Vec<(usize, usize)>, usize) {
+    let all = count * count.saturating_sub(1) / 2;
+    if all <= RANKED_PAIRS {
+        return (pairs(count).collect(), all);
+    }
+    // Every vehicle about as often as every other, with partners spread over all others.
+    let pair = |k: usize| (k % count, (k % count + 1 + evenly(k, count - 1)) % count);
+    ((0..RANKED_PAIRS).map(pair).collect(), all)
+}
+
+/// Quantiles of 5, 25, 50, 75 and 95 % of the distances of pairs \[m\]; NaN where no distance is finite.
+fn quantiles_m(positions_m: &Rows, pairs: &[(usize, usize)], scratch: &mut Vec<f64>) -> [f64; 5] {
+    scratch.clear();
+    scratch.extend(pairs.iter().map(|&(i, j)| separation(positions_m, i, j)).filter(|distance| distance.is_finite()));
+    [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(scratch, share))
+}
+
+/// The number below which a share of the others lies; NaN for none. Reorders the numbers.
+pub(super) fn quantile(numbers: &mut [f64], share: f64) -> f64 {
+    let Some(last) = numbers.len().checked_sub(1) else { return f64::NAN };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+    let place = (share * last as f64).round() as usize;
+    *numbers.select_nth_unstable_by(place.min(last), f64::total_cmp).1
+}
+
+/// The closest pair at an instant.
+fn nearest(positions_m: &Rows, time_s: f64) -> Option<ClosestApproach> {
+    let apart = |(i, j)| ClosestApproach { pair: Pair::new(i, j), separation_m: separation(positions_m, i, j), time_s };
+    let finite = pairs(positions_m.nrows()).map(apart).filter(|closest| closest.separation_m.is_finite());
+    finite.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m))
+}
+
+/// The pairs that come closest, the closest first.
+fn closest_pairs(closest: &[(f64, ClosestApproach)], vehicles: usize) -> Vec<Pair> {
+    let known = closest.iter().map(|(_, closest)| (closest.pair, closest.separation_m));
+    let mut known: Vec<_> = known.filter(|(pair, apart_m)| apart_m.is_finite() && pair.second() < vehicles).collect();
+    known.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let mut closest = Vec::new();
+    for (pair, _) in known {
+        if closest.len() < CLOSEST_PAIRS && !closest.contains(&pair) {
+            closest.push(pair);
+        }
+    }
+    closest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_those_of_the_sorted_numbers() {
+        let mut numbers: Vec<_> = (0..101).rev().map(f64::from).collect();
+        assert_eq!([0.0, 0.05, 0.5, 1.0].map(|share| quantile(&mut numbers, share)), [0.0, 5.0, 50.0, 100.0]);
+        assert_eq!(quantile(&mut [7.0], 0.95), 7.0);
+        assert!(quantile(&mut [], 0.5).is_nan());
+    }
+
+    #[test]
+    fn the_nearest_pair_is_the_closest_one() {
+        let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 6.0, 0.0, 0.0]);
+        let closest = nearest(&positions_m, 3.0).unwrap();
+        assert_eq!((closest.pair, closest.separation_m), (Pair::new(1, 2), 1.0));
+        let ranked = quantiles_m(&positions_m, &ranked_pairs(3).0, &mut Vec::new());
+        assert_eq!(ranked[2], 5.0);
+        assert!(nearest(&Rows::zeros(1), 0.0).is_none());
+    }
+
+    #[test]
+    fn quantiles_of_an_even_sample_are_those_of_all_pairs() {
+        let count = 600;
+        let line = Rows::from_fn(count, |i, axis| if axis == 0 { i as f64 } else { 0.0 });
+        let (sample, all) = ranked_pairs(count);
+        assert!(sample.len() < all && sample.iter().all(|&(i, j)| i != j && i < count && j < count));
+        let every: Vec<_> = pairs(count).collect();
+        let of = |pairs: &[(usize, usize)]| quantiles_m(&line, pairs, &mut Vec::new());
+        for (found, expected) in of(&sample).into_iter().zip(of(&every)) {
+            assert!((found - expected).abs() < 0.01 * count as f64, "{found} instead of {expected}");
+        }
+    }
+}

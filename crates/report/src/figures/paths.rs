@@ -1,0 +1,193 @@
+//! Where the vehicles went.
+
+use nalgebra::Vector3;
+
+use super::axis::Axis;
+use super::chart::{Chart, Line, Mark, TITLE, WIDTH};
+use super::figure::Figure;
+use super::history::{FEW_VEHICLES, RunHistory, evenly};
+use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke};
+use super::thin::thinned;
+use tautline_core::swarm::row;
+
+/// Share of the extent left free on each side.
+const MARGIN: f64 = 0.06;
+/// Most vehicles whose paths are drawn.
+const MOST_PATHS: usize = 300;
+
+/// Where the vehicles went, seen from above: x and y \[m\], a unit as long on both axes, a cross at each start and a
+/// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, as many are drawn, chosen
+/// evenly, and the two that come closest.
+#[must_use]
+pub fn paths(history: &RunHistory, title: &str) -> Figure {
+    let axis = |axis: usize, label: &str| {
+        let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
+        let margin = MARGIN * (high - low);
+        Axis::linear(label, [low - margin, high + margin], false)
+    };
+    let mut chart = Chart::new(axis(0, "x [m]"), axis(1, "y [m]"));
+    chart.equal = true;
+    for (k, &i) in drawn(history).iter().enumerate() {
+        let look = Look::of(i, history.vehicles());
+        let points: Vec<_> = history.spans().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
+        let mark = |at: Option<&(f64, f64)>, marker, colour, label: &str| {
+            let label = (k == 0).then(|| label.to_owned());
+            at.map(|&at| Mark { at, marker, colour, radius: look.radius, text: look.number.clone(), label })
+        };
+        chart.marks.extend(mark(points.first(), Marker::Cross, look.start, "start"));
+        chart.marks.extend(mark(points.last(), Marker::Ring, look.end, "end"));
+        chart.lines.push(Line { points, stroke: look.path, label: None });
+    }
+    chart.figure("paths", title, &description(history, "from above"))
+}
+
+/// The vehicles whose paths are drawn.
+fn drawn(history: &RunHistory) -> Vec<usize> {
+    let count = history.vehicles();
+    if count <= MOST_PATHS {
+        return (0..count).collect();
+    }
+    let closest = history.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
+    let spread = (0..MOST_PATHS).map(|k| evenly(k, count));
+    let mut drawn: Vec<_> = spread.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
+    drawn.sort_unstable();
+    drawn.dedup();
+    drawn
+}
+
+/// How a vehicle is drawn.
+struct Look {
+    path: Stroke,
+    start: Colour,
+    end: Colour,
+    radius: f64,
+    number: Option<String>,
+}
+
+impl Look {
+    fn of(vehicle: usize, count: usize) -> Self {
+        if count <= FEW_VEHICLES {
+            let path = Stroke::of_line(vehicle);
+            let number = Some((vehicle + 1).to_string());
+            return Self { path, start: path.colour, end: path.colour, radius: 4.5, number };
+        }
+        let path = Stroke::solid(PALETTE[0], 0.8).faint(0.45);
+        let radius = if count <= 100 { 3.0 } else { 2.0 };
+        Self { path, start: SOFT_INK, end: PALETTE[1], radius, number: None }
+    }
+}
+
+fn description(history: &RunHistory, from: &str) -> String {
+    let (count, end_s) = (history.vehicles(), history.end_s());
+    let of_all = match drawn(history).len() {
+        drawn if drawn < count => format!("{drawn} of {count} vehicles, chosen evenly,"),
+        _ => format!("{count} vehicles"),
+    };
+    format!("Paths of {of_all} {from} over {end_s:.2} s; a cross marks each start and a ring each end.")
+}
+
+/// Angles of the view on a run in space \[rad\], and the height of the chart \[px\].
+const YAW: f64 = 0.6;
+const PITCH: f64 = 0.42;
+const HEIGHT: f64 = 330.0;
+/// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
+const BOX: Point = (340.0, 270.0);
+/// Least space between the ticks of an axis, and across between their numbers \[px\].
+const TICK_PX: f64 = 32.0;
+const BESIDE_PX: f64 = 4.0;
+
+/// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Which
+/// vehicles, marks and colours as in [`paths`].
+#[must_use]
+pub fn paths_in_space(history: &RunHistory, title: &str) -> Figure {
+    let view = View::of(history);
+    let mut canvas = Canvas::new((WIDTH, TITLE + HEIGHT), title, WIDTH / 2.0);
+    view.draw_axes(&mut canvas);
+    let lines = drawn(history).into_iter().map(|i| {
+        let look = Look::of(i, history.vehicles());
+        let places = history.spans().map(|span| row(&span.positions_m, i)).filter(|place| view.shows(place));
+        (look, places.map(|place| view.on_paper(place)).collect())
+    });
+    for (look, points) in thinned(lines.collect()) {
+        let (Some(&start), Some(&end)) = (points.first(), points.last()) else { continue };
+        canvas.line(&points, look.path);
+        for (marker, at, colour) in [(Marker::Cross, start, look.start), (Marker::Ring, end, look.end)] {
+            canvas.marker(marker, at, look.radius, colour);
+            if let Some(number) = &look.number {
+                canvas.text_beside(marker, at, number);
+            }
+        }
+    }
+    canvas.figure("paths-3d", &description(history, "in space"))
+}
+
+/// A box of axes, seen from above its edge where x is largest and y smallest.
+struct View {
+    axes: [Axis; 3],
+    /// Pixels of a metre.
+    unit: f64,
+}
+
+impl View {
+    fn of(history: &RunHistory) -> Self {
+        let spans = [(0, "x [m]"), (1, "y [m]"), (2, "z [m]")].map(|(axis, label)| {
+            let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
+            Axis::linear(label, [low, high], true)
+        });
+        let [across, deep, up] = spans.each_ref().map(|axis| axis.to - axis.from);
+        let seen_across = across * YAW.cos() + deep * YAW.sin();
+        let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
+        let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up);
+        // How much of a length along each axis is seen across: numbers beside each other must not meet.
+        let axes = [(0, YAW.cos()), (1, YAW.sin()), (2, 0.0)].map(|(k, across)| {
+            let Axis { label, from, to, .. } = &spans[k];
+            let spanning = |tick_px: f64| Axis::spanning(label, *from, *to, (unit * (to - from) / tick_px).max(1.0));
+            let axis = spanning(TICK_PX);
+            let wide_px = if across > 0.0 { (axis.labels_px() + BESIDE_PX) / across } else { 0.0 };
+            if wide_px > TICK_PX { spanning(wide_px) } else { axis }
+        });
+        Self { axes, unit }
+    }
+
+    fn shows(&self, place: &Vector3<f64>) -> bool {
+        self.axes.iter().zip(place.iter()).all(|(axis, &p)| axis.place(p).is_some())
+    }
+
+    /// Seen from afar: x to the right and nearer, y to the right and away, z up.
+    fn on_paper(&self, place: Vector3<f64>) -> Point {
+        let middle = Vector3::from(self.axes.each_ref().map(Axis::middle));
+        let [x, y, z] = (self.unit * (place - middle)).into();
+        let away = y * YAW.cos() - x * YAW.sin();
+        let (right, up) = (x * YAW.cos() + y * YAW.sin(), z * PITCH.cos() + away * PITCH.sin());
+        (WIDTH / 2.0 + right, TITLE + HEIGHT / 2.0 - up)
+    }
+
+    /// The floor and the two walls behind, with a grid, and the numbers along three edges.
+    fn draw_axes(&self, canvas: &mut Canvas) {
+        let [x, y, z] = &self.axes;
+        let at = |x, y, z| self.on_paper(Vector3::new(x, y, z));
+        let mut numbered = |axis: &Axis, line: &dyn Fn(f64) -> [Point; 3], (right, down), align| {
+            for &tick in &axis.ticks {
+                let line = line(tick);
+                canvas.line(&line, Stroke::solid(GRID, 0.8));
+                canvas.text((line[0].0 + right, line[0].1 + down), align, &axis.tick_label(tick));
+            }
+        };
+        let on_x = |tick| [at(tick, y.from, z.from), at(tick, y.to, z.from), at(tick, y.to, z.to)];
+        let on_y = |tick| [at(x.to, tick, z.from), at(x.from, tick, z.from), at(x.from, tick, z.to)];
+        let on_z = |tick| [at(x.from, y.from, tick), at(x.from, y.to, tick), at(x.to, y.to, tick)];
+        numbered(x, &on_x, (-8.0, 7.0), Align::CENTRE_ABOVE);
+        numbered(y, &on_y, (11.0, 8.0), Align::LEFT);
+        numbered(z, &on_z, (-7.0, 0.0), Align::RIGHT);
+        for (axis, [beside, ..], (right, down), align) in [
+            (x, on_x(x.middle()), (-8.0, 28.0), Align::RIGHT_ABOVE),
+            (y, on_y(y.middle()), ((15.0 + y.labels_px()).max(38.0), 26.0), Align::LEFT),
+            (z, on_z(z.to), (0.0, -12.0), Align::CENTRE_BELOW),
+        ] {
+            canvas.text((beside.0 + right, beside.1 + down), align, &axis.label);
+        }
+        let edges =
+            [at(x.from, y.from, z.to), at(x.from, y.from, z.from), at(x.to, y.from, z.from), at(x.to, y.to, z.from)];
+        canvas.line(&edges, Stroke::solid(SOFT_INK, 0.8));
+    }
+}

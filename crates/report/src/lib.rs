@@ -1,0 +1,15 @@
+//! Flights and audits as reports, figures and pages with a replay.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`run`] | a scenario, flown to its report |
+//! | [`report`] | `report.json`, `report.html` and the verdict in words |
+//! | [`figures`] | a run as charts in SVG |
+//! | [`replay`] | a flight packed into a page: positions on a grid, links, slots, obstacles and what the judge found |
+
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
+pub mod figures;
+pub mod replay;
+pub mod report;
+pub mod run;

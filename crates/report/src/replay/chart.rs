@@ -1,0 +1,107 @@
+//! The smallest distance over time as a chart, in a thousand parts of its width and a hundred of its height.
+
+use std::fmt::Write as _;
+
+use super::moment::{Kind, Moment};
+use tautline_audit::Slice;
+
+/// Width and height.
+const SIZE: [f64; 2] = [1000.0, 100.0];
+/// What a band is wider on either side, so that it is seen.
+const MARGIN: f64 = 1.5;
+
+/// Lines and bands of the chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Chart {
+    /// The smallest distance of each slice of time, as a path; nothing is drawn across a gap, and of a slice that is not whole a dot.
+    pub distance: String,
+    /// Height of the limit, from above.
+    pub limit: Option<f64>,
+    /// Bands of findings: from where to where, and whether it is a violation (or undecided). Those of a kind do not overlap.
+    pub bands: Vec<(f64, f64, bool)>,
+    /// Where the closest approach is.
+    pub closest: Option<[f64; 2]>,
+}
+
+impl Chart {
+    pub(super) fn of(near: &[Slice], moments: &[Moment], limit: Option<f64>, [first_s, last_s]: [f64; 2]) -> Self {
+        let x = |time_s: f64| ((time_s - first_s) / (last_s - first_s).max(1e-300)).clamp(0.0, 1.0) * SIZE[0];
+        let mut sorted: Vec<f64> = near.iter().map(|slice| slice.closest.certain_m()).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        // Nine tenths are seen, and the limit always.
+        let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(1.0);
+        let most = limit.map_or(usual, |limit| usual.clamp(2.0 * limit, 5.0 * limit)).max(1e-300);
+        let y = |distance: f64| SIZE[1] * (1.0 - 0.96 * (distance / most).clamp(0.0, 1.0));
+        let mut distance = String::new();
+        let mut end_s = f64::NEG_INFINITY;
+        for slice in near {
+            let ([from_s, to_s], height) = (slice.known_s(), y(slice.closest.certain_m()));
+            // Writing to a string cannot fail.
+            let _ = if from_s > end_s {
+                write!(distance, "M{:.1} {height:.1}", x(from_s))
+            } else {
+                write!(distance, "V{height:.1}")
+            };
+            let _ = write!(distance, "H{:.1}", x(to_s));
+            end_s = to_s;
+        }
+        let of_pairs = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());
+        let mut bands = Vec::new();
+        for violation in [false, true] {
+            let some =
+                moments.iter().filter(|of| of.kind != Kind::Closest && (of.kind == Kind::Violation) == violation);
+            let some = some.map(|of| (x(of.span.from_s) - MARGIN, x(of.span.to_s) + MARGIN));
+            bands.extend(joined(some.collect()).into_iter().map(|(from, to)| (from, to, violation)));
+        }
+        Self {
+            distance,
+            limit: limit.map(y),
+            bands,
+            closest: of_pairs.zip(sorted.first()).map(|(of, &least)| [x(of.span.at_s), y(least)]),
+        }
+    }
+}
+
+/// Stretches of which none touches another.
+fn joined(mut all: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut joined: Vec<(f64, f64)> = Vec::new();
+    for (from, to) in all {
+        match joined.last_mut() {
+            Some(last) if from <= last.1 => last.1 = last.1.max(to),
+            _ => joined.push((from, to)),
+        }
+    }
+    joined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::choice::Span;
+    use super::*;
+    use tautline_audit::{Approach, ObjectPair};
+    use tautline_core::swarm::Pair;
+
+    #[test]
+    fn bands_of_a_kind_do_not_overlap_and_the_line_stops_at_a_gap() {
+        let slice = |from_s: f64| {
+            let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+            let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
+            Slice { from_s, to_s: from_s + 1.0, closest, is_whole: true }
+        };
+        let moment = |kind: Kind, from_s: f64, to_s: f64| {
+            let span = Span { from_s, to_s, at_s: from_s };
+            Moment { kind, vehicles: Vec::new(), obstacle: None, span, brief: String::new(), said: String::new() }
+        };
+        let moments = [
+            moment(Kind::Violation, 4.0, 5.0),
+            moment(Kind::Violation, 1.0, 2.0),
+            moment(Kind::Violation, 1.5, 3.0),
+            moment(Kind::Unseen, 2.0, 4.0),
+        ];
+        let in_parts = Slice { to_s: 7.0, is_whole: false, ..slice(5.0) };
+        let chart = Chart::of(&[slice(0.0), slice(1.0), in_parts, slice(8.0)], &moments, None, [0.0, 10.0]);
+        assert_eq!(chart.bands, [(198.5, 401.5, false), (98.5, 301.5, true), (398.5, 501.5, true)]);
+        assert_eq!(chart.distance, "M0.0 4.0H100.0V4.0H200.0M500.0 4.0H500.0M800.0 4.0H900.0");
+    }
+}

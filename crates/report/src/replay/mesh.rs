@@ -1,0 +1,169 @@
+//! Obstacles and the ground as triangles and lines.
+
+use nalgebra::{Rotation3, Vector3};
+
+use tautline_audit::Shape;
+
+/// Parts of a turn, and of a quarter of one, of a capsule.
+const TURN: u32 = 24;
+const QUARTER: i32 = 4;
+/// Lines across a plane.
+const HATCHES: u32 = 8;
+/// Squares of the ground from the middle of the flight to its end, about.
+const SQUARES: f64 = 5.0;
+
+/// Triangles, each corner a place and a normal (none where light plays no part), and lines, each two places, from the place of
+/// the obstacle \[m\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Mesh {
+    pub(super) solid: Vec<Vector3<f64>>,
+    pub(super) rims: Vec<Vector3<f64>>,
+}
+
+impl Mesh {
+    /// That of an obstacle; a plane is drawn around its point below the middle of the flight, which is so far from the place
+    /// \[m\], and as far as the flight goes. A ball has none: it is drawn as the vehicles are.
+    pub(super) fn of(shape: &Shape, middle: Vector3<f64>, reach_m: f64) -> Self {
+        match *shape {
+            Shape::Ball { .. } => Self::default(),
+            Shape::Box { half_m, yaw_rad } => of_box(half_m, yaw_rad),
+            Shape::Capsule { from_m, to_m, radius_m } => of_capsule(from_m, to_m, radius_m),
+            Shape::HalfSpace { normal } => of_plane(normal.normalize(), middle, reach_m),
+        }
+    }
+}
+
+fn of_box(half_m: Vector3<f64>, yaw_rad: f64) -> Mesh {
+    let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+    let mut mesh = Mesh::default();
+    for side in 0..6 {
+        let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
+        let of = |k: usize, share: f64| turned * Vector3::ith(k % 3, half_m[k % 3] * share);
+        let (middle, u, v) = (of(axis, sign), of(axis + 1, 1.0), of(axis + 2, 1.0));
+        let normal = turned * Vector3::ith(axis, sign);
+        mesh.square(middle, u, v, normal);
+        for end in [-1.0, 1.0] {
+            mesh.rims.extend([middle + u * end - v, middle + u * end + v]);
+        }
+    }
+    mesh
+}
+
+fn of_plane(normal: Vector3<f64>, middle: Vector3<f64>, reach_m: f64) -> Mesh {
+    let foot = middle - normal * middle.dot(&normal);
+    let u = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize() * reach_m;
+    let v = normal.cross(&u);
+    let mut mesh = Mesh::default();
+    mesh.square(foot, u, v, Vector3::zeros());
+    for k in 0..=HATCHES {
+        let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
+        mesh.rims.extend([foot + u * share - v, foot + u * share + v, foot + v * share - u, foot + v * share + u]);
+    }
+    mesh
+}
+
+fn of_capsule(from_m: Vector3<f64>, to_m: Vector3<f64>, radius_m: f64) -> Mesh {
+    let along = (to_m - from_m).try_normalize(0.0).unwrap_or(Vector3::z());
+    let u = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+    let v = along.cross(&u);
+    let rings: Vec<_> =
+        (-QUARTER..=0).map(|lift| (from_m, lift)).chain((0..=QUARTER).map(|lift| (to_m, lift))).collect();
+    let corner = |(end, lift): (Vector3<f64>, i32), turn: u32| {
+        let (sin, cos) = (f64::from(lift) / f64::from(QUARTER) * std::f64::consts::FRAC_PI_2).sin_cos();
+        let (y, x) = (f64::from(turn % TURN) / f64::from(TURN) * std::f64::consts::TAU).sin_cos();
+        let normal = along * sin + (u * x + v * y) * cos;
+        [end + normal * radius_m, normal]
+    };
+    let mut mesh = Mesh::default();
+    for two in rings.windows(2) {
+        for turn in 0..TURN {
+            let [a, b] = [0, 1].map(|more| corner(two[0], turn + more));
+            let [c, d] = [0, 1].map(|more| corner(two[1], turn + more));
+            mesh.solid.extend([a, b, d, a, d, c].into_iter().flatten());
+        }
+    }
+    mesh
+}
+
+impl Mesh {
+    fn square(&mut self, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, normal: Vector3<f64>) {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        self.solid.extend(corners.into_iter().flat_map(|(s, t)| [middle + u * s + v * t, normal]));
+    }
+}
+
+/// Squares on the ground at a height \[m\], under everything between two corners \[m\]: their side, 1, 2 or 5 times a power of ten,
+/// and lines.
+pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, Vec<Vector3<f64>>) {
+    let rough = (0.5 * (high - low)).xy().amax() / SQUARES;
+    let mut ten = 1e-9;
+    while ten * 10.0 <= rough {
+        ten *= 10.0;
+    }
+    let side_m =
+        [1.0, 2.0, 5.0, 10.0].map(|times| times * ten).into_iter().find(|&side_m| side_m >= rough).unwrap_or(ten);
+    let from = (low / side_m).map(f64::floor).map(|cells| cells - 1.0);
+    let to = (high / side_m).map(f64::ceil).map(|cells| cells + 1.0);
+    let mut lines = Vec::new();
+    for (across, along) in [(0, 1), (1, 0)] {
+        let mut cell = from[across];
+        while cell <= to[across] {
+            for end in [from, to] {
+                let mut at = Vector3::new(0.0, 0.0, height_m);
+                (at[across], at[along]) = (cell * side_m, end[along] * side_m);
+                lines.push(at);
+            }
+            cell += 1.0;
+        }
+    }
+    (side_m, lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_corner_lies_on_the_surface_and_normals_point_out() {
+        let middle = Vector3::new(1.0, 2.0, 3.0);
+        let shapes = [
+            Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.4 },
+            Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.5), to_m: Vector3::new(2.0, 1.0, 0.0), radius_m: 0.7 },
+            Shape::Capsule { from_m: Vector3::zeros(), to_m: Vector3::zeros(), radius_m: 0.7 },
+            Shape::HalfSpace { normal: Vector3::new(0.0, 1.0, 2.0) },
+        ];
+        for shape in shapes {
+            let off = |at: &Vector3<f64>| match shape {
+                Shape::Box { half_m, yaw_rad } => {
+                    let at = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad) * at;
+                    at.zip_map(&half_m, |x, half| x.abs() - half).max()
+                }
+                Shape::Capsule { from_m, to_m, radius_m } => {
+                    let along = to_m - from_m;
+                    let share = ((at - from_m).dot(&along) / along.norm_squared().max(1e-300)).clamp(0.0, 1.0);
+                    (at - from_m - along * share).norm() - radius_m
+                }
+                Shape::HalfSpace { normal } => at.dot(&normal.normalize()),
+                Shape::Ball { .. } => f64::NAN,
+            };
+            let mesh = Mesh::of(&shape, middle, 10.0);
+            assert!(mesh.solid.len() >= 12 && mesh.solid.len().is_multiple_of(6), "whole triangles");
+            for corner in mesh.solid.chunks(2) {
+                assert!(off(&corner[0]).abs() < 1e-9, "{shape:?}: {}", corner[0]);
+                assert!(corner[1].norm() < 1e-9 || off(&(corner[0] + corner[1] * 0.01)) > 0.0099, "{shape:?}");
+            }
+            assert!(mesh.rims.iter().all(|at| off(at).abs() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn squares_lie_under_everything_and_are_neither_many_nor_few() {
+        for reach_m in [1e-3, 0.7, 3.0, 49.0, 1e6] {
+            let (low, high) = (Vector3::repeat(-reach_m), Vector3::new(reach_m, 0.5 * reach_m, 0.0));
+            let (side_m, lines) = ground(low, high, -1.0);
+            let most = lines.iter().fold(Vector3::repeat(f64::NEG_INFINITY), |most, at| most.sup(at));
+            assert!(most.x >= high.x && most.y >= high.y && lines.iter().all(|at| at.z == -1.0));
+            assert!((10..60).contains(&(lines.len() / 2)), "{side_m} m: {} lines", lines.len() / 2);
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! What a page holds of a flight: its limits, and what is never lost.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use nalgebra::Vector3;
+use serde_json::Value;
+
+use super::*;
+use tautline_audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
+use tautline_core::record::{OwnedSample, Sink as _};
+use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
+use tautline_sim::scenario::{Scenario, Source};
+
+const JUDGED: Judged = Judged { is_else_known: true, limit: Some(1.0), unit: "m" };
+
+fn stage(vehicles: usize) -> Stage {
+    Stage {
+        vehicles: (1..=vehicles).map(|number| number.to_string()).collect(),
+        radius_m: vec![Some(0.2); vehicles],
+        shell_m: Some([0.5; 3]),
+        plan: None,
+        obstacles: Vec::new(),
+    }
+}
+
+/// Vehicles on a line, 2 m apart, that fly 1 m/s, at 10 Hz.
+fn film(vehicles: usize, samples: usize) -> Film {
+    let mut film = Film::new();
+    for k in 0..samples {
+        let time_s = 0.1 * k as f64;
+        let mut positions_m = Rows::zeros(vehicles);
+        (0..vehicles).for_each(|i| set_row(&mut positions_m, i, Vector3::new(time_s, 2.0 * i as f64, 1.0)));
+        let pair = (vehicles > 1).then(|| Pair::new(0, 1));
+        film.take(time_s, &positions_m, pair.map(|pair| ClosestApproach { pair, separation_m: 2.0, time_s }));
+    }
+    film
+}
+
+fn violation(vehicle: usize, from_s: f64, to_s: f64) -> Moment {
+    let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+    Moment {
+        kind: Kind::Violation,
+        vehicles: vec![vehicle],
+        obstacle: None,
+        span,
+        brief: "near".to_owned(),
+        said: "too near".to_owned(),
+    }
+}
+
+fn packed(stage: &Stage, film: &Film, moments: &[Moment], room_bytes: usize) -> (Replay, Value) {
+    let replay = Replay::new(stage, film, moments, JUDGED, room_bytes).expect("a replay");
+    assert!(replay.json().len() <= room_bytes, "{} of {room_bytes} bytes", replay.json().len());
+    let data = serde_json::from_str(replay.json()).expect("JSON");
+    (replay, data)
+}
+
+fn doubles(data: &Value) -> Vec<f64> {
+    let bytes = BASE64.decode(data.as_str().expect("base64")).expect("base64");
+    bytes.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().expect("eight"))).collect()
+}
+
+#[test]
+fn a_short_flight_is_there_whole() {
+    let (replay, data) = packed(&stage(3), &film(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES);
+    assert_eq!((replay.instants(), replay.vehicles(), replay.moments()), ([100, 100], [3, 3], [1, 1]));
+    let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
+    assert_eq!(doubles(&data["times_s"]), times);
+    // The first slice is the first instant alone.
+    assert_eq!(doubles(&data["near_s"]), [&[0.0, 0.0][..], &times[1..99]].concat());
+    assert_eq!(data["nearest"], serde_json::json!([[0.0, "nearest so far 2.000 m, 1 and 2"]]));
+    let verdicts = data["verdicts"].as_array().expect("verdicts");
+    let said: Vec<_> = verdicts.iter().map(|told| (&told[1], told[2].as_str().expect("words"))).collect();
+    assert_eq!(
+        said,
+        [
+            (&Value::from(false), "no violation so far"),
+            (&Value::from(true), "violation: near"),
+            (&Value::from(false), "1 violation so far")
+        ]
+    );
+    assert_eq!((replay.inexact(), replay.unknown_radius(), replay.obstacles_off_m()), (0, None, 0.0));
+    assert_eq!(data["moments"][0]["who"], serde_json::json!([2]));
+    assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m()) && replay.rounding_m() < 1e-5);
+    assert_eq!(packed(&stage(3), &film(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES).0, replay, "the same bytes");
+}
+
+#[test]
+fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
+    let film = film(5, 40_000);
+    for room_bytes in [PAGE_BYTES, 60_000, 30_000] {
+        let (replay, data) = packed(&stage(5), &film, &[violation(3, 1234.5, 1236.0)], room_bytes);
+        let [kept, samples] = replay.instants();
+        assert!(samples == 40_000 && kept <= MOST_INSTANTS && kept > 150, "{kept} in {room_bytes}");
+        let times = doubles(&data["times_s"]);
+        let within = film.times_s.iter().filter(|&&time_s| (1234.4..1236.1).contains(&time_s));
+        assert!(within.clone().count() >= 16 && within.clone().all(|time_s| times.contains(time_s)));
+        assert_eq!((times.first(), times.last()), (film.times_s.first(), film.times_s.last()));
+    }
+    let none = Replay::new(&stage(5), &film, &[], JUDGED, 1000);
+    assert_eq!(none, Err(NoReplay::NoRoom { room_bytes: 1000 }));
+}
+
+#[test]
+fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
+    let vehicles = 100_000;
+    let (replay, data) = packed(&stage(vehicles), &film(vehicles, 3), &[violation(77_777, 0.1, 0.1)], PAGE_BYTES);
+    assert_eq!(replay.vehicles(), [MOST_VEHICLES, vehicles]);
+    let names = data["vehicles"].as_array().expect("names");
+    let at = names.iter().position(|name| name == "77778").expect("the one that violated");
+    assert_eq!(data["moments"][0]["who"], serde_json::json!([at]));
+    // The first of the two nearest is drawn, too; the second is among those left out.
+    assert!(names.iter().any(|name| name == "1") && names.iter().all(|name| name != "2"));
+}
+
+#[test]
+fn one_vehicle_one_sample_and_nobody() {
+    let (replay, data) = packed(&stage(1), &film(1, 1), &[], PAGE_BYTES);
+    assert_eq!((replay.instants(), doubles(&data["near_s"]).len()), ([1, 1], 0));
+    assert_eq!(Replay::new(&stage(2), &Film::new(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
+    let nowhere = Film::of(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Slices::default(), 1);
+    assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
+    let far = Film::of(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
+    let refused = Replay::new(&stage(1), &far, &[], JUDGED, PAGE_BYTES).expect_err("too far");
+    assert_eq!(refused.to_string(), "vehicle 1 is beyond 1e9 m at 0.5 s");
+}
+
+#[test]
+fn who_is_not_there_for_a_time_is_not_packed() {
+    let at = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0, x, 5.0, 0.0]);
+    let mut gone = at(1.0);
+    gone.row_mut(1).fill(f64::NAN);
+    let film = Film::of(vec![0.0, 1.0, 2.0], vec![at(0.0), gone, at(2.0)], Slices::default(), 3);
+    let (_, data) = packed(&stage(2), &film, &[], PAGE_BYTES);
+    let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
+    let along_x: Vec<_> = steps.chunks_exact(6).map(|step| i16::from_le_bytes([step[0], step[1]])).collect();
+    assert_eq!(along_x.iter().map(|&x| x == i16::MIN).collect::<Vec<_>>(), [false, false, false, true, false, false]);
+    assert_eq!(i32::from(along_x[5]), 2 * i32::from(along_x[2]), "from where it was last seen");
+}
+
+#[test]
+fn foreign_text_neither_ends_the_script_nor_fills_the_page() {
+    let mut hostile = stage(2);
+    hostile.vehicles = vec!["</script><script>alert(1)</script>".to_owned(), "ü".repeat(5_000_000)];
+    hostile.obstacles = vec![Obstacle {
+        name: "<!--".repeat(9000),
+        shape: Shape::Ball { radius_m: 1.0 },
+        clearance_m: None,
+        path: vec![(0.0, Vector3::zeros())],
+    }];
+    let said = "</SCRIPT>".repeat(100_000);
+    let moment = Moment { said, ..violation(0, 0.0, 0.1) };
+    let (replay, data) = packed(&hostile, &film(2, 10), &[moment], PAGE_BYTES);
+    assert!(!replay.json().contains('<') && replay.json().len() < 20_000);
+    assert_eq!(data["vehicles"][0], "</script><script>alert(1)</script>");
+    assert_eq!(data["vehicles"][1].as_str().map(|name| name.chars().count()), Some(41));
+}
+
+#[test]
+fn memory_is_bounded_while_a_flight_is_taken_and_its_violations_stay() {
+    let mut film = Film::new().within(200_000);
+    let control = Rows::zeros(0);
+    let pair = Pair::new(0, 1);
+    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]));
+    for k in 0..50_000_u32 {
+        let time_s = f64::from(k) / 100.0;
+        if k == 20_000 {
+            film.event(&tautline_core::record::Event::ViolationBegan { pair, time_s }).expect("taken");
+        }
+        if k == 20_050 {
+            film.event(&tautline_core::record::Event::ViolationEnded { pair, time_s, min_m: 0.5 }).expect("taken");
+        }
+        swarm.positions_m[(0, 1)] = time_s;
+        let sample = tautline_core::record::Sample::new(time_s, k.into(), &swarm, &control);
+        film.sample(&OwnedSample::from(&sample).as_sample()).expect("taken");
+    }
+    assert!(film.times_s.len() * 48 <= 200_000 && film.samples == 50_000, "{}", film.times_s.len());
+    let even = film.even();
+    let widest_s = even.windows(2).map(|two| film.times_s[two[1]] - film.times_s[two[0]]).fold(0.0, f64::max);
+    assert!(even.len() > 1000 && widest_s < 500.0 / 1000.0, "as dense everywhere: {} and {widest_s} s", even.len());
+    for k in 19_998..=20_052_u32 {
+        assert!(film.times_s.contains(&(f64::from(k) / 100.0)), "{k}");
+    }
+}
+
+#[test]
+fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
+    let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
+    let mut film = Film::new();
+    // Every vehicle in its slot, turned by a quarter and moved.
+    let slots_m = &scenario.legs[0].formation.slots_m;
+    let turned = Rows::from_fn(slots_m.nrows(), |i, axis| match axis {
+        0 => 3.0 - slots_m[(i, 1)],
+        1 => slots_m[(i, 0)],
+        _ => slots_m[(i, 2)],
+    });
+    film.take(0.0, &turned, None);
+    let (_, data) = packed(&Stage::of(&scenario, Vec::new()), &film, &[], PAGE_BYTES);
+    assert_eq!(
+        (data["axes"].as_u64(), data["points"].as_u64(), data["tension"].as_bool()),
+        (Some(5), Some(9), Some(true))
+    );
+    let bytes = |key: &Value| BASE64.decode(key.as_str().expect("base64")).expect("base64");
+    assert_eq!(bytes(&data["links"]).len(), 10 * 4, "every two");
+    let numbers: Vec<_> = bytes(&data["formations"][0]["slots"])
+        .chunks_exact(4)
+        .map(|bytes| f64::from(f32::from_le_bytes(bytes.try_into().expect("four"))))
+        .collect();
+    let number = |key: &str| data[key].as_f64().expect("a number");
+    let starts: Vec<_> = bytes(&data["starts"])
+        .chunks_exact(4)
+        .map(|bytes| f64::from(i32::from_le_bytes(bytes.try_into().expect("four"))) * number("cell_m"))
+        .collect();
+    let point = |k: usize| Vector3::from_column_slice(&starts[3 * k..3 * k + 3]);
+    for vehicle in 0..5 {
+        let along = |axis: usize| (point(6 + axis) - point(5)) * numbers[3 * vehicle + axis] / number("axis_m");
+        let slot = point(5) + along(0) + along(1) + along(2);
+        assert!((slot - point(vehicle)).norm() < 1e-5, "{vehicle}: {slot} and {}", point(vehicle));
+    }
+}
+
+/// Two instants of vehicles on a line, 2 m apart.
+fn two_instants(vehicles: usize) -> Film {
+    let at = |x: f64| Rows::from_fn(vehicles, |i, axis| if axis == 0 { x + 2.0 * i as f64 } else { 0.0 });
+    Film::of(vec![0.0, 10.0], vec![at(0.0), at(1.0)], Slices::default(), 2)
+}
+
+#[test]
+fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
+    let gaps = vec![(1, [3.0, 5.0]), (1, [6.0, 7.0]), (7, [1.0, 2.0]), (2, [4.0, 11.0])];
+    let (_, data) = packed(&stage(3), &two_instants(3).with_gaps(gaps), &[], PAGE_BYTES);
+    let bytes = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64");
+    assert_eq!(bytes, [1, 0, 1, 0], "at instant 1 vehicle 1");
+    assert_eq!(data["holds"], false);
+    // Where there is no room for that, it is not there.
+    let many = (0..200).map(|vehicle| (vehicle, [3.0, 5.0])).collect();
+    let (_, data) = packed(&stage(200), &two_instants(200).with_gaps(many), &[], 15_000);
+    let breaks = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64").len() / 4;
+    let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
+    let absent = steps.chunks_exact(6).filter(|step| step[..2] == i16::MIN.to_le_bytes()).count();
+    assert!(absent > 0 && breaks + absent == data["vehicles"].as_array().map_or(0, Vec::len), "{breaks} and {absent}");
+}
+
+#[test]
+fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
+    let vehicles = 1000;
+    let mut film = Film::new();
+    for k in 0..600_u32 {
+        let at = Rows::from_fn(vehicles, |i, axis| if axis == 0 { f64::from(k) * 0.01 } else { 3.0 * i as f64 });
+        film.take(f64::from(k), &at, None);
+    }
+    let moments: Vec<_> = (0..150).map(|k| violation(k, 4.0 * k as f64 - 3.0, 4.0 * k as f64 + 3.0)).collect();
+    let (replay, data) = packed(&stage(vehicles), &film, &moments, PAGE_BYTES);
+    let times = doubles(&data["times_s"]);
+    let missing = moments.iter().filter(|of| !times.contains(&of.span.at_s.max(0.0))).count();
+    assert_eq!((missing, replay.inexact()), (0, 0), "{:?} and {:?}", replay.instants(), replay.vehicles());
+    // Those that are not listed have theirs as long as there is room, and where there is none it is said.
+    let at = |k: u32| 0.2 * f64::from(k);
+    let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
+    let longer = self::film(2, 4000);
+    let (replay, data) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
+    assert_eq!((replay.moments(), replay.inexact()), ([200, 300], 0), "{:?}", replay.instants());
+    let alarms = data["verdicts"].as_array().expect("verdicts").iter().filter(|told| told[1] == true);
+    let named: Vec<_> = alarms.map(|told| told[3].as_array().map_or(0, Vec::len)).collect();
+    assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "those that are not listed are said with who they are");
+    let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
+    assert!(replay.inexact() > 0, "{:?}", replay.instants());
+}
+
+#[test]
+fn of_those_that_were_not_asked_for_nobody_is_drawn() {
+    let mut at = Rows::repeat(5000, f64::NAN);
+    for k in [7, 4321] {
+        set_row(&mut at, k, Vector3::zeros());
+    }
+    let film = Film::of(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
+    let (replay, data) = packed(&stage(5000), &film, &[], PAGE_BYTES);
+    assert_eq!((replay.vehicles(), &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
+}
+
+#[test]
+fn far_from_others_drawing_is_precise_where_the_weightiest_finding_is() {
+    let at = |x: f64| Rows::from_row_slice(&[5e5 + x, 4e6, 0.0, 5e5, 4e6, 0.0, 0.0, 0.0, 0.0]);
+    let film = Film::of(vec![0.0, 1.0], vec![at(1.0), at(0.35)], Slices::default(), 2);
+    let (replay, data) = packed(&stage(3), &film, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
+    let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(data[key].clone()).expect("numbers");
+    assert_eq!(numbers("origin_m"), [5e5 + 0.35, 4e6, 0.0]);
+    assert!(replay.rounding_m() > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m());
+    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m() < 1e-3);
+}
+
+#[test]
+fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
+    let unknown = |half_m: f64| Stage { radius_m: vec![None, Some(0.3)], shell_m: Some([half_m; 3]), ..stage(2) };
+    for (half_m, drawn_m) in [(0.025, 0.025), (1.0, 0.1)] {
+        let (replay, data) = packed(&unknown(half_m), &two_instants(2), &[], PAGE_BYTES);
+        assert_eq!(data["radius_m"], serde_json::json!([drawn_m, 0.3]));
+        assert_eq!(replay.unknown_radius(), Some((1, drawn_m)));
+    }
+}
+
+#[test]
+fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
+    let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+    let slice = |from_s: f64, to_s: f64| {
+        let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };
+        Slice { from_s, to_s, closest, is_whole: true }
+    };
+    let mut near = Slices::default();
+    for slice in [slice(0.0, 3.0), slice(5.0, 10.0)] {
+        near.take(slice);
+    }
+    let mut film = two_instants(2);
+    film.nearest = near;
+    let (_, data) = packed(&stage(2), &film, &[violation(0, -5.0, 50.0)], PAGE_BYTES);
+    let moment = &data["moments"][0];
+    assert_eq!((&moment["from_s"], &moment["to_s"]), (&Value::from(0.0), &Value::from(10.0)));
+    assert_eq!(doubles(&data["near_s"]), [0.0, 3.0_f64.next_up(), 5.0]);
+    let who = BASE64.decode(data["near_who"].as_str().expect("base64")).expect("base64");
+    assert_eq!(who, [0, 0, 1, 0, 255, 255, 255, 255, 0, 0, 1, 0]);
+}

@@ -1,0 +1,110 @@
+//! The legs of a flight, one after the other.
+
+use maud::Markup;
+use serde::{Deserialize, Serialize};
+
+use super::findings::{Findings, finite};
+use super::page;
+use tautline_core::text::{at_least, seconds};
+use tautline_sim::metrics::LegSummary;
+
+/// One formation of several that were flown to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LegNumbers {
+    /// Its number, from 1.
+    pub leg: usize,
+    /// When it began \[s\]; null where it never did.
+    pub from_s: Option<f64>,
+    /// When the next one began, or the flight ended \[s\].
+    pub to_s: Option<f64>,
+    /// When its formation was reached and kept to the end of the leg \[s\].
+    pub reached_at_s: Option<f64>,
+    /// No pair comes closer than this on it, as certified before the first step, and anew wherever slots were spread \[m\].
+    pub certified_m: Option<f64>,
+    /// Nor is the energy larger than this \[m^2/s^2\].
+    pub energy_bound: Option<f64>,
+}
+
+/// Of a flight of several legs; none for a flight of one.
+pub(super) fn legs(findings: &Findings<'_>) -> Vec<LegNumbers> {
+    let (ended, last) = (findings.ended_legs, findings.ended_legs.len());
+    if findings.legs < 2 {
+        return Vec::new();
+    }
+    let number = |leg: usize| {
+        let began = |leg: usize| leg.checked_sub(1).map_or(Some(0.0), |before| Some(ended.get(before)?.ended_at_s));
+        let LegSummary { ended_at_s, reached_at_s } = ended.get(leg).copied().unwrap_or(LegSummary {
+            ended_at_s: findings.run.duration_s,
+            reached_at_s: findings.reached_at_s().filter(|_| leg == last),
+        });
+        let bound = findings.certificate.legs.get(leg);
+        LegNumbers {
+            leg: leg + 1,
+            from_s: began(leg).filter(|_| leg <= last),
+            to_s: Some(ended_at_s).filter(|_| leg <= last),
+            reached_at_s,
+            certified_m: bound.and_then(|bound| bound.certified_m).and_then(finite),
+            energy_bound: bound.and_then(|bound| finite(bound.energy)),
+        }
+    };
+    (0..findings.legs).map(number).collect()
+}
+
+/// Legs before the last that were not reached, or that never began.
+pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
+    let (last, before) = legs.split_last()?;
+    let missed: Vec<_> = before.iter().filter(|leg| leg.from_s.is_some() && leg.reached_at_s.is_none()).collect();
+    let never = legs.iter().find(|leg| leg.from_s.is_none());
+    let missed = missed.first().filter(|leg| leg.leg < last.leg).and_then(|leg| {
+        let next_began = legs.get(leg.leg).is_some_and(|next| next.from_s.is_some());
+        next_began.then(|| {
+            let at = leg.to_s.map(seconds).unwrap_or_default();
+            format!("Leg {} was not reached before leg {} began at {at}.", leg.leg, leg.leg + 1)
+        })
+    });
+    let never = never.map(|leg| {
+        let before = &legs[leg.leg - 2];
+        let why = match before.reached_at_s {
+            Some(_) => "the flight ended before".to_owned(),
+            None => format!("leg {} was not reached", before.leg),
+        };
+        format!("Leg {} never began: {why}.", leg.leg)
+    });
+    let said: Vec<_> = missed.into_iter().chain(never).collect();
+    (!said.is_empty()).then(|| said.join(" "))
+}
+
+/// How many of them were reached, in a few words; none for a flight of one leg.
+pub(super) fn brief(legs: &[LegNumbers]) -> Option<String> {
+    let reached = legs.iter().filter(|leg| leg.reached_at_s.is_some()).count();
+    (!legs.is_empty()).then(|| format!("{reached} of {} legs reached", legs.len()))
+}
+
+/// A line each: when it began and was reached, and what was certified.
+pub(super) fn lines(legs: &[LegNumbers]) -> Vec<(String, String)> {
+    let line = |leg: &LegNumbers| {
+        let said = match (leg.from_s, leg.reached_at_s) {
+            (None, _) => "never began".to_owned(),
+            (Some(from_s), Some(at_s)) => format!("from {}, reached at {}", seconds(from_s), seconds(at_s)),
+            (Some(from_s), None) => format!("from {}, not reached", seconds(from_s)),
+        };
+        let certified = leg.certified_m.map(|certified_m| format!(", certified {} m", at_least(certified_m, 6)));
+        (format!("leg {}", leg.leg), said + &certified.unwrap_or_default())
+    };
+    legs.iter().map(line).collect()
+}
+
+pub(super) fn table(legs: &[LegNumbers]) -> Markup {
+    let dash = || "-".to_owned();
+    let row = |leg: &LegNumbers| {
+        vec![
+            leg.leg.to_string(),
+            leg.from_s.map_or_else(dash, seconds),
+            leg.reached_at_s.map_or_else(|| "not reached".to_owned(), seconds),
+            leg.to_s.map_or_else(dash, seconds),
+            leg.certified_m.map_or_else(dash, |certified_m| format!("{} m", at_least(certified_m, 6))),
+        ]
+    };
+    let heads = ["Leg", "Began", "Reached", "Ended", "Certified distance"];
+    page::numbers("Legs, one after the other", &heads, legs.iter().map(row))
+}

@@ -1,0 +1,216 @@
+//! How vehicles kept clear of obstacles.
+
+use maud::{Markup, html};
+use serde::{Deserialize, Serialize};
+
+use super::energy::INTEGRATION;
+use super::findings::{Findings, finite};
+use super::page;
+use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
+use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
+
+/// Violations that a page lists.
+const LISTED: usize = 50;
+
+/// The judge's findings on a flight past obstacles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Obstacles {
+    /// The verdict on them alone; that of `audit` holds it too. Undecided at best where the flight ended early.
+    pub status: Status,
+    /// Every vehicle keeps this much beyond the clearance of every obstacle, by the law's certificate \[m\].
+    pub certified_room_m: Option<f64>,
+    /// The closest approaches of different vehicles and obstacles, at most ten, closest first.
+    pub closest: Vec<ObstacleApproach>,
+    /// Every time that a vehicle was nearer to an obstacle than its clearance.
+    pub violations: Vec<ObstacleViolation>,
+    /// Times at which it cannot be told.
+    pub undecided: u64,
+    /// Distances measured again by parry that contradict the closed form.
+    pub disagreements: u64,
+}
+
+/// The closest that a vehicle came to an obstacle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObstacleApproach {
+    /// The vehicle.
+    pub vehicle: usize,
+    /// Name of the obstacle.
+    pub obstacle: String,
+    /// Distance that the vehicle's centre must keep from its surface \[m\].
+    pub clearance_m: f64,
+    /// Smallest distance, below zero within \[m\].
+    pub min_m: f64,
+    /// When \[s\].
+    pub min_at_s: f64,
+}
+
+/// A time during which a vehicle was nearer to an obstacle than its clearance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObstacleViolation {
+    /// Who and where, at the closest.
+    #[serde(flatten)]
+    pub approach: ObstacleApproach,
+    /// When it began \[s\].
+    pub from_s: f64,
+    /// When it ended, or the end of the run \[s\].
+    pub to_s: f64,
+}
+
+impl Obstacles {
+    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
+        let (outcome, names) = (findings.clearance?, findings.obstacles);
+        let approach = |pair: ObjectPair, clearance_m: f64, min_m: f64, min_at_s: f64| match pair {
+            ObjectPair::Obstacle { vehicle, obstacle } => Some(ObstacleApproach {
+                vehicle: vehicle + 1,
+                obstacle: names.get(obstacle).cloned().unwrap_or_default(),
+                clearance_m,
+                min_m,
+                min_at_s,
+            }),
+            ObjectPair::Vehicles(_) => None,
+        };
+        let ClearanceOutcome { status, closest, violations, undecided, unresolved, parry, refused } = outcome;
+        let of_violation = |found: &Violation<ObjectPair>| {
+            let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
+            Some(ObstacleViolation { approach: approach(pair, limit_m, min_m, min_at_s)?, from_s, to_s })
+        };
+        let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
+        Some(Self {
+            status: if findings.run.ended_early.is_some() { status.and(Status::Undecided) } else { *status },
+            certified_room_m: findings.certificate.certified_room_m.and_then(finite),
+            closest: closest.iter().filter_map(of_closest).collect(),
+            violations: violations.iter().filter_map(of_violation).collect(),
+            undecided: undecided.len() as u64 + unresolved + refused,
+            disagreements: parry.disagreements,
+        })
+    }
+
+    /// The deepest violation.
+    fn deepest(&self) -> Option<&ObstacleApproach> {
+        let room = |approach: &ObstacleApproach| approach.min_m - approach.clearance_m;
+        let approaches = self.violations.iter().map(|violation| &violation.approach);
+        approaches.min_by(|a, b| room(a).total_cmp(&room(b)))
+    }
+
+    /// The least that anybody had beyond a clearance \[m\], and where.
+    fn tightest(&self) -> Option<(f64, &ObstacleApproach)> {
+        let rooms = self.closest.iter().map(|approach| (approach.min_m - approach.clearance_m, approach));
+        rooms.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// What happened, in a few words, for a headline.
+    pub(super) fn brief(&self) -> Option<String> {
+        self.deepest().map(ObstacleApproach::brief)
+    }
+
+    /// How much room there was, in a few words, for a headline.
+    pub(super) fn room(&self) -> Option<String> {
+        self.tightest().map(|(room_m, _)| format!("{} m beyond every obstacle's clearance", at_least(room_m, 3)))
+    }
+
+    /// Every reason that they give against a pass, a sentence.
+    pub(super) fn reason(&self) -> Option<String> {
+        let violation = self.deepest().filter(|_| self.status == Status::Violation).map(|deepest| {
+            let others = match self.violations.len() - 1 {
+                0 => String::new(),
+                1 => " There is 1 more such time.".to_owned(),
+                n => format!(" There are {n} more such times."),
+            };
+            format!("A vehicle came too near to an obstacle: {}.{others}", deepest.brief())
+        });
+        let broken = self.tightest().filter(|_| violation.is_none()).and_then(|(room_m, tightest)| {
+            let certified_m = self.certified_room_m?;
+            (room_m < certified_m * (1.0 - INTEGRATION)).then(|| {
+                format!(
+                    "The law certifies {} m beyond every clearance in continuous time, and {}: what was flown is not the \
+                     motion that the proof is about. Shorten time.dt_s.",
+                    metres(certified_m),
+                    tightest.brief()
+                )
+            })
+        });
+        let disagree = (self.disagreements > 0).then(|| {
+            let times = counted(self.disagreements, "time", "times");
+            format!("The two detectors disagree {times} on the distance from an obstacle, so one of them is wrong.")
+        });
+        let open = (self.status == Status::Undecided && self.disagreements == 0).then(|| match self.deepest() {
+            Some(deepest) => format!(
+                "The step cannot resolve whether the clearance of obstacles is kept: as flown, {}, and after steps that are too \
+                 long for the law integration may err by more than that.",
+                deepest.brief()
+            ),
+            None => "It cannot be told whether every vehicle kept clear of the obstacles.".to_owned(),
+        });
+        violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
+    }
+
+    /// The closest approaches, with what is certified, and the violations, for a page.
+    pub(super) fn table(&self) -> Markup {
+        let cells = |approach: &ObstacleApproach| {
+            let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = approach;
+            [vehicle.to_string(), obstacle.clone(), metres(*clearance_m), shown(*min_m), seconds(*min_at_s)]
+        };
+        let certified = match self.certified_room_m {
+            Some(room_m) => format!("certified {} m beyond every clearance", at_least(room_m, 6)),
+            None => "nothing is certified".to_owned(),
+        };
+        let violations = self.violations.iter().take(LISTED);
+        html! {
+            (page::numbers(
+                &format!("The closest that vehicles came to obstacles; {certified}"),
+                &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At"],
+                self.closest.iter().map(cells),
+            ))
+            @if !self.violations.is_empty() {
+                (page::numbers(
+                    "Times that a vehicle was nearer to an obstacle than its clearance",
+                    &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At", "From", "To"],
+                    violations.map(|violation| {
+                        let [vehicle, obstacle, clearance, min, at] = cells(&violation.approach);
+                        [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
+                    }),
+                ))
+                @if let Some(more @ 1..) = self.violations.len().checked_sub(LISTED) {
+                    p { (more) " more are in report.json." }
+                }
+            }
+        }
+    }
+
+    /// One line of a table.
+    pub(super) fn line(&self) -> String {
+        let closest = self.tightest().map_or("-".to_owned(), |(_, tightest)| {
+            let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = tightest;
+            let at = seconds(*min_at_s);
+            format!(
+                "{} m at {at}, vehicle {vehicle} from `{obstacle}` (clearance {} m",
+                shown(*min_m),
+                metres(*clearance_m)
+            )
+        });
+        let certified = match self.certified_room_m {
+            Some(room_m) => format!("certified {} m beyond it", at_least(room_m, 6)),
+            None => "not certified".to_owned(),
+        };
+        let violations = counted(self.violations.len() as u64, "violation", "violations");
+        format!("{closest}, {certified}); {violations}")
+    }
+}
+
+impl ObstacleApproach {
+    fn brief(&self) -> String {
+        let Self { vehicle, obstacle, clearance_m, min_m, min_at_s } = self;
+        let (clearance, at) = (metres(*clearance_m), seconds(*min_at_s));
+        if *min_m < 0.0 {
+            let deep = metres(-min_m);
+            return format!("vehicle {vehicle} was {deep} m inside `{obstacle}` at {at} (clearance {clearance} m)");
+        }
+        let near = metres_below(*min_m, *clearance_m);
+        format!("vehicle {vehicle} came to {near} m from `{obstacle}` at {at} (clearance {clearance} m)")
+    }
+}
+
+/// A distance that is not larger than what was found.
+fn shown(distance_m: f64) -> String {
+    if distance_m < 0.0 { metres(distance_m) } else { at_least(distance_m, 6) }
+}

@@ -1,0 +1,153 @@
+//! A flight that is replayed within a page.
+
+use std::sync::LazyLock;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use maud::{Markup, PreEscaped, html};
+use sha2::{Digest as _, Sha256};
+
+use crate::replay::{Chart, Replay};
+use tautline_core::text::{counted, metres};
+
+/// How they look.
+pub(super) const STYLE: &str = include_str!("replay.css");
+
+/// The script that draws replays, and the shaders that it draws with, without comments and indentation.
+static SCRIPT: LazyLock<String> = LazyLock::new(|| without_comments(include_str!("../../../../../assets/replay.js")));
+static SHADERS: LazyLock<String> =
+    LazyLock::new(|| without_comments(include_str!("../../../../../shaders/replay.glsl")));
+
+/// What lets that script run, and no other.
+pub(super) fn script_source() -> String {
+    format!("script-src 'sha256-{}'", BASE64.encode(Sha256::digest(&*SCRIPT)))
+}
+
+/// The script and its shaders, which are data, at the end of a page.
+pub(super) fn script() -> Markup {
+    html! {
+        script type="x-shader" { (PreEscaped(&*SHADERS)) }
+        script { (PreEscaped(&*SCRIPT)) }
+    }
+}
+
+/// A source without comments and indentation: lines that begin with `//`, and everything from `/**` to `*/`.
+fn without_comments(source: &str) -> String {
+    let mut code = String::new();
+    for (k, part) in source.split("/**").enumerate() {
+        let rest =
+            if k == 0 { Some(part) } else { part.split_once("*/").map(|(_, rest)| rest.trim_start_matches(' ')) };
+        code += rest.unwrap_or_default();
+    }
+    let lines = code.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+    lines.flat_map(|line| [line, "\n"]).collect()
+}
+
+/// When a replay begins to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// With the page.
+    AtOnce,
+    /// When it is asked for; another of the page that draws ends then.
+    OnDemand,
+}
+
+/// A replay with a name for those who cannot see it. The page is to be rendered with
+/// [`render_with_replays`](super::Page::render_with_replays).
+#[must_use]
+pub fn replay(label: &str, replay: &Replay, start: Start) -> Markup {
+    let on_demand = start == Start::OnDemand;
+    html! {
+        div.replay data-label=(label) data-start=[on_demand.then_some("later")] {
+            script type="application/json" { (PreEscaped(replay.json())) }
+            noscript { p { "The replay needs JavaScript, which is switched off. Pictures and figures are below." } }
+            (chart(replay.chart()))
+            p.replay-note { (note(replay)) }
+        }
+    }
+}
+
+/// The smallest distance over time, which the script puts along its slider.
+fn chart(chart: &Chart) -> Markup {
+    let band = |&(from, to, violation): &(f64, f64, bool)| {
+        html! {
+            rect.replay-violation[violation].replay-undecided[!violation] x={ (format!("{:.1}", from - 1.5)) } y="0"
+                width={ (format!("{:.1}", to - from + 3.0)) } height="100" {}
+        }
+    };
+    html! {
+        svg.replay-graph viewBox="0 0 1000 100" preserveAspectRatio="none" role="img"
+            aria-label="Smallest distance of any two over time, with its limit" {
+            @for found in &chart.bands { (band(found)) }
+            @if let Some(height) = chart.limit {
+                line.replay-limit x1="0" x2="1000" y1=(format!("{height:.1}")) y2=(format!("{height:.1}")) {}
+            }
+            @if !chart.distance.is_empty() { path d=(chart.distance) {} }
+            @if let Some([x, y]) = chart.closest {
+                path.replay-closest d=(format!("M{x:.1} {y:.1}h0.01")) {}
+            }
+        }
+    }
+}
+
+/// Why there is none.
+#[must_use]
+pub fn no_replay(why: &str) -> Markup {
+    html! { p { "There is no replay: " (why) "." } }
+}
+
+/// What of it is true and what is for the eye.
+fn note(replay: &Replay) -> String {
+    let [kept, samples] = replay.instants();
+    let of_all = if kept < samples { format!(" of {samples}") } else { String::new() };
+    let motion = match (replay.holds(), samples) {
+        (_, 0 | 1) => "of one instant".to_owned(),
+        (true, _) => format!("at rest between {kept} instants{of_all}"),
+        (false, _) => format!("drawn straight between {kept} instants{of_all}"),
+    };
+    let some = |[shown, all]: [usize; 2], what: &str| {
+        if shown < all { format!("{shown} of {all} {what} are here. ") } else { String::new() }
+    };
+    let said = [
+        format!(
+            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are the judge's. ",
+            metres(replay.rounding_m())
+        ),
+        some(replay.vehicles(), "vehicles"),
+        some(replay.moments(), "findings"),
+        match replay.inexact() {
+            0 => String::new(),
+            count => format!(
+                "The very instant of {} is not drawn, or not all of whom it is on. ",
+                counted(count as u64, "finding", "findings")
+            ),
+        },
+        replay.unknown_radius().map_or(String::new(), |(count, radius_m)| {
+            format!("The size of {} is made up, {} m. ", counted(count as u64, "vehicle", "vehicles"), metres(radius_m))
+        }),
+        if replay.obstacles_off_m() > 0.0 {
+            format!("Moving obstacles are drawn at most {} m off their ways. ", metres(replay.obstacles_off_m()))
+        } else {
+            String::new()
+        },
+    ];
+    said.concat() + "Everything is in this page: nothing is loaded."
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_and_indentation_go_and_code_stays() {
+        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n/** two\n lines */ c();\n";
+        assert_eq!(without_comments(source), "const a = ((b)) => \"a // b\";\nc();\n");
+    }
+
+    #[test]
+    fn script_and_shaders_stay_below_30_kilobytes() {
+        assert!(SCRIPT.len() + SHADERS.len() < 30_000, "{} and {}", SCRIPT.len(), SHADERS.len());
+        assert!(SCRIPT.len() > 10_000 && SHADERS.starts_with("@ COMMON"));
+        assert!(!SCRIPT.contains("</script") && !SHADERS.contains("</script"));
+    }
+}

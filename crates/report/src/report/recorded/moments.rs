@@ -1,0 +1,127 @@
+//! What a replay of a recording jumps to, and what it says over time.
+
+use super::named::{OfPair, OfVehicle};
+use super::report::RecordedReport;
+use super::words::interval;
+use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
+use tautline_audit::envelope::Exceeding;
+use tautline_audit::recorded::{Approach, Gap, ObjectPair};
+use tautline_audit::{Undecided, Violation};
+use tautline_core::text::{exact, metres_below};
+
+impl RecordedReport {
+    /// The closest approach, every violation, every time that cannot be decided and every gap, the weightiest first, with the
+    /// judge's distances and times.
+    #[must_use]
+    pub fn moments(&self) -> Vec<Moment> {
+        let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
+        let mut violations: Vec<_> = self.violations.iter().map(OfPair::short).collect();
+        violations.sort_by(|a, b| over(&a.finding).total_cmp(&over(&b.finding)));
+        let closest = self.closest.first().or(self.obstacles.closest.first());
+        let closest = closest.map(|of| self.closest_moment(&of.short()));
+        let violations = violations.iter().map(|of| self.violation(of));
+        let undecided = self.undecided.iter().map(|of| undecided(&of.short()));
+        let gaps = self.gaps.iter().map(|of| unseen(&of.short()));
+        let of_limits = self.moments_of_limits();
+        let (beyond, open): (Vec<_>, Vec<_>) = of_limits.into_iter().partition(|of| of.kind == Kind::Violation);
+        closest.into_iter().chain(violations).chain(beyond).chain(undecided).chain(open).chain(gaps).collect()
+    }
+
+    /// What is known of all, and what distances of two vehicles are held against.
+    #[must_use]
+    pub fn judgement(&self) -> Judged {
+        let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
+        Judged { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
+    }
+
+    fn closest_moment(&self, OfPair { who: [first, second], finding }: &OfPair<Approach>) -> Moment {
+        let &Approach { pair, lower_m, upper_m, time_s, .. } = finding;
+        let (apart, unit) = (interval(lower_m, upper_m), self.judgement().unit);
+        let said = format!("Closest approach: {apart} {unit}, {first} and {second} at {time_s:.3} s");
+        let span = Span { from_s: time_s, to_s: time_s, at_s: time_s };
+        moment(Kind::Closest, pair, span, [String::new(), said])
+    }
+
+    fn violation(&self, of: &OfPair<Violation<ObjectPair>>) -> Moment {
+        let Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = of.finding;
+        let ([first, second], unit) = (&of.who, self.judgement().unit);
+        let (least, limit) = (metres_below(min_m, limit_m), exact(limit_m));
+        let brief = format!("{first} and {second} come to {least} {unit} (limit {limit})");
+        let span = Span { from_s, to_s, at_s: min_at_s };
+        moment(Kind::Violation, pair, span, [brief, format!("Violation: {}", of.words())])
+    }
+
+    fn moments_of_limits(&self) -> Vec<Moment> {
+        let of_limit = |limit: &super::envelope::OfLimit| {
+            let named = |kind: Kind| {
+                move |of: &OfVehicle<Exceeding>| {
+                    let (of, Exceeding { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
+                    let (brief, said) = (limit.in_short(&of), limit.in_words(&of, kind == Kind::Violation));
+                    Moment {
+                        kind,
+                        vehicles: vec![vehicle],
+                        obstacle: None,
+                        span: Span { from_s, to_s, at_s },
+                        brief,
+                        said,
+                    }
+                }
+            };
+            let violations = limit.violations.iter().map(named(Kind::Violation));
+            violations.chain(limit.undecided.iter().map(named(Kind::Undecided))).collect::<Vec<_>>()
+        };
+        self.limits.iter().flat_map(of_limit).collect()
+    }
+}
+
+fn undecided(of: &OfPair<Undecided<ObjectPair>>) -> Moment {
+    let Undecided { pair, from_s, to_s, .. } = of.finding;
+    let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+    let brief = format!("{} and {} may come too near", of.who[0], of.who[1]);
+    moment(Kind::Undecided, pair, span, [brief, format!("Undecided: {}", of.words())])
+}
+
+fn unseen(of: &OfVehicle<Gap>) -> Moment {
+    let Gap { vehicle, from_s, to_s, .. } = of.finding;
+    let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+    let (brief, said) = (format!("{} is not seen", of.vehicle), format!("Undecided: {}", of.words()));
+    Moment { kind: Kind::Unseen, vehicles: vec![vehicle], obstacle: None, span, brief, said }
+}
+
+fn moment(kind: Kind, pair: ObjectPair, span: Span, [brief, said]: [String; 2]) -> Moment {
+    let (vehicles, obstacle) = match pair {
+        ObjectPair::Vehicles(pair) => (vec![pair.first(), pair.second()], None),
+        ObjectPair::Obstacle { vehicle, obstacle } => (vec![vehicle], Some(obstacle)),
+    };
+    Moment { kind, vehicles, obstacle, span, brief, said }
+}
+
+impl<T: Clone> OfPair<T> {
+    /// With names that are no longer than a replay shows.
+    fn short(&self) -> Self {
+        Self { who: self.who.each_ref().map(|name| cut(name, LONGEST_NAME)), finding: self.finding.clone() }
+    }
+}
+
+impl<T: Clone> OfVehicle<T> {
+    fn short(&self) -> Self {
+        Self { vehicle: cut(&self.vehicle, LONGEST_NAME), finding: self.finding.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_core::swarm::Pair;
+    use tautline_core::text::in_order;
+
+    #[test]
+    fn a_long_name_costs_no_distance_and_no_time_and_none_turns_what_follows() {
+        let pair = ObjectPair::Vehicles(Pair::new(0, 1));
+        let finding = Violation { pair, from_s: 1.0, to_s: 2.0, min_m: 0.25, min_at_s: 1.5, limit_m: 1.0 };
+        let of = OfPair { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };
+        let said = in_order(&of.short().words());
+        let expected = "… and drone \u{fffd}b: 0.250 at 1.500 s, below 1.000 from 1.000 s to 2.000 s";
+        assert!(said.ends_with(expected) && said.chars().count() < 120, "{said}");
+    }
+}

@@ -1,0 +1,436 @@
+//! The report on a recording in words and as a page.
+
+use std::fmt::Write as _;
+
+use super::envelope::OfLimit;
+use super::named::{OfPair, OfVehicle};
+use super::report::{EarlyEnd, RecordedReport, Seen};
+use crate::figures::Figure;
+use crate::replay::{NoReplay, Replay};
+use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
+use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
+use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
+use tautline_core::text::{at_least, at_most, counted, exact, fixed, in_order, metres_below, seconds};
+
+/// Violations that are listed in words, and on the page.
+const LISTED_IN_WORDS: usize = 10;
+const LISTED_ON_PAGE: usize = 100;
+/// Vehicles that are not seen throughout and are named in the headline.
+const NAMED_IN_HEADLINE: usize = 3;
+
+impl RecordedReport {
+    fn unit(&self) -> &'static str {
+        if self.measure == "metres" { " m" } else { " ellipsoids" }
+    }
+
+    /// The verdict in one line, with the window that it is about, and which vehicles are not seen throughout.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        one_line(&format!("{}: {}", self.verdict(), self.finding()))
+    }
+
+    /// The window that the verdict is about, and the first vehicles that are not seen throughout.
+    fn window(&self) -> String {
+        let presence = &self.presence;
+        let window = presence.window_s.map_or(String::new(), |(from_s, to_s)| format!("; from {}", span(from_s, to_s)));
+        if presence.partly == 0 {
+            return if self.status == Status::Clear { window } else { String::new() };
+        }
+        let named = presence.listed.iter().take(NAMED_IN_HEADLINE).map(OfVehicle::<Seen>::words);
+        let rest = presence.partly.saturating_sub(NAMED_IN_HEADLINE);
+        let more = (rest > 0).then(|| format!("and {rest} more"));
+        let named = named.chain(more).collect::<Vec<_>>().join(", ");
+        let all = presence.partly + presence.throughout;
+        let required = if presence.required { ", which --require-presence asks for" } else { "" };
+        format!(
+            "{window}, over which {} of {all} vehicles {} not seen throughout{required}: {named}",
+            presence.partly,
+            if presence.partly == 1 { "is" } else { "are" }
+        )
+    }
+
+    /// The verdict alone, such as `PROVED CLEAR`.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        match self.status {
+            Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
+            Status::Clear if self.audit.judged_by_run => format!("CLEAR {}", self.motion),
+            Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
+            Status::Violation => "VIOLATION".to_owned(),
+            Status::Undecided => "UNDECIDED".to_owned(),
+        }
+    }
+
+    /// The headline behind the verdict.
+    fn finding(&self) -> String {
+        match (&self.ended_early, &self.until_then) {
+            (None, _) => self.finding_of_motion(),
+            (Some(end), Some(until_then)) => format!("{}; until then {until_then}", end.words()),
+            (Some(end), None) => format!("{}; {}", self.finding_of_motion(), end.words()),
+        }
+    }
+
+    /// The finding on what was recorded: of pairs, and of the limits that decide it.
+    fn finding_of_motion(&self) -> String {
+        let decides = |limit: &&OfLimit| limit.status == self.status;
+        let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
+        let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
+        let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
+        let pairs = of_pairs.then(|| self.finding_of_pairs());
+        let found = pairs.into_iter().chain(limits).collect::<Vec<_>>();
+        // All that was asked for is kept while vehicles are seen, which is not throughout.
+        let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
+        found.into_iter().chain(nothing).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
+    }
+
+    fn finding_of_pairs(&self) -> String {
+        let unit = self.unit();
+        let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
+        match self.status {
+            Status::Clear => {
+                let all = self.closest.iter().chain(&self.obstacles.closest);
+                let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+                let closest = lowest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                    let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
+                    format!("never closer than {least}{unit}, {first} and {second} at {at} ")
+                });
+                let motion = if self.audit.proved { format!(", {}", self.motion) } else { String::new() };
+                format!("{closest}({delta}{motion}){}", self.of_those_alone())
+            }
+            Status::Violation => {
+                let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
+                let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
+                let others = match counted_in_words(self.findings.violations) {
+                    _ if self.findings.violations.count <= 1 => String::new(),
+                    count => format!("; {count} violations in all"),
+                };
+                deepest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                    format!(
+                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
+                        metres_below(finding.min_m, finding.limit_m),
+                        exact(finding.limit_m),
+                        seconds(finding.min_at_s),
+                        self.motion
+                    )
+                })
+            }
+            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion),
+        }
+    }
+
+    /// Who was there when nobody else was, of whom nothing is said.
+    fn of_those_alone(&self) -> String {
+        let others = |count: usize| if count > 0 { format!(" and {count} more") } else { String::new() };
+        self.alone.split_first().map_or(String::new(), |(first, rest)| {
+            let (is, others) = (if rest.is_empty() { "is" } else { "are" }, others(rest.len()));
+            format!("; {}{others} {is} never there with another", first.vehicle)
+        })
+    }
+
+    fn why_undecided(&self) -> String {
+        let unit = self.unit();
+        if self.audit.flight.parry.disagreements > 0 {
+            return "the two detectors disagree".to_owned();
+        }
+        if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
+            return format!(
+                "{vehicle} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
+                fixed(finding.needs_m_s2, 3),
+                seconds(finding.time_s),
+                finding.assumed_m_s2
+            );
+        }
+        let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
+        if let Some(OfPair { who: [first, second], finding }) = closest {
+            let rate = self
+                .deciding_rate_hz
+                .map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
+            let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
+            return if finding.upper_m.is_finite() {
+                format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
+            } else {
+                format!("how near {first} and {second} came to each other by {at} is not known")
+            };
+        }
+        let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
+        // Rounded up: as it is said it is long enough.
+        let joined = format!("--max-gap {} would judge across", (longest_s * 1e6).ceil() / 1e6);
+        match &self.gaps[..] {
+            [] if self.span_s.is_none() => "there was nothing to judge".to_owned(),
+            [] => "at no time were there two to keep apart".to_owned(),
+            [OfVehicle { vehicle, finding }] => {
+                format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
+            }
+            [OfVehicle { vehicle, finding }, ..] => {
+                let (count, at) = (counted_in_words(self.findings.gaps), seconds(finding.from_s));
+                format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
+            }
+        }
+    }
+
+    /// What was found of each kind: how much, and a sentence for each finding that is listed.
+    fn lists(&self) -> [(&'static str, String, Vec<String>); 3] {
+        let of_limits = |tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).collect::<Vec<_>>();
+        let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
+        let all = |of: Tally, more: Vec<Tally>| more.into_iter().fold(of, sum);
+        let beyond = self.limits.iter().flat_map(OfLimit::violations_in_words);
+        let undecided = self.limits.iter().flat_map(OfLimit::undecided_in_words);
+        let found = [
+            all(self.findings.violations, of_limits(|limit| limit.violations_tally)),
+            all(
+                self.findings.undecided,
+                [of_limits(|limit| limit.undecided_tally), vec![Tally::all(unknown)]].concat(),
+            ),
+            self.findings.gaps,
+        ];
+        let [violations, open, gaps] = found.map(shortened_in_words);
+        [
+            (
+                "Violations",
+                violations,
+                self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect(),
+            ),
+            ("Undecided", open, self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
+            ("Gaps", gaps, self.gaps.iter().map(OfVehicle::<Gap>::words).collect()),
+        ]
+    }
+
+    /// What is left out of lists that are too long, a sentence each.
+    #[must_use]
+    pub fn shortened(&self) -> Vec<String> {
+        let of_pairs = [
+            ("violations", self.findings.violations),
+            ("undecided times", self.findings.undecided),
+            ("gaps", self.findings.gaps),
+        ];
+        let of_limits = self.limits.iter().flat_map(|limit| {
+            [("violations", limit.violations_tally), ("undecided times", limit.undecided_tally)]
+                .map(|(what, tally)| (format!("{what} of {}", limit.quantity), tally))
+        });
+        let all = of_pairs.map(|(what, tally)| (what.to_owned(), tally)).into_iter().chain(of_limits);
+        let shortened = all.filter(|(_, tally)| tally.is_shortened());
+        shortened
+            .map(|(what, tally)| {
+                let (count, listed) = (counted_in_words(tally), tally.listed);
+                format!("{count} {what} were found and {listed} are listed: the worst, and the first of each pair or vehicle, {LISTED} of either at most")
+            })
+            .collect()
+    }
+
+    /// The closest pairs and what was found, a line each, with a line end.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let mut line = |words: String| {
+            let _ = writeln!(text, "{}", one_line(&words));
+        };
+        let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
+        line(format!(
+            "judged       {span}, {}, {} of motion, {} swept",
+            counted(self.judged as u64, "vehicle", "vehicles"),
+            counted(self.audit.flight.steps, "stretch", "stretches"),
+            self.audit.flight.pairs_checked
+        ));
+        for (heading, closest) in [("closest pairs", &self.closest), ("closest to obstacles", &self.obstacles.closest)]
+        {
+            if !closest.is_empty() {
+                line(format!("{heading} [{}]", self.unit().trim()));
+            }
+            for OfPair { who: [first, second], finding } in closest {
+                let (apart, at) = (interval(finding.lower_m, finding.upper_m), fixed(finding.time_s, 3));
+                line(format!("  {apart}  at {at} s  {first} and {second}"));
+            }
+        }
+        if !self.limits.is_empty() {
+            line("limits on each vehicle".to_owned());
+            self.limits.iter().for_each(|limit| line(format!("  {}", limit.brief())));
+        }
+        if self.presence.partly > 0 {
+            line(format!("seen throughout: {}, not throughout: {}", self.presence.throughout, self.presence.partly));
+            let lines = self.presence.listed.iter().map(OfVehicle::<Seen>::words).collect();
+            listed(lines, self.presence.partly, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+        }
+        for (heading, count, lines) in self.lists() {
+            if !lines.is_empty() {
+                line(format!("{}: {count}", heading.to_lowercase()));
+            }
+            let all = lines.len();
+            listed(lines, all, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
+        }
+        text
+    }
+
+    /// The report as a self-contained HTML page, with the replay of the recording or why there is none.
+    #[must_use]
+    pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
+        let replay = match replay {
+            Ok(replay) => page::replay(&self.source.recording, replay, Start::AtOnce),
+            Err(why) => page::no_replay(&why.to_string()),
+        };
+        let mut sections = vec![section("Replay", &[replay])];
+        if !self.closest.is_empty() {
+            sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
+        }
+        if !self.limits.is_empty() {
+            let columns = ["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
+            let rows = self.limits.iter().map(OfLimit::row);
+            sections.push(section(
+                "Each vehicle by itself",
+                &[page::numbers("Limits, and who came nearest", &columns, rows)],
+            ));
+        }
+        if !figures.is_empty() {
+            sections.push(section("Figures", &[page::figures(figures)]));
+        }
+        if !self.obstacles.closest.is_empty() {
+            sections.push(section("Obstacles", &[closest_table(&self.obstacles.closest)]));
+        }
+        if self.presence.partly > 0 {
+            let columns = ["vehicle", "seen from [s]", "to [s]"];
+            let time = |time_s: Option<f64>| time_s.map_or("never".to_owned(), |time_s| fixed(time_s, 3));
+            let rows = self.presence.listed.iter().take(LISTED_ON_PAGE);
+            let rows = rows.map(|of| [of.vehicle.clone(), time(of.finding.from_s), time(of.finding.to_s)]);
+            let title = format!("The first of {} that are not seen throughout", self.presence.partly);
+            sections.push(section("Presence", &[page::numbers(&title, &columns, rows)]));
+        }
+        let lists = self.lists().map(|(heading, _, lines)| (heading, lines));
+        for (heading, lines) in lists.into_iter().chain([("How it was read", self.source.notes.clone())]) {
+            if !lines.is_empty() {
+                let all = lines.len();
+                let lines: Vec<_> = listed(lines, all, LISTED_ON_PAGE).collect();
+                sections.push(section(heading, &[page::list(&lines)]));
+            }
+        }
+        let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
+        let assumed = [
+            format!("Motion: {} ({known}).", self.motion),
+            "A distance strictly below its limit is a violation; equality is not.".to_owned(),
+            format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
+        ];
+        sections.push(section("What was assumed", &[page::list(&assumed)]));
+        sections.push(section("Repeat it", &[page::command(command)]));
+        let tone = match self.status {
+            Status::Clear => Tone::Good,
+            Status::Violation => Tone::Bad,
+            Status::Undecided => Tone::Neutral,
+        };
+        Page {
+            title: self.source.recording.clone(),
+            kind: "Audit of a recording",
+            badge: Badge { tone, word: self.verdict() },
+            verdict: self.finding(),
+            reasons: Vec::new(),
+            warnings: Vec::new(),
+            sections,
+        }
+        .render_with_replays()
+    }
+}
+
+/// Words with foreign names in them, on one line and in the order of reading whatever the names hold.
+fn one_line(words: &str) -> String {
+    in_order(words).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
+/// How many of some findings are listed, and how many more there are.
+fn sum(a: Tally, b: Tally) -> Tally {
+    Tally { count: a.count + b.count, listed: a.listed + b.listed, is_exact: a.is_exact && b.is_exact }
+}
+
+/// How many there are, such as `at least 12`.
+fn counted_in_words(tally: Tally) -> String {
+    let least = if tally.is_exact { "" } else { "at least " };
+    format!("{least}{}", tally.count)
+}
+
+/// The same, and how many of them are listed where that is not all.
+fn shortened_in_words(tally: Tally) -> String {
+    let count = counted_in_words(tally);
+    if tally.is_shortened() { format!("{count}, of which {} are listed", tally.listed) } else { count }
+}
+
+/// The first of some lines of so many, and how many more there are.
+fn listed(mut lines: Vec<String>, all: usize, most: usize) -> impl Iterator<Item = String> {
+    let rest = all.saturating_sub(most);
+    lines.truncate(most);
+    lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
+}
+
+impl EarlyEnd {
+    /// Returns where the flight ended and why, in a clause.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let (at, duration) = (seconds(self.at_s), seconds(self.duration_s));
+        let reason = self.reason.as_ref().map(|reason| format!(" ({reason})"));
+        format!("the flight ended early, at {at} of {duration}{}", reason.unwrap_or_default())
+    }
+}
+
+impl OfPair<Violation<ObjectPair>> {
+    pub(super) fn words(&self) -> String {
+        let Self { who: [first, second], finding } = self;
+        let min = metres_below(finding.min_m, finding.limit_m);
+        format!(
+            "{first} and {second}: {min} at {} s, below {} from {}",
+            fixed(finding.min_at_s, 3),
+            exact(finding.limit_m),
+            span(finding.from_s, finding.to_s)
+        )
+    }
+}
+
+impl OfPair<Undecided<ObjectPair>> {
+    pub(super) fn words(&self) -> String {
+        let Self { who: [first, second], finding } = self;
+        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
+        let apart = if finding.upper_m.is_finite() {
+            interval(finding.lower_m, finding.upper_m)
+        } else {
+            "not known".to_owned()
+        };
+        format!(
+            "{first} and {second}: {apart} from {}, limit {}{rate}",
+            span(finding.from_s, finding.to_s),
+            exact(finding.limit_m)
+        )
+    }
+}
+
+impl OfVehicle<Gap> {
+    pub(super) fn words(&self) -> String {
+        format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
+    }
+}
+
+impl OfVehicle<Seen> {
+    pub(super) fn words(&self) -> String {
+        match self.finding {
+            Seen { from_s: Some(from_s), to_s: Some(to_s) } => {
+                format!("{} is seen from {}", self.vehicle, span(from_s, to_s))
+            }
+            _ => format!("{} is not seen", self.vehicle),
+        }
+    }
+}
+
+/// Two times in words.
+fn span(from_s: f64, to_s: f64) -> String {
+    format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
+}
+
+/// A distance with six decimals, rounded down, or an interval where its bounds differ, which holds them.
+#[must_use]
+pub fn interval(lower: f64, upper: f64) -> String {
+    let (low, high) = (at_least(lower, 6), at_most(upper, 6));
+    if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
+}
+
+fn closest_table(closest: &[OfPair<Approach>]) -> Markup {
+    let row = |OfPair { who: [first, second], finding }: &OfPair<Approach>| {
+        let apart = interval(finding.lower_m, finding.upper_m);
+        [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
+    };
+    let columns = ["who", "smallest distance", "at [s]", "limit"];
+    page::numbers("Who came closest, and when", &columns, closest.iter().map(row))
+}

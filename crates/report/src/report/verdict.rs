@@ -1,0 +1,321 @@
+//! The judgement and its reasons.
+
+use serde::{Deserialize, Serialize};
+
+use super::energy::{INTEGRATION, highest_honest};
+use super::failures::FailedVehicle;
+use super::findings::Findings;
+use super::legs;
+use super::obstacles::Obstacles;
+use tautline_audit::Status;
+use tautline_core::record::EnergyRise;
+use tautline_core::text::{counted, metres, metres_below, seconds};
+use tautline_sim::scenario::TimeSpec;
+
+/// The judgement.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Clear, reached, flown to its end, and not refused before the first step.
+    pub pass: bool,
+    /// Stable names of what refused the flight before the first step, such as `start-on-line`.
+    pub refused: Vec<String>,
+    /// Why it did not pass, a sentence each; empty where it did.
+    pub reasons: Vec<String>,
+}
+
+impl Verdict {
+    /// Passes where nothing refused the flight, the audit is clear, both detectors agree, the formation is reached and the
+    /// run was flown to its end.
+    pub(super) fn of(findings: &Findings<'_>) -> Self {
+        let reasons: Vec<_> = [
+            refused(findings),
+            violation(findings),
+            unresolved_by_step(findings),
+            Obstacles::of(findings).and_then(|obstacles| obstacles.reason()),
+            findings.hulls.reason(),
+            disagreement(findings),
+            undecided(findings),
+            broken_certificate(findings),
+            steps_too_long(findings),
+            risen_energy(findings),
+            ended_early(findings),
+            not_reached(findings),
+            legs::reason(&legs::legs(findings)),
+            too_flat(findings),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        let refused = findings.refused.iter().map(|&code| code.to_owned()).collect();
+        Self { pass: reasons.is_empty(), refused, reasons }
+    }
+}
+
+/// The number that keeps a formation from being reached, by its key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fails {
+    /// The formation was reached, and the flight ended early.
+    EndedEarly,
+    /// Everything was within the limits at the end, for too short a time.
+    HeldS,
+    /// No state at the end is known.
+    Unknown,
+    /// The largest error of a desired distance.
+    MaxEdgeErrorM,
+    /// The distance of a vehicle from its slot: every edge has its length, and the shape is another one, or elsewhere.
+    #[serde(alias = "rms_position_error_m")]
+    MaxPositionErrorM,
+    /// The largest speed relative to the mean.
+    #[serde(rename = "disagreement_m_s")]
+    Disagreement,
+}
+
+impl Fails {
+    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
+        let Findings { summary, judge, .. } = findings;
+        if summary.reached_at_s.is_some() {
+            findings.run.ended_early.as_ref().map(|_| Self::EndedEarly)
+        } else if summary.held_s.is_some() {
+            Some(Self::HeldS)
+        } else if !summary.max_edge_error_m.is_finite() {
+            Some(Self::Unknown)
+        } else if summary.max_edge_error_m > judge.edge_error_m {
+            Some(Self::MaxEdgeErrorM)
+        } else if summary.max_position_error_m > judge.edge_error_m {
+            Some(Self::MaxPositionErrorM)
+        } else {
+            Some(Self::Disagreement)
+        }
+    }
+}
+
+/// Vehicles are at rest if what they still lack is farther than they would get in this many times the flight's duration.
+const REST_DURATIONS: f64 = 10.0;
+/// Time over which a commanded acceleration adds to the speed \[s\].
+const COMMANDED_S: f64 = 1.0;
+
+/// Whether the vehicles of a formation that is not reached have come to rest elsewhere: at the speeds and commanded
+/// accelerations of the end, ten times the flight's duration would not cover the position error that is too much,
+///
+/// ```text
+/// (v + u 1 s) H < e - edge_error_m,    H = 10 T
+/// ```
+///
+/// where laws damp relative velocities at about 1/s, so that a command is worth its acceleration over a second.
+///
+/// Returns `None` if this is unknown: the flight ended early, or a disturbance may hold vehicles that stand while they are
+/// commanded.
+pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
+    let Findings { summary, judge, is_disturbed, run, .. } = findings;
+    let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
+    let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
+    let is_void = findings.reached_at_s().is_some() || run.ended_early.is_some();
+    if is_void || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let horizon_s = REST_DURATIONS * summary.end_s;
+    let stands = speed_m_s * horizon_s < lacking_m;
+    let is_left_alone = (speed_m_s + command_m_s2 * COMMANDED_S) * horizon_s < lacking_m;
+    if stands && !is_left_alone && *is_disturbed { None } else { Some(is_left_alone) }
+}
+
+fn refused(findings: &Findings<'_>) -> Option<String> {
+    let codes = findings.refused.join(", ");
+    (!codes.is_empty()).then(|| format!("The flight was refused before its first step: {codes}."))
+}
+
+fn violation(findings: &Findings<'_>) -> Option<String> {
+    if findings.audit.status != Status::Violation {
+        return None;
+    }
+    let delta_m = findings.delta_m;
+    let violations = &findings.audit.violations;
+    let Some(deepest) = violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) else {
+        return Some(format!("Two vehicles came closer than {} m.", metres(delta_m)));
+    };
+    let [first, second] = deepest.pair.numbers();
+    let others = match violations.len() - 1 {
+        0 => String::new(),
+        1 => " There is 1 other violation.".to_owned(),
+        n => format!(" There are {n} other violations."),
+    };
+    Some(format!(
+        "Vehicles {first} and {second} came to {} m of each other at {}; the safety distance is {} m.{others}",
+        metres_below(deepest.min_m, delta_m),
+        seconds(deepest.min_at_s),
+        metres(delta_m),
+    ))
+}
+
+/// Whether violations were found that integration may have made: a step was too long for the law before, or in, the first of them.
+pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violations: usize) -> bool {
+    status == Status::Undecided && overlong_steps > 0 && violations > 0
+}
+
+fn unresolved_by_step(findings: &Findings<'_>) -> Option<String> {
+    let audit = findings.audit;
+    if !is_unresolved_by_step(audit.status, findings.run.overlong_steps, audit.violations.len()) {
+        return None;
+    }
+    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
+    let [first, second] = deepest.pair.numbers();
+    Some(format!(
+        "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m of each \
+         other at {} as flown, and after steps that are too long for the law integration may err by more than that.",
+        metres(findings.delta_m),
+        metres_below(deepest.min_m, findings.delta_m),
+        seconds(deepest.min_at_s),
+    ))
+}
+
+fn disagreement(findings: &Findings<'_>) -> Option<String> {
+    let parry = &findings.audit.parry;
+    let first = parry.first_disagreement.as_ref().map(|first| format!(" First: {first}.")).unwrap_or_default();
+    let count = parry.disagreements;
+    let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
+    (count > 0).then(|| format!("The two detectors of the audit disagree {times}, so one of them is wrong.{first}"))
+}
+
+fn undecided(findings: &Findings<'_>) -> Option<String> {
+    if !findings.audit.violations.is_empty() {
+        return None;
+    }
+    if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
+        return Some(
+            "Two vehicles came so near to delta that the audit cannot tell whether they kept it: paths that bend within a \
+             step leave more room than there was."
+                .to_owned(),
+        );
+    }
+    (findings.audit.status == Status::Undecided && findings.audit.parry.disagreements == 0).then(|| {
+        "The audit could not judge everything it was shown, so it cannot say that no two vehicles came too close."
+            .to_owned()
+    })
+}
+
+fn ended_early(findings: &Findings<'_>) -> Option<String> {
+    let why = findings.run.ended_early.as_deref()?.trim_end_matches('.');
+    Some(format!("The run ended early, at {}: {why}.", seconds(findings.run.duration_s)))
+}
+
+/// Whether a separation is below what was certified, by more of the certified clearance above delta than integration may
+/// cost: near the barrier the energy of a pair is in inverse proportion to its clearance, so the part is that of the energy.
+pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f64) -> bool {
+    separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
+}
+
+/// The proof says that the energy never grows: one that did was not flown by the law, but by a step too long for it or by
+/// numbers that ran out of digits.
+pub(super) fn rises(findings: &Findings<'_>) -> bool {
+    risen_energy(findings).is_some()
+}
+
+fn risen_energy(findings: &Findings<'_>) -> Option<String> {
+    let (summary, vehicles) = (findings.summary, findings.run.vehicles);
+    let EnergyRise { from: initial, to: most } = findings.energy_rise?;
+    let allowed = highest_honest(initial, summary, vehicles);
+    (findings.energy_falls && most > allowed).then(|| {
+        format!(
+            "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \
+             where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten \
+             time.dt_s, or raise time.max_halvings.",
+        )
+    })
+}
+
+/// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
+/// numbers that ran out of digits.
+fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
+    let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
+    let holds = findings.certificate.certified_until_s.is_none_or(|until_s| closest.time_s <= until_s);
+    let breaks = holds && breaks_certificate(closest.separation_m, certified_m, findings.delta_m);
+    breaks.then(|| {
+        format!(
+            "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
+             the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
+            metres(certified_m),
+            closest.pair,
+            metres_below(closest.separation_m, certified_m),
+        )
+    })
+}
+
+/// Where even the shortest part of a step is too long for the law, nothing that is flown from there on is its motion.
+fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
+    let overlong = findings.run.overlong_steps;
+    (overlong > 0).then(|| {
+        format!(
+            "{} longer than the law allows in the state that it was in, and halved no further: what was flown is not the motion of \
+             the law. Shorten time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law gentler.",
+            counted(overlong, "step was", "steps were"),
+            TimeSpec::DEFAULT_MAX_RATE_DT
+        )
+    })
+}
+
+fn not_reached(findings: &Findings<'_>) -> Option<String> {
+    let (summary, judge) = (findings.summary, findings.judge);
+    let why = match Fails::of(findings)? {
+        // The reason is that of the early end.
+        Fails::EndedEarly => return None,
+        Fails::HeldS => format!(
+            "it was kept for the last {} only, and {} are asked for",
+            seconds(summary.held_s.unwrap_or_default()),
+            seconds(judge.hold_s)
+        ),
+        Fails::Unknown => "no state at the end is known".to_owned(),
+        Fails::MaxEdgeErrorM => format!(
+            "at the end a distance is still wrong by {} m, and {} m are allowed",
+            metres(summary.max_edge_error_m),
+            judge.edge_error_m
+        ),
+        Fails::MaxPositionErrorM => format!(
+            "at the end every edge has its length within what is allowed and the shape is another one all the same, or it is turned \
+             or elsewhere where it may not be: a vehicle is {} m from its slot, and {} m are allowed",
+            metres(summary.max_position_error_m),
+            judge.edge_error_m
+        ),
+        Fails::Disagreement => format!(
+            "at the end vehicles still differ by {} m/s from their mean velocity, or from that of the reference they follow, and \
+             {} m/s are allowed",
+            metres(summary.disagreement_m_s),
+            judge.disagreement_m_s
+        ),
+    };
+    let failed =
+        (!findings.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(findings.failures)));
+    let then = match at_rest(findings) {
+        _ if failed.is_some() => "",
+        Some(true) if summary.held_s.is_none() => {
+            " The vehicles have come to rest elsewhere: ten times the duration would not be enough."
+        }
+        Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
+            " The vehicles are still moving: more time may help."
+        }
+        Some(false) if summary.held_s.is_none() => " The vehicles are still moving.",
+        _ => "",
+    };
+    Some(format!("The formation was not reached: {why}.{then}{}", failed.unwrap_or_default()))
+}
+
+/// A start flatter than the formation: forces along the lines between vehicles never leave it.
+fn too_flat(findings: &Findings<'_>) -> Option<String> {
+    if findings.reached_at_s().is_some() {
+        return None;
+    }
+    let (start, trap) = match findings.trap_dimension? {
+        0 => ("at one point", "point"),
+        1 => ("on a line", "line"),
+        _ => ("in a plane", "plane"),
+    };
+    let formation = match findings.formation_dimension {
+        1 => "a line",
+        2 => "a plane",
+        _ => "space",
+    };
+    Some(format!(
+        "The start lies {start} and the formation needs {formation}: a law that acts along the lines between vehicles \
+         never leaves that {trap}."
+    ))
+}

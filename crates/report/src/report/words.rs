@@ -1,0 +1,306 @@
+//! A report in words: one line, and a table.
+
+use super::failures::FailedVehicle;
+use super::findings::Performance;
+use super::flight::Report;
+use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
+use tautline_audit::Status;
+use tautline_core::text::{at_least, counted, metres, metres_below, seconds, table};
+
+impl Report {
+    /// The verdict in one line, with what refused the flight before its first step behind it.
+    ///
+    /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
+    /// `VIOLATION: vehicles 2-3 came to 1.533 m (delta 2.000 m) at 3.63 s`.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let refused = match &self.verdict.refused[..] {
+            [] => String::new(),
+            codes => format!("; refused before the first step: {}", codes.join(", ")),
+        };
+        let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
+        let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
+        let legs = super::legs::brief(&self.legs).map(|legs| format!("; {legs}"));
+        let overlong = match self.run.overlong_steps {
+            0 => String::new(),
+            n => format!("; {} too long for the law", counted(n, "step", "steps")),
+        };
+        let changes = self.changes().map(|changes| format!("; {changes}"));
+        self.judged()
+            + &legs.unwrap_or_default()
+            + &changes.unwrap_or_default()
+            + &hulls.unwrap_or_default()
+            + &overlong
+            + &ended.unwrap_or_default()
+            + &refused
+    }
+
+    /// What is said behind a distance that is no distance in metres.
+    fn scaled(&self) -> &'static str {
+        if self.separation.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
+    }
+
+    /// How often slots were spread, and vehicles given others; none where neither was.
+    pub(super) fn changes(&self) -> Option<String> {
+        let counts =
+            [(self.breaths.len(), "breath", "breaths"), (self.assignments.len(), "new assignment", "new assignments")];
+        let some = counts.into_iter().filter(|&(n, ..)| n > 0);
+        let said: Vec<_> = some.map(|(n, one, many)| counted(n as u64, one, many)).collect();
+        (!said.is_empty()).then(|| said.join(" and "))
+    }
+
+    /// Whether two vehicles came closer than the law's certificate promises, by more than integration may cost.
+    #[must_use]
+    pub fn breaks_certificate(&self) -> bool {
+        let both = self.separation.min_m.zip(self.separation.certified_m);
+        let breaks = |(min_m, certified_m)| breaks_certificate(min_m, certified_m, self.separation.delta_m);
+        both.is_some_and(breaks) && self.separation.is_promised()
+    }
+
+    /// What was judged of what was flown.
+    fn judged(&self) -> String {
+        let delta = metres(self.separation.delta_m);
+        match self.audit.status {
+            Status::Clear => format!("CLEAR: {}", self.clear_in_words()),
+            Status::Violation => {
+                let deepest = self.deepest_in_words();
+                format!("VIOLATION: {deepest}")
+            }
+            Status::Undecided if self.is_clear_until_its_early_end() => {
+                format!("UNDECIDED from {} on: {}", seconds(self.run.duration_s), self.clear_in_words())
+            }
+            Status::Undecided if self.audit.parry.disagreements > 0 => {
+                format!("UNDECIDED: the two detectors disagree (delta {delta} m), {}", self.formation_in_words())
+            }
+            Status::Undecided if self.is_unresolved_by_step() => {
+                format!(
+                    "UNDECIDED: the step cannot resolve this, as flown {}, {}",
+                    self.deepest_in_words(),
+                    self.formation_in_words()
+                )
+            }
+            Status::Undecided => {
+                format!("UNDECIDED: not everything could be judged (delta {delta} m), {}", self.formation_in_words())
+            }
+        }
+    }
+
+    /// Returns whether the flight ended early and was clear up to there.
+    pub(super) fn is_clear_until_its_early_end(&self) -> bool {
+        let audit = &self.audit;
+        let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
+        let is_open = audit.undecided + audit.parry.disagreements + of_obstacles > 0;
+        let is_judged = self.run.vehicles < 2 || self.separation.min_m.is_some();
+        self.run.ended_early.is_some()
+            && audit.status == Status::Undecided
+            && is_judged
+            && !is_open
+            && !self.is_unresolved_by_step()
+    }
+
+    fn clear_in_words(&self) -> String {
+        let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
+        let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
+        let broken = match self.separation.certified_m.filter(|_| self.breaks_certificate()) {
+            Some(certified_m) => format!(", which breaks the certificate of {} m", at_least(certified_m, 6)),
+            None => String::new(),
+        };
+        let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
+            Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
+            None => String::new(),
+        };
+        let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
+        let room = room.map(|room| format!(", {room}")).unwrap_or_default();
+        format!(
+            "{closest}{} (delta {} m){room}{broken}{rose}, {}",
+            self.scaled(),
+            metres(self.separation.delta_m),
+            self.formation_in_words()
+        )
+    }
+
+    /// Whether integration may have made all violations.
+    fn is_unresolved_by_step(&self) -> bool {
+        let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
+        let violations = self.audit.violations.len() + past_obstacles;
+        is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
+    }
+
+    fn formation_in_words(&self) -> String {
+        let formation = &self.formation;
+        let (what, number, unit) = match formation.fails {
+            None => {
+                let at_s = formation.reached_at_s.unwrap_or_default();
+                return format!("formation reached at {at_s:.1} s");
+            }
+            Some(Fails::EndedEarly) => return "formation NOT reached (the flight ended early)".to_owned(),
+            Some(Fails::Unknown) => return "formation NOT reached".to_owned(),
+            Some(Fails::HeldS) => {
+                let held_s = formation.held_s.unwrap_or_default();
+                return format!("formation NOT reached (kept for the last {} only)", seconds(held_s));
+            }
+            Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
+            Some(Fails::MaxPositionErrorM) => {
+                ("another shape or place, largest position error", formation.max_position_error_m, "m")
+            }
+            Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
+        };
+        let then = match formation.at_rest {
+            Some(true) => ", at rest elsewhere",
+            Some(false) => ", still moving",
+            None => "",
+        };
+        format!("formation NOT reached ({what} {} {unit}{then})", number.map_or("-".to_owned(), short))
+    }
+
+    fn deepest_in_words(&self) -> String {
+        let of_obstacles = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::brief);
+        if let Some(of_obstacles) = of_obstacles {
+            let is_alone = self.audit.violations.is_empty();
+            return if is_alone { of_obstacles } else { format!("{}; {of_obstacles}", self.deepest_pair_in_words()) };
+        }
+        self.deepest_pair_in_words()
+    }
+
+    fn deepest_pair_in_words(&self) -> String {
+        let Self { separation, .. } = self;
+        let delta_m = separation.delta_m;
+        let (Some([first, second]), Some(min_m)) = (separation.min_pair, separation.min_m) else {
+            return format!("two vehicles came closer than {} m", metres(delta_m));
+        };
+        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
+        format!(
+            "vehicles {first}-{second} came to {} m{} (delta {} m){at}",
+            metres_below(min_m, delta_m),
+            self.scaled(),
+            metres(delta_m)
+        )
+    }
+
+    /// The numbers as a short table, a line each, with a line end.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let (control, velocity) = (&self.control, &self.velocity);
+        let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
+        let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
+        let mut rows: Vec<(String, String)> =
+            vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
+        let ellipsoid = self.separation.ellipsoid.iter();
+        rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
+        rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
+        rows.extend(self.network.iter().map(|network| ("network".to_owned(), network.line())));
+        let failed = (!self.failures.is_empty()).then(|| FailedVehicle::line(&self.failures));
+        rows.extend(failed.map(|line| ("failed".to_owned(), line)));
+        rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
+        rows.extend(super::legs::lines(&self.legs));
+        let rest = [
+            ("formation", self.formation_line()),
+            ("energy", self.energy_line()),
+            ("control", format!("peak {peak}, final {last} m/s^2")),
+            ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
+            ("run", self.run_line()),
+        ];
+        let times = self.performance.map(|times| ("performance", times.line()));
+        rows.extend(rest.into_iter().chain(times).map(|(name, line)| (name.to_owned(), line)));
+        table(rows)
+    }
+
+    fn separation_line(&self) -> String {
+        let separation = &self.separation;
+        let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
+        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
+        let certified = match separation.certified_m {
+            Some(certified_m) => {
+                let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("certified {} m{}", at_least(certified_m, 6), until.unwrap_or_default())
+            }
+            None => "not certified".to_owned(),
+        };
+        format!(
+            "{} m{}{}{} (delta {} m, {certified})",
+            separation.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6)),
+            self.scaled(),
+            at.unwrap_or_default(),
+            pair.unwrap_or_default(),
+            metres(separation.delta_m),
+        )
+    }
+
+    fn audit_line(&self) -> String {
+        let audit = &self.audit;
+        let detectors = match audit.parry.disagreements {
+            0 => "both detectors agree".to_owned(),
+            n => format!("{} of the two detectors", counted(n, "disagreement", "disagreements")),
+        };
+        let contacts = audit
+            .rapier
+            .contact_pairs
+            .map(|pairs| format!(", {} seen by the engine", counted(pairs, "contact pair", "contact pairs")));
+        format!(
+            "{} in {}, {} swept; {detectors}{}",
+            counted(audit.violations.len() as u64, "violation", "violations"),
+            counted(audit.steps, "step", "steps"),
+            counted(audit.pairs_checked, "pair", "pairs"),
+            contacts.unwrap_or_default()
+        )
+    }
+
+    fn formation_line(&self) -> String {
+        let formation = &self.formation;
+        let reached =
+            formation.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
+        format!(
+            "{reached}, largest edge error {} m, largest position error {} m",
+            or_dash(formation.max_edge_error_m),
+            or_dash(formation.max_position_error_m)
+        )
+    }
+
+    fn energy_line(&self) -> String {
+        let energy = &self.energy;
+        let ratio = energy.max_over_initial.map(|ratio| match ratio {
+            ..1e3 => format!(", at most {ratio:.6} of the initial"),
+            _ => format!(", at most {ratio:.1e} of the initial"),
+        });
+        format!(
+            "initial {}, final {} m^2/s^2{}",
+            or_dash(energy.initial),
+            or_dash(energy.at_end),
+            ratio.unwrap_or_default()
+        )
+    }
+
+    fn run_line(&self) -> String {
+        let run = &self.run;
+        format!(
+            "{} vehicles, {} s in {} steps of {:.3} ms, state {}",
+            run.vehicles,
+            // To a microsecond, without the zeros that a fixed number of decimals would show.
+            (run.duration_s * 1e6).round() / 1e6,
+            run.steps,
+            run.dt_s * 1e3,
+            run.state_hash.get(..12).unwrap_or(&run.state_hash)
+        )
+    }
+}
+
+impl Performance {
+    fn line(self) -> String {
+        let Self { wall_s, real_time_factor, law_s, energy_s, physics_s, airframe_s, audit_s, record_s } = self;
+        let airframe = if airframe_s > 0.0 { format!(", {airframe_s:.3} of it airframes") } else { String::new() };
+        let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
+        format!(
+            "{wall_s:.3} s wall, {factor} x real time (law {law_s:.3}, energy {energy_s:.3}, physics \
+             {physics_s:.3}{airframe}, audit {audit_s:.3}, record {record_s:.3} s)"
+        )
+    }
+}
+
+/// A length with two decimals, or in powers of ten where that would show little.
+fn short(number: f64) -> String {
+    if number.abs() < 5e-2 { metres(number) } else { format!("{number:.2}") }
+}
+
+fn or_dash(number: Option<f64>) -> String {
+    number.map_or("-".to_owned(), metres)
+}
