@@ -35,15 +35,9 @@
 //! per vehicle. Vehicles are counted from 0 in code and from 1 in everything a person reads. Equation numbers are those
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
-pub mod attack;
-pub mod campaign;
 pub mod cli;
-pub mod compare;
-pub mod margin;
 #[cfg(feature = "viewer")]
 pub mod render;
-pub mod splitting;
-pub mod statistics;
 pub mod validate;
 
 pub use tautline_audit as audit;
@@ -53,3 +47,4 @@ pub use tautline_laws::{formation, graph, law, observation, space, target, wind}
 pub use tautline_recordings::{export, mcap, read};
 pub use tautline_report::{figures, replay, report, run};
 pub use tautline_sim::{continuous, feedback, link, metrics, plan, plant, preflight, scenario, sim, vehicle};
+pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics};

@@ -1,0 +1,239 @@
+//! CMA-ES: candidates are normal around a mean, and mean, step and covariance follow the better half of them.
+//!
+//! N. Hansen, *The CMA evolution strategy: a tutorial* (2016), with its default numbers and positive weights. Candidates are
+//! asked for and their values told, so that a generation may be flown on any number of threads. Sums run in a fixed order and
+//! elementary functions come from `libm`: the same seed gives the same candidates on every machine.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use tautline_laws::wind::Normals;
+
+/// Smallest and largest eigenvalue of the covariance beyond whose ratio numbers run out of digits.
+const WORST_CONDITION: f64 = 1e14;
+
+/// The distribution that candidates are drawn from.
+#[derive(Clone, Debug)]
+pub(super) struct CmaEs {
+    mean: DVector<f64>,
+    /// Scale of the distribution.
+    step: f64,
+    covariance: DMatrix<f64>,
+    /// Eigenvectors of the covariance, a column each.
+    axes: DMatrix<f64>,
+    /// Square roots of its eigenvalues.
+    lengths: DVector<f64>,
+    /// Evolution paths of step and covariance.
+    path_step: DVector<f64>,
+    path_covariance: DVector<f64>,
+    generation: u32,
+    rates: Rates,
+}
+
+/// What does not change from one generation to the next.
+#[derive(Clone, Debug)]
+struct Rates {
+    population: usize,
+    weights: Vec<f64>,
+    /// Variance-effective number of parents.
+    parents: f64,
+    path_step: f64,
+    damping: f64,
+    path_covariance: f64,
+    rank_one: f64,
+    rank_many: f64,
+    /// Expected length of a vector of standard normal numbers.
+    expected: f64,
+}
+
+/// Candidates of a generation unless it is enlarged: 4 + 3 ln n in n dimensions.
+pub(super) fn usual_population(dimensions: usize) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and far below 2^32")]
+    let more = (3.0 * libm::log(dimensions.max(1) as f64)) as usize;
+    4 + more
+}
+
+impl Rates {
+    fn of(dimensions: usize, population: usize) -> Self {
+        let n = dimensions as f64;
+        let raw: Vec<_> = (1..=population / 2)
+            .map(|rank| libm::log(f64::midpoint(population as f64, 1.0)) - libm::log(rank as f64))
+            .collect();
+        let sum: f64 = raw.iter().sum();
+        let weights: Vec<_> = raw.iter().map(|weight| weight / sum).collect();
+        let parents = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
+        let path_step = (parents + 2.0) / (n + parents + 5.0);
+        let rank_one = 2.0 / ((n + 1.3) * (n + 1.3) + parents);
+        let rank_many = 2.0 * (parents - 2.0 + 1.0 / parents) / ((n + 2.0) * (n + 2.0) + parents);
+        Self {
+            population,
+            weights,
+            parents,
+            path_step,
+            damping: 1.0 + 2.0 * (((parents - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + path_step,
+            path_covariance: (4.0 + parents / n) / (n + 4.0 + 2.0 * parents / n),
+            rank_one,
+            rank_many: rank_many.min(1.0 - rank_one),
+            expected: n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)),
+        }
+    }
+}
+
+impl CmaEs {
+    /// A round distribution about a mean, of which so many candidates, at least 2, are a generation.
+    pub(super) fn new(mean: &[f64], step: f64, population: usize) -> Self {
+        let n = mean.len();
+        Self {
+            mean: DVector::from_column_slice(mean),
+            step,
+            covariance: DMatrix::identity(n, n),
+            axes: DMatrix::identity(n, n),
+            lengths: DVector::from_element(n, 1.0),
+            path_step: DVector::zeros(n),
+            path_covariance: DVector::zeros(n),
+            generation: 0,
+            rates: Rates::of(n, population.max(2)),
+        }
+    }
+
+    /// Candidates of a generation.
+    pub(super) fn population(&self) -> usize {
+        self.rates.population
+    }
+
+    /// A candidate.
+    pub(super) fn draw(&self, normals: &mut Normals) -> Vec<f64> {
+        let n = self.mean.len();
+        let along = DVector::from_fn(n, |k, _| self.lengths[k] * normals.next());
+        (0..n).map(|row| self.mean[row] + self.step * dot(n, |k| self.axes[(row, k)] * along[k])).collect()
+    }
+
+    /// Largest standard deviation of a candidate along any direction.
+    pub(super) fn spread(&self) -> f64 {
+        self.step * self.lengths.max()
+    }
+
+    /// Whether nothing is left to be drawn from.
+    pub(super) fn is_degenerate(&self) -> bool {
+        let [low, high] = [self.lengths.min(), self.lengths.max()];
+        !(self.spread().is_finite() && high * high <= WORST_CONDITION * low * low)
+    }
+
+    /// Moves the distribution to where the candidates of a generation have low values; of those with the same value the first
+    /// counts as the lower.
+    pub(super) fn learn(&mut self, candidates: &[Vec<f64>], values: &[f64]) {
+        let mut order: Vec<_> = (0..candidates.len()).collect();
+        order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+        let n = self.mean.len();
+        let rates = self.rates.clone();
+        let steps: Vec<DVector<f64>> = order
+            .iter()
+            .zip(&rates.weights)
+            .map(|(&rank, _)| DVector::from_fn(n, |k, _| (candidates[rank][k] - self.mean[k]) / self.step))
+            .collect();
+        let moved = DVector::from_fn(n, |k, _| rates.weights.iter().zip(&steps).map(|(w, step)| w * step[k]).sum());
+        self.mean = DVector::from_fn(n, |k, _| self.mean[k] + self.step * moved[k]);
+
+        let (c, kept) = (rates.path_step, 1.0 - rates.path_step);
+        let gain = (c * (2.0 - c) * rates.parents).sqrt();
+        let whitened = self.whitened(&moved);
+        self.path_step = DVector::from_fn(n, |k, _| kept * self.path_step[k] + gain * whitened[k]);
+        self.generation += 1;
+        let length = dot(n, |k| self.path_step[k] * self.path_step[k]).sqrt();
+        let settled = (1.0 - libm::pow(kept, 2.0 * f64::from(self.generation))).sqrt();
+        let is_calm = length / settled < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
+        let calm = f64::from(u8::from(is_calm));
+
+        let c = rates.path_covariance;
+        let gain = calm * (c * (2.0 - c) * rates.parents).sqrt();
+        self.path_covariance = DVector::from_fn(n, |k, _| (1.0 - c) * self.path_covariance[k] + gain * moved[k]);
+        let kept = 1.0 - rates.rank_one - rates.rank_many + (1.0 - calm) * rates.rank_one * c * (2.0 - c);
+        let path = &self.path_covariance;
+        self.covariance = DMatrix::from_fn(n, n, |i, j| {
+            let many: f64 = rates.weights.iter().zip(&steps).map(|(w, step)| w * (step[i] * step[j])).sum();
+            kept * self.covariance[(i, j)] + rates.rank_one * (path[i] * path[j]) + rates.rank_many * many
+        });
+        self.step *=
+            libm::exp((rates.path_step / rates.damping) * (length / rates.expected - 1.0)).min(std::f64::consts::E);
+        self.decompose();
+    }
+
+    /// What a step is in lengths of the distribution.
+    fn whitened(&self, step: &DVector<f64>) -> DVector<f64> {
+        let n = self.mean.len();
+        let along = DVector::from_fn(n, |k, _| dot(n, |row| self.axes[(row, k)] * step[row]) / self.lengths[k]);
+        DVector::from_fn(n, |row, _| dot(n, |k| self.axes[(row, k)] * along[k]))
+    }
+
+    fn decompose(&mut self) {
+        let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(self.covariance.clone());
+        self.lengths = eigenvalues.map(|value| value.max(0.0).sqrt());
+        self.axes = eigenvectors;
+    }
+}
+
+/// A sum in the order of its terms.
+fn dot(count: usize, term: impl Fn(usize) -> f64) -> f64 {
+    (0..count).map(term).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Candidates until a value is as low as asked, at most so many.
+    fn asked(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
+        let mut normals = Normals::new(3, 0);
+        let mut search = CmaEs::new(&vec![0.5; n], 0.3, usual_population(n));
+        let mut count = 0;
+        while count < most {
+            let candidates: Vec<_> = (0..search.population()).map(|_| search.draw(&mut normals)).collect();
+            let values: Vec<_> = candidates.iter().map(|candidate| value(candidate)).collect();
+            count += candidates.len();
+            if values.iter().any(|&value| value <= goal) {
+                return count;
+            }
+            search.learn(&candidates, &values);
+            assert!(!search.is_degenerate(), "after {count}");
+        }
+        panic!("{most} candidates were not enough");
+    }
+
+    #[test]
+    fn known_functions_are_minimised_within_what_is_published_of_them() {
+        // Hansen's tutorial and the BBOB tables: about 1e3 for a ball and some 6e3 for Rosenbrock's valley in ten dimensions.
+        let ball = |x: &[f64]| x.iter().map(|x| (x - 0.2) * (x - 0.2)).sum::<f64>();
+        assert!(asked(10, 1e-9, 2_500, &ball) > 300);
+        let narrow = |x: &[f64]| {
+            let scale = |k: usize| libm::pow(1e6, k as f64 / 9.0);
+            x.iter().enumerate().map(|(k, x)| scale(k) * (x - 0.2) * (x - 0.2)).sum::<f64>()
+        };
+        asked(10, 1e-9, 9_000, &narrow);
+        let valley = |x: &[f64]| {
+            let part = |pair: &[f64]| {
+                100.0 * (pair[1] - pair[0] * pair[0]) * (pair[1] - pair[0] * pair[0])
+                    + (1.0 - pair[0]) * (1.0 - pair[0])
+            };
+            x.windows(2).map(part).sum::<f64>()
+        };
+        asked(10, 1e-9, 12_000, &valley);
+    }
+
+    #[test]
+    fn one_dimension_and_equal_values_are_no_trouble() {
+        asked(1, 1e-9, 400, &|x| (x[0] - 0.9) * (x[0] - 0.9));
+        let mut search = CmaEs::new(&[0.5, 0.5], 0.3, 6);
+        let mut normals = Normals::new(0, 0);
+        for _ in 0..50 {
+            let candidates: Vec<_> = (0..6).map(|_| search.draw(&mut normals)).collect();
+            search.learn(&candidates, &[1.0; 6]);
+        }
+        assert!(search.spread().is_finite());
+    }
+
+    #[test]
+    fn a_seed_is_a_sequence() {
+        let drawn = |seed: u64| CmaEs::new(&[0.5; 4], 0.3, 8).draw(&mut Normals::new(seed, 0));
+        assert_eq!(drawn(1), drawn(1));
+        assert_ne!(drawn(1), drawn(2));
+    }
+}

@@ -1,0 +1,174 @@
+//! The search finds where an answer turns, and says what it looked at.
+
+use std::sync::atomic::AtomicBool;
+
+use super::search::{Found, Range, search};
+use super::{Asked, Margin, Plan, Question};
+use crate::compare::Watch;
+use tautline_sim::scenario::Source;
+
+fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
+    Range { from, to, scan, halvings, logarithmic: false }
+}
+
+fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
+    let mut asked = 0;
+    let found = search(range, false, &mut |value| {
+        asked += 1;
+        Ok::<_, ()>(Some(answer(value)))
+    });
+    (found.expect("no error"), asked)
+}
+
+#[test]
+fn the_bracket_holds_the_turn_and_is_as_narrow_as_its_halvings_say() {
+    for (from, to) in [(0.0, 4.0), (4.0, 0.0)] {
+        let (turn, asked) = found(range(from, to, 5, 10), &|value| value < 1.2345);
+        let Some(Found::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
+        assert_eq!((was, turns, asked), (from < to, 1, 15));
+        assert!((before - 1.2345) * (after - 1.2345) <= 0.0, "{before} {after}");
+        assert_eq!((after - before).abs(), 2.0_f64.powi(-10));
+    }
+}
+
+#[test]
+fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
+    let range = Range { logarithmic: true, ..range(1e-6, 1.0, 4, 0) };
+    let mut asked = Vec::new();
+    let found = search(range, false, &mut |value: f64| {
+        asked.push(value);
+        Ok::<_, ()>(Some(value < 1e-3))
+    });
+    for (value, exact) in asked.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
+        assert!((value / exact - 1.0).abs() < 1e-12, "{value} {exact}");
+    }
+    assert!(matches!(found, Ok(Some(Found::Turn { was: true, .. }))), "{found:?}");
+}
+
+#[test]
+fn whole_numbers_are_looked_at_once_each_and_the_bracket_ends_at_neighbours() {
+    for (from, to, logarithmic) in [(1.0, 40.0, false), (40.0, 1.0, false), (1.0, 40.0, true), (5.0, 7.0, false)] {
+        let mut asked = Vec::new();
+        let found = search(Range { logarithmic, ..range(from, to, 9, 60) }, true, &mut |value: f64| {
+            asked.push(value);
+            Ok::<_, ()>(Some(value < 6.5))
+        });
+        let Ok(Some(Found::Turn { before, after, .. })) = found else { panic!("{found:?}") };
+        assert_eq!((before.min(after), before.max(after)), (6.0, 7.0));
+        assert!(asked.iter().all(|value| value.fract() == 0.0), "{asked:?}");
+        asked.sort_by(f64::total_cmp);
+        assert!(asked.windows(2).all(|pair| pair[0] < pair[1]), "{asked:?}");
+    }
+}
+
+#[test]
+fn an_answer_that_never_turns_is_said_to_be_even_and_one_that_turns_twice_to_turn_twice() {
+    assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Found::Even(true)), 5));
+    let (twice, _) = found(range(0.0, 1.0, 11, 20), &|value| !(0.33..0.77).contains(&value));
+    let Some(Found::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
+    assert!(before < 0.33 && after >= 0.33 && after - before < 1e-6, "{before} {after}");
+}
+
+#[test]
+fn a_search_that_is_broken_off_says_only_what_it_knows() {
+    let broken = |after: usize| {
+        let mut asked = 0;
+        search(range(0.0, 1.0, 3, 8), false, &mut |value| {
+            asked += 1;
+            Ok::<_, ()>((asked <= after).then_some(value < 0.3))
+        })
+    };
+    assert_eq!(broken(0), Ok(None));
+    assert_eq!(broken(1), Ok(None), "one value is no bracket");
+    let Ok(Some(Found::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
+    assert_eq!((before, after), (0.0, 0.5));
+}
+
+/// A pair that starts too far apart.
+const PAIR: &str = r#"name = "pair"
+[start]
+positions_m = [[0.0, 0.0], [4.0, 0.0]]
+[formation]
+shape = "line"
+spacing_m = 3.0
+[law]
+delta_m = 2.0
+alpha = 0.5
+[time]
+duration_s = 2.0
+record_hz = 10
+"#;
+
+fn margin_in(key: &str, range: Range, asked: Asked) -> Margin {
+    let source = Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() };
+    let plan = Plan::new(source, &[], key, range, asked).expect("a plan");
+    let interrupted = AtomicBool::new(false);
+    let one = plan.search(1, Watch { flown: &|_| {}, interrupted: &interrupted }).expect("flown").expect("found");
+    let two = plan.search(2, Watch { flown: &|_| {}, interrupted: &interrupted }).expect("flown").expect("found");
+    assert_eq!(one, two, "the number of threads changes nothing");
+    one
+}
+
+#[test]
+fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
+    let asked = Asked { question: Question::Reached, runs: 1, seed: 0 };
+    let margin = margin_in("time.duration_s", range(1.5, 40.0, 3, 6), asked);
+    let turn = margin.turn.expect("it takes time to arrive");
+    assert!(!turn.holds_below, "{turn:?}");
+    let [holds, fails] = margin.sides().expect("both sides");
+    assert!(holds.holds() && !fails.holds() && holds.value > fails.value);
+    assert!(margin.headline().contains("reaches its formation with time.duration_s from"), "{}", margin.headline());
+    let csv = String::from_utf8(margin.to_csv().expect("csv")).expect("text");
+    assert_eq!(csv.lines().count(), margin.probes.len() + 1);
+    assert!(csv.starts_with("time.duration_s,runs,held_count"), "{csv}");
+}
+
+#[test]
+fn a_key_that_takes_whole_numbers_alone_is_halved_at_whole_numbers() {
+    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
+    let any = margin_in("time.record_hz", range(1.0, 8.0, 3, 2), asked);
+    assert!(any.probes.iter().any(|probe| probe.value.fract() != 0.0), "record_hz takes any number");
+    let whole = margin_in("start.seed", range(1.0, 8.0, 3, 2), asked);
+    let values: Vec<_> = whole.probes.iter().map(|probe| probe.value).collect();
+    assert_eq!(values, [1.0, 5.0, 8.0]);
+}
+
+#[test]
+fn a_key_that_measures_takes_any_number_though_a_millionth_beside_its_ends_is_refused() {
+    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
+    let plan = |key: &str| {
+        let source = Source::Builtin("crazyflies".to_owned());
+        Plan::new(source, &[], key, range(0.0, 1.0, 9, 6), asked).expect("a plan")
+    };
+    assert!(!plan("sensing.latency_s").is_whole());
+    assert!(plan("noise.seed").is_whole());
+}
+
+#[test]
+fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
+    let asked = Asked { question: Question::Clear, runs: 3, seed: 7 };
+    let margin = margin_in("law.alpha", range(0.5, 1.0, 2, 1), asked);
+    assert!(margin.turn.is_none() && margin.holds_everywhere() && margin.jittered);
+    for probe in &margin.probes {
+        let seeds: Vec<_> = probe.flights.iter().map(|flown| flown.seed).collect();
+        assert_eq!(seeds, [7, 8, 9]);
+        assert!(probe.flights.windows(2).all(|pair| pair[0].state_hash != pair[1].state_hash));
+        assert_eq!((probe.held.count, probe.held.of), (3, 3));
+    }
+    assert!(margin.notes().iter().any(|note| note.contains("start.seed moves")), "{:?}", margin.notes());
+}
+
+#[test]
+fn ranges_that_are_none_and_values_that_cannot_be_flown_are_refused() {
+    let asked = Asked { question: Question::Pass, runs: 1, seed: 0 };
+    let refused = |key: &str, range: Range| {
+        let source = Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() };
+        Plan::new(source, &[], key, range, asked).expect_err("refused").to_string()
+    };
+    assert!(refused("law.alpha", range(1.0, 1.0, 2, 1)).contains("both ends"));
+    assert!(refused("law.alpha", range(f64::NAN, 1.0, 2, 1)).contains("NaN"));
+    let logarithmic = Range { logarithmic: true, ..range(0.0, 1.0, 2, 1) };
+    assert!(refused("law.alpha", logarithmic).contains("logarithmic"));
+    assert!(refused("law.alpha", range(-1.0, 1.0, 2, 1)).contains("with law.alpha = -1"));
+    assert!(refused("law.alfa", range(0.5, 1.0, 2, 1)).contains("alfa"));
+}
