@@ -37,7 +37,7 @@
 
 pub mod cli;
 #[cfg(feature = "viewer")]
-pub mod render;
+pub use tautline_render as render;
 pub mod validate;
 
 pub use tautline_audit as audit;

@@ -1,0 +1,114 @@
+//! Why there is no picture, no film or no window.
+
+use tautline_core::record::RecordError;
+
+/// Largest coordinate and radius that are drawn \[m\]: more than twice as far as the Moon. Pictures are made in single
+/// precision, where fourth powers of lengths must have room.
+pub const FARTHEST_M: f64 = 1e9;
+
+/// Why there is no picture, no film or no window.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A length is too large to be drawn: whose, which, when and how large, in a sentence.
+    #[error("{0}; what is beyond {FARTHEST_M:e} m cannot be drawn")]
+    TooFar(String),
+    /// The flight of this name holds no samples.
+    #[error("{0} holds no samples, so there is nothing to draw")]
+    Empty(String),
+    /// A camera that is none of the known ones, or out of range.
+    #[error("{0}")]
+    Camera(String),
+    /// A camera follows a vehicle that the flight does not have.
+    #[error("{0}")]
+    NoVehicle(String),
+    /// The machine has no adapter at all.
+    #[error("this machine has no graphics adapter and no driver in software")]
+    NoAdapter,
+    /// It has adapters, but not of this choice.
+    #[error("{0}")]
+    NoSuchAdapter(String),
+    /// A picture of this size cannot be drawn.
+    #[error("{0}")]
+    PictureSize(String),
+    /// The adapter cannot be started, failed while drawing, or is gone.
+    #[error("{0}")]
+    Driver(String),
+    /// A picture cannot be encoded or put together.
+    #[error("the picture cannot be made: {0}")]
+    Picture(String),
+    /// The name of the file does not say which format a film is to be.
+    #[error("`{0}` does not end in .mp4, .gif or .png")]
+    UnknownFilm(String),
+    /// The format does not allow this number of pictures a second.
+    #[error("{0}")]
+    FilmRate(String),
+    /// The format does not allow pictures of this size.
+    #[error("{0}")]
+    FilmSize(String),
+    /// The film was not given the pictures that it was made for, or its encoder failed.
+    #[error("{0}")]
+    Film(String),
+    /// The film cannot be written.
+    #[error("the film cannot be written: {0}")]
+    Write(#[from] std::io::Error),
+    /// There is no screen to open a window on.
+    #[error("there is no display to open a window on: {0}")]
+    NoDisplay(String),
+    /// The window system refused.
+    #[error("the window cannot be opened: {0}")]
+    NoWindow(String),
+}
+
+impl RenderError {
+    /// Whether the machine is at fault, and not what was asked for.
+    #[must_use]
+    pub fn is_machine(&self) -> bool {
+        use RenderError as E;
+        let of_machine = matches!(self, E::NoAdapter | E::Driver(_) | E::NoDisplay(_) | E::NoWindow(_));
+        of_machine || matches!(self, E::Picture(_) | E::Film(_) | E::Write(_))
+    }
+
+    /// What helps, where something does.
+    #[must_use]
+    pub fn help(&self) -> Option<&'static str> {
+        use RenderError as E;
+        Some(match self {
+            E::TooFar(_) => "mend the recording, or see whether its lengths are in metres",
+            E::Empty(_) => "give a recording that holds at least one sample, such as a run's run.mcap",
+            E::NoVehicle(_) => "give the name of a vehicle of the recording",
+            E::Camera(_) => {
+                "give iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres such as -60,30,25"
+            }
+            E::NoAdapter => {
+                "install a driver; one in software is in Debian's packages: apt-get install mesa-vulkan-drivers libvulkan1"
+            }
+            E::NoSuchAdapter(_) => {
+                "give hardware, software or a part of the name of an adapter that there is with --adapter"
+            }
+            E::PictureSize(_) => "give another size with --size",
+            E::Driver(_) => "try a smaller picture, or another driver with --adapter software",
+            E::UnknownFilm(_) => "name the film something.mp4, something.gif or something.png",
+            E::FilmRate(_) => "give another rate with --fps",
+            E::FilmSize(_) => "give another size with --size, or another format",
+            E::Write(_) => "free some space or write to another folder",
+            E::NoDisplay(_) => "run it on a machine with a screen, or draw without one: tautline render RECORDING",
+            E::Record(_) | E::Picture(_) | E::Film(_) | E::NoWindow(_) => return None,
+        })
+    }
+}
+
+/// Refuses lengths \[m\] that are too large to be drawn.
+pub(super) fn check_lengths<'a>(
+    lengths_m: impl IntoIterator<Item = &'a f64>,
+    what: &str,
+    time_s: f64,
+    vehicle: impl FnOnce() -> String,
+) -> Result<(), RenderError> {
+    let too_far = lengths_m.into_iter().find(|length_m| length_m.abs() > FARTHEST_M);
+    too_far.map_or(Ok(()), |length_m| {
+        Err(RenderError::TooFar(format!("vehicle {} has a {what} of {length_m:?} m at {time_s} s", vehicle())))
+    })
+}

@@ -1,0 +1,369 @@
+//! A run as a 3-D scene that Foxglove shows without a plug-in.
+
+use std::collections::BTreeSet;
+use std::io;
+
+use foxglove::messages::line_primitive::Type as LineType;
+use foxglove::messages::{
+    CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp,
+    Vector3,
+};
+use foxglove::{Encode as _, Schema};
+use nalgebra::UnitQuaternion;
+
+use super::foxglove_parts::{ball, colour, pose, quadrotor, turned};
+use super::scene::{Colour, Theme};
+use super::timeline::{QuadrotorShape, attitudes_of};
+use tautline_core::record::{Event, Sample};
+use tautline_core::swarm::{Pair, Rows, row, separation};
+use tautline_laws::graph::Graph;
+use tautline_laws::space::{Obstacle, Shape};
+use tautline_recordings::mcap::{ExtraTopic, Topic};
+use tautline_sim::plan::Plan;
+use tautline_sim::scenario::Scenario;
+
+/// Scenes a second \[Hz\].
+pub const SCENE_HZ: f64 = 5.0;
+/// Most edges that are in a scene.
+const MOST_EDGES: usize = 300;
+/// Most vehicles that are, but for those that are too close to another.
+const MOST_VEHICLES: usize = 2000;
+/// Most quadrotors that are shown with arms and rotors: of more, each is a ball.
+const MOST_QUADROTORS: usize = 100;
+/// Width of an edge \[m\].
+const EDGE_M: f64 = 0.03;
+/// Side of the plate that stands for a half-space \[m\].
+const PLATE_M: f64 = 100.0;
+/// Times are products of steps.
+const ROUNDING_S: f64 = 1e-6;
+
+/// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls or quadrotors, keep-out shells, edges in the colour of their
+/// tension, in the colours of [`Theme::Dark`], [`SCENE_HZ`] times a second.
+///
+/// Of more than 2000 vehicles so many are shown, evenly chosen, and those that are closer than delta to another.
+/// A scene takes some 230 bytes for each vehicle, of which a half is its shell, and 140 for each edge (none where there
+/// are more than 300), so beside 72 bytes for each vehicle and sample at 60 Hz a recording grows by less than a third,
+/// and one of few vehicles by a half. Up to 100 quadrotors have arms and rotors, turned as they are, in some 1100 bytes
+/// each.
+pub struct FoxgloveScene {
+    plan: Plan,
+    radius_m: Vec<f64>,
+    shape: Option<QuadrotorShape>,
+    delta_m: f64,
+    /// Height of shells over their width.
+    shell_ratio: f64,
+    next_s: f64,
+    schema: Option<Schema>,
+    /// Pairs that are closer than delta, by the judge of the flight.
+    violated: BTreeSet<Pair>,
+}
+
+impl FoxgloveScene {
+    /// Scenes of a flight of this scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self {
+            plan: Plan::of(scenario),
+            radius_m: scenario.hull_radius_m.clone(),
+            shape: QuadrotorShape::of(scenario),
+            delta_m: scenario.delta_m,
+            shell_ratio: scenario.metric().ratio(),
+            next_s: f64::NEG_INFINITY,
+            schema: SceneUpdate::get_schema(),
+            violated: BTreeSet::new(),
+        }
+    }
+
+    fn scene(&self, sample: &Sample<'_>) -> SceneUpdate {
+        let theme = Theme::Dark;
+        let (time_s, positions_m) = (sample.time_s, &sample.swarm.positions_m);
+        let count = positions_m.nrows();
+        let mut alarm = vec![false; count];
+        for pair in self.violated.iter().filter(|pair| pair.second() < count) {
+            (alarm[pair.first()], alarm[pair.second()]) = (true, true);
+        }
+        // The share of the vehicles up to this one passes a whole number at those that are chosen.
+        let share = |k: usize| k * MOST_VEHICLES / count;
+        let is_shown = |k: &usize| count <= MOST_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
+        let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
+        let attitudes = if count <= MOST_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
+        let attitude = |k: usize| attitudes.get(k).copied().flatten();
+        let fliers = (0..count).filter_map(|k| {
+            let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
+            Some(quadrotor(&shape, row(positions_m, k), attitude(k)?, hull_colour(k)))
+        });
+        let fliers: Vec<_> = fliers.collect();
+        let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
+        let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
+        let bodies = fliers.iter().map(|flier| flier.body);
+        let rotors = fliers.iter().flat_map(|flier| flier.rotors);
+        let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
+            Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
+            _ => None,
+        });
+        let shells = (0..count).filter(is_shown).map(|k| {
+            let colour = if alarm[k] { theme.alarm() } else { theme.shell() };
+            let mut shell = sphere(positions_m, k, self.delta_m / 2.0, colour.at(0.15));
+            shell.size.iter_mut().for_each(|size| size.z *= self.shell_ratio);
+            shell
+        });
+        let mut lines = LinePrimitive {
+            r#type: LineType::LineList.into(),
+            pose: Some(pose(Vector3::default())),
+            thickness: EDGE_M,
+            ..LinePrimitive::default()
+        };
+        let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MOST_EDGES);
+        for (i, j) in few_edges.into_iter().flat_map(Graph::edges) {
+            let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
+            for place in [i, j].map(|k| row(positions_m, k)) {
+                lines.points.push(Point3 { x: place.x, y: place.y, z: place.z });
+                lines.colors.push(colour(theme.tension(tension).at(0.8)));
+            }
+        }
+        SceneUpdate {
+            deletions: Vec::new(),
+            entities: vec![SceneEntity {
+                timestamp: Some(timestamp(time_s)),
+                frame_id: "world".to_owned(),
+                id: "swarm".to_owned(),
+                spheres: bodies.chain(hulls).chain(shells).chain(solids).collect(),
+                cubes: self.plan.obstacles.iter().filter_map(cube).collect(),
+                cylinders: self.plan.obstacles.iter().filter_map(cylinder).chain(rotors).collect(),
+                lines: Some(lines)
+                    .filter(|lines| !lines.points.is_empty())
+                    .into_iter()
+                    .chain(fliers.iter().map(|flier| flier.arms.clone()))
+                    .collect(),
+                ..SceneEntity::default()
+            }],
+        }
+    }
+}
+
+impl ExtraTopic for FoxgloveScene {
+    fn topic(&self) -> Topic<'_> {
+        let (schema_name, schema_encoding, schema) = self
+            .schema
+            .as_ref()
+            .map(|schema| (schema.name.as_str(), schema.encoding.as_str(), &*schema.data))
+            .unwrap_or_default();
+        Topic { name: "/scene", message_encoding: "protobuf", schema_name, schema_encoding, schema }
+    }
+
+    fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool> {
+        if sample.time_s < self.next_s - ROUNDING_S {
+            return Ok(false);
+        }
+        self.next_s = sample.time_s + 1.0 / SCENE_HZ;
+        message.clear();
+        self.scene(sample).encode(message).map_err(io::Error::other)?;
+        Ok(true)
+    }
+
+    fn note(&mut self, event: &Event) {
+        self.plan.note(event);
+        match *event {
+            Event::ViolationBegan { pair, .. } => _ = self.violated.insert(pair),
+            Event::ViolationEnded { pair, .. } => _ = self.violated.remove(&pair),
+            _ => {}
+        }
+    }
+}
+
+fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SpherePrimitive {
+    ball(row(positions_m, k), radius_m, shown)
+}
+
+/// A box, or a half-space as a plate around its place.
+fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
+    let (size, turn) = match obstacle.shape {
+        Shape::Box { half_m, yaw_deg } => {
+            (half_m * 2.0, UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw_deg.to_radians()))
+        }
+        Shape::HalfSpace { normal } => (nalgebra::Vector3::new(PLATE_M, PLATE_M, 1e-3), from_z(normal)),
+        Shape::Ball { .. } | Shape::Capsule { .. } => return None,
+    };
+    Some(CubePrimitive {
+        pose: Some(turned(obstacle.place_m, turn)),
+        size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
+        color: Some(colour(Theme::Dark.obstacle())),
+    })
+}
+
+/// A capsule without its ends.
+fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
+    let Shape::Capsule { from_m, to_m, radius_m } = obstacle.shape else { return None };
+    let side = 2.0 * radius_m;
+    Some(CylinderPrimitive {
+        pose: Some(turned(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
+        size: Some(Vector3 { x: side, y: side, z: (to_m - from_m).norm() + side }),
+        bottom_scale: 1.0,
+        top_scale: 1.0,
+        color: Some(colour(Theme::Dark.obstacle())),
+    })
+}
+
+/// What turns the z axis to a direction.
+fn from_z(direction: nalgebra::Vector3<f64>) -> UnitQuaternion<f64> {
+    let z = nalgebra::Vector3::z();
+    UnitQuaternion::rotation_between(&z, &direction)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI))
+}
+
+fn timestamp(time_s: f64) -> Timestamp {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
+    let (seconds, nanoseconds) = (time_s.floor() as u32, ((time_s - time_s.floor()) * 1e9) as u32);
+    Timestamp::new_checked(seconds, nanoseconds).unwrap_or(Timestamp::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use foxglove::Decode as _;
+
+    use super::*;
+    use tautline_core::swarm::Swarm;
+    use tautline_sim::scenario::Source;
+
+    fn pentagon() -> Scenario {
+        Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in")
+    }
+
+    fn message(scene: &mut FoxgloveScene, time_s: f64, swarm: &Swarm) -> Option<Vec<u8>> {
+        let control = Rows::zeros(swarm.count());
+        let sample = Sample::new(time_s, 0, swarm, &control);
+        let mut bytes = Vec::new();
+        scene.message(&sample, &mut bytes).expect("encoded").then_some(bytes)
+    }
+
+    #[test]
+    fn a_scene_holds_the_obstacles() {
+        let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+        let mut scene = FoxgloveScene::of(&scenario);
+        let bytes = message(&mut scene, 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let entity = &update.entities[0];
+        assert_eq!((entity.cubes.len(), entity.cylinders.len()), (2, 3));
+        let cable = entity.cylinders[2].pose.and_then(|pose| pose.position).expect("a place");
+        assert_eq!((cable.x, cable.y, cable.z), (16.0, 0.0, 7.25));
+        assert_eq!(entity.cubes[0].size.map(|size| (size.x, size.y, size.z)), Some((3.0, 5.0, 3.0)));
+    }
+
+    #[test]
+    fn a_scene_holds_every_vehicle_with_its_shell_and_every_edge() {
+        let scenario = pentagon();
+        let mut scene = FoxgloveScene::of(&scenario);
+        let bytes = message(&mut scene, 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let entity = &update.entities[0];
+        assert_eq!((entity.spheres.len(), entity.lines[0].points.len()), (10, 20));
+        assert_eq!(entity.spheres[0].size.map(|size| size.x), Some(0.5));
+        assert_eq!(entity.spheres[0].pose.and_then(|pose| pose.position).map(|at| (at.x, at.y)), Some((3.0, -0.05)));
+        assert_eq!(entity.spheres[5].size.map(|size| size.x), Some(2.0));
+        let topic = scene.topic();
+        assert_eq!(
+            (topic.schema_name, topic.message_encoding),
+            ("foxglove.SceneUpdate", SceneUpdate::get_message_encoding().as_str())
+        );
+        assert!(!topic.schema.is_empty());
+    }
+
+    #[test]
+    fn a_shell_is_as_high_as_the_ellipsoid_that_must_stay_empty() {
+        let scenario =
+            Scenario { safety: tautline_sim::scenario::Safety::Ellipsoid { half_height_m: 3.0 }, ..pentagon() };
+        let bytes = message(&mut FoxgloveScene::of(&scenario), 0.0, &scenario.start).expect("a message");
+        let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
+        let size = |k: usize| update.entities[0].spheres[k].size.map(|size| (size.x, size.y, size.z));
+        assert_eq!((size(0), size(5)), (Some((0.5, 0.5, 0.5)), Some((2.0, 2.0, 6.0))));
+    }
+
+    #[test]
+    fn a_quadrotor_is_turned_as_it_flies_and_many_are_balls() {
+        let entity = |count: usize, tilt_rad: f64| {
+            let start = Swarm::at_rest(tautline_laws::formation::Formation::grid(count, 3.0).slots_m);
+            let formation = tautline_laws::formation::Formation { slots_m: start.positions_m.clone() };
+            let mut scene = FoxgloveScene::of(&Scenario::new("fliers", start.clone(), formation, 2.0, 1.0));
+            let mut attitude = tautline_core::record::Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
+            let half = 0.5 * tilt_rad;
+            attitude.values = [half.cos(), 0.0, half.sin(), 0.0].repeat(count);
+            let (control, channels, mut bytes) = (Rows::zeros(count), [attitude], Vec::new());
+            let sample = Sample { channels: &channels, ..Sample::new(0.0, 0, &start, &control) };
+            scene.message(&sample, &mut bytes).expect("encoded");
+            (
+                SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0),
+                row(&start.positions_m, 0),
+                bytes,
+            )
+        };
+        let (tilted, place, bytes) = entity(2, 0.4);
+        assert_eq!((tilted.spheres.len(), tilted.cylinders.len(), tilted.lines.len()), (4, 8, 3));
+        assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
+        let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
+        let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
+        // Ahead is down where it flies ahead.
+        let x = QuadrotorShape::within(0.25).rotors_m[0].x;
+        assert!(
+            (at.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12 && (at.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
+        );
+        assert!((turn.y - 0.2_f64.sin()).abs() < 1e-12 && (turn.w - 0.2_f64.cos()).abs() < 1e-12);
+        let (level, place, _) = entity(2, 0.0);
+        assert_eq!(front(&level).position.map(|at| at.z), Some(place.z));
+        let (many, ..) = entity(MOST_QUADROTORS + 1, 0.4);
+        assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MOST_QUADROTORS + 1), 0));
+    }
+
+    #[test]
+    fn two_without_an_edge_between_them_are_red_too_while_the_judge_finds_them_too_close() {
+        let mut scenario = pentagon();
+        scenario.graph = tautline_laws::graph::Graph::ring(5);
+        let mut swarm = scenario.start.clone();
+        let place = row(&swarm.positions_m, 0) + nalgebra::Vector3::new(0.0, 0.0, 1.9);
+        tautline_core::swarm::set_row(&mut swarm.positions_m, 2, place);
+        let mut scene = FoxgloveScene::of(&scenario);
+        let red = |scene: &mut FoxgloveScene, time_s: f64| {
+            let bytes = message(scene, time_s, &swarm).expect("a message");
+            let entity = SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities.remove(0);
+            assert!(entity.lines[0].pose.is_some());
+            [0, 2, 4].map(|k| entity.spheres[k].color == Some(colour(Theme::Dark.alarm())))
+        };
+        assert_eq!(red(&mut scene, 0.0), [false; 3], "the judge has said nothing");
+        let (pair, time_s, min_m) = (Pair::new(0, 2), 0.5, 1.9);
+        scene.note(&Event::ViolationBegan { pair, time_s });
+        assert_eq!(red(&mut scene, 1.0), [true, true, false]);
+        scene.note(&Event::ViolationEnded { pair, time_s, min_m });
+        assert_eq!(red(&mut scene, 2.0), [false; 3]);
+    }
+
+    #[test]
+    fn a_scene_of_many_vehicles_holds_some_of_them_and_those_that_are_too_close() {
+        let count = 4001;
+        let formation = tautline_laws::formation::Formation::grid(count, 3.0);
+        let start = Swarm::at_rest(formation.slots_m.clone());
+        let scenario = Scenario::new("many", start.clone(), formation, 2.0, 1.0);
+        let mut scene = FoxgloveScene::of(&scenario);
+        let shown = |time_s: f64, scene: &mut FoxgloveScene| {
+            let bytes = message(scene, time_s, &start).expect("a message");
+            SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities[0].spheres.len()
+        };
+        assert_eq!(shown(0.0, &mut scene), 2 * MOST_VEHICLES);
+        for first in [0, 2, 3, 4000] {
+            scene.note(&Event::ViolationBegan { pair: Pair::new(first, (first + 1) % count), time_s: 0.5 });
+        }
+        let more = shown(1.0, &mut scene) / 2 - MOST_VEHICLES;
+        assert!((2..=4).contains(&more), "of 0 to 4 and 4000 some are shown anyway: {more}");
+    }
+
+    #[test]
+    fn scenes_come_five_times_a_second_and_take_what_the_documentation_says() {
+        let scenario = pentagon();
+        let mut scene = FoxgloveScene::of(&scenario);
+        let sizes: Vec<usize> = (0..=60_u32)
+            .filter_map(|k| message(&mut scene, f64::from(k) / 60.0, &scenario.start))
+            .map(|bytes| bytes.len())
+            .collect();
+        assert_eq!(sizes.len(), 6);
+        let most = 5 * 230 + 10 * 140 + 60;
+        assert!(sizes.iter().all(|&size| size <= most && size > most / 2), "{sizes:?} of {most}");
+    }
+}

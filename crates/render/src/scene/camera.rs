@@ -1,0 +1,331 @@
+//! Where the picture is taken from.
+
+use std::str::FromStr;
+
+use nalgebra::Vector3;
+
+use crate::error::RenderError;
+
+/// Half of the vertical angle of view, as a tangent: 35 degrees in all.
+pub(crate) const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
+/// Parts of the picture's half width and height that framing leaves to captions: left, right, bottom, top.
+const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
+/// Nearest that a camera is put to what it looks at \[m\].
+const MIN_DISTANCE_M: f64 = 1e-3;
+/// Where `iso` looks from: azimuth and elevation \[degrees\].
+pub(crate) const ISO_DEG: [f64; 2] = [-62.0, 32.0];
+
+/// Which camera to use.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum CameraSpec {
+    /// From above at an angle, framing the whole flight.
+    #[default]
+    Iso,
+    /// Straight down, x to the right and y up, in parallel projection, framing the whole flight.
+    Top,
+    /// Along +y, x to the right and z up, in parallel projection, framing the whole flight.
+    Front,
+    /// Along -x, y to the right and z up, in parallel projection, framing the whole flight.
+    Side,
+    /// At the angle of `iso`, moving with the vehicle of this name.
+    Follow(String),
+    /// At the angle of `iso`, near the closest pair.
+    Closest,
+    /// Around the middle of the flight.
+    Orbit(Orbit),
+}
+
+/// A camera on a sphere around what it looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orbit {
+    /// Direction from the target to the camera, from the x axis towards the y axis \[degrees\].
+    pub azimuth_deg: f64,
+    /// Height of the camera above the target's horizon \[degrees\], from -90 to 90.
+    pub elevation_deg: f64,
+    /// Distance from the target \[m\].
+    pub distance_m: f64,
+}
+
+impl FromStr for CameraSpec {
+    type Err = RenderError;
+
+    fn from_str(text: &str) -> Result<Self, RenderError> {
+        match text {
+            "iso" => return Ok(Self::Iso),
+            "top" => return Ok(Self::Top),
+            "front" => return Ok(Self::Front),
+            "side" => return Ok(Self::Side),
+            "closest" => return Ok(Self::Closest),
+            _ => {}
+        }
+        if let Some(name) = text.strip_prefix("follow:").filter(|name| !name.is_empty()) {
+            return Ok(Self::Follow(name.to_owned()));
+        }
+        let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        let Ok([azimuth_deg, elevation_deg, distance_m]) = numbers.as_deref() else {
+            return Err(RenderError::Camera(format!("`{text}` is not a camera")));
+        };
+        let range = |what| Err(RenderError::Camera(format!("the camera `{text}` has {what}")));
+        if !azimuth_deg.is_finite() {
+            return range("an azimuth that is not a finite number");
+        }
+        if !(-90.0..=90.0).contains(elevation_deg) {
+            return range("an elevation that is not between -90 and 90 degrees");
+        }
+        if !(MIN_DISTANCE_M..=1e9).contains(distance_m) {
+            return range("a distance that is not between 0.001 and 1e9 m");
+        }
+        Ok(Self::Orbit(Orbit { azimuth_deg: *azimuth_deg, elevation_deg: *elevation_deg, distance_m: *distance_m }))
+    }
+}
+
+/// How depth becomes size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// Half of the picture's width and height, as tangents.
+    Perspective([f64; 2]),
+    /// Half of the picture's width and height \[m\].
+    Parallel([f64; 2]),
+}
+
+/// A camera in place. Lengths are in the scene's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it is \[m\].
+    pub eye_m: Vector3<f64>,
+    /// Unit vector to the right of the picture.
+    pub right: Vector3<f64>,
+    /// Unit vector to the top of the picture.
+    pub up: Vector3<f64>,
+    /// Unit vector from what is looked at to the camera.
+    pub back: Vector3<f64>,
+    /// Perspective or parallel.
+    pub lens: Lens,
+    /// Width and height of the picture \[pixels\].
+    pub size_px: [u32; 2],
+}
+
+/// A point in the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projected {
+    /// To the right and down from the top left corner \[pixels\].
+    pub at_px: [f64; 2],
+    /// Distance ahead of the camera \[m\].
+    pub depth_m: f64,
+    /// Pixels in a metre across the line of sight.
+    pub px_per_m: f64,
+}
+
+impl Camera {
+    /// A camera that sees all balls (centre and radius \[m\]) and is as near as that allows.
+    pub(super) fn framing(spec: &CameraSpec, balls: &[(Vector3<f64>, f64)], size_px: [u32; 2]) -> Self {
+        let ([azimuth_deg, elevation_deg], parallel) = match spec {
+            CameraSpec::Top => ([-90.0, 90.0], true),
+            CameraSpec::Front => ([-90.0, 0.0], true),
+            CameraSpec::Side => ([0.0, 0.0], true),
+            CameraSpec::Orbit(orbit) => ([orbit.azimuth_deg, orbit.elevation_deg], false),
+            _ => (ISO_DEG, false),
+        };
+        let [right, up, back] = axes(azimuth_deg, elevation_deg);
+        let half = if parallel { 1.0 } else { TAN_HALF_VIEW };
+        let across = half * aspect(size_px);
+        let room = [across, across, half, half];
+        let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - MARGINS[side]));
+        // How far each side of the view must reach.
+        let mut reaches = [f64::NEG_INFINITY; 4];
+        for (centre, radius) in balls {
+            let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
+            for (side, offset) in [-x, x, -y, y].into_iter().enumerate() {
+                let slope = slopes[side];
+                let reach = if parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
+                reaches[side] = reaches[side].max(reach);
+            }
+        }
+        if reaches.iter().any(|reach| !reach.is_finite()) {
+            reaches = [half; 4];
+        }
+        let need = |low: usize, high: usize| (reaches[low] + reaches[high]) / (slopes[low] + slopes[high]);
+        let distance_m = need(0, 1).max(need(2, 3)).max(MIN_DISTANCE_M);
+        let middle = |low: usize, high: usize| {
+            let (least, most) = (reaches[high] - slopes[high] * distance_m, slopes[low] * distance_m - reaches[low]);
+            f64::midpoint(least, most)
+        };
+        let behind = if parallel { far_behind(back, balls) } else { distance_m };
+        let eye_m = right * middle(0, 1) + up * middle(2, 3) + back * behind;
+        let lens = if parallel {
+            Lens::Parallel([across * distance_m, distance_m])
+        } else {
+            Lens::Perspective([across, half])
+        };
+        Self { eye_m, right, up, back, lens, size_px }
+    }
+
+    /// A camera in perspective that looks at a target \[m\].
+    #[must_use]
+    pub fn orbiting(orbit: Orbit, target_m: Vector3<f64>, size_px: [u32; 2]) -> Self {
+        let [right, up, back] = axes(orbit.azimuth_deg, orbit.elevation_deg);
+        Self {
+            eye_m: target_m + back * orbit.distance_m,
+            right,
+            up,
+            back,
+            lens: Lens::Perspective([TAN_HALF_VIEW * aspect(size_px), TAN_HALF_VIEW]),
+            size_px,
+        }
+    }
+
+    /// A camera at the angle of `iso` from which a ball of this radius \[m\] fills the height of the picture.
+    pub(super) fn close_up(target_m: Vector3<f64>, radius_m: f64, size_px: [u32; 2]) -> Self {
+        let narrow = TAN_HALF_VIEW * aspect(size_px).min(1.0);
+        let distance_m = (radius_m * narrow.hypot(1.0) / narrow).max(MIN_DISTANCE_M);
+        let orbit = Orbit { azimuth_deg: ISO_DEG[0], elevation_deg: ISO_DEG[1], distance_m };
+        Self::orbiting(orbit, target_m, size_px)
+    }
+
+    /// The point in coordinates of the camera: right, up, towards it \[m\].
+    pub(super) fn seen(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+        let from_eye = point_m - self.eye_m;
+        Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
+    }
+
+    /// Where a point is in the picture; none where it is not ahead of a camera in perspective.
+    #[must_use]
+    pub fn project(&self, point_m: Vector3<f64>) -> Option<Projected> {
+        let seen = self.seen(point_m);
+        let depth_m = -seen.z;
+        let [width, height] = self.size_px.map(f64::from);
+        let half = match self.lens {
+            Lens::Perspective(tangents) if depth_m > 0.0 => tangents.map(|tangent| tangent * depth_m),
+            Lens::Perspective(_) => return None,
+            Lens::Parallel(half) => half,
+        };
+        let at_px = [(1.0 + seen.x / half[0]) * width / 2.0, (1.0 - seen.y / half[1]) * height / 2.0];
+        let px_per_m = height / 2.0 / half[1];
+        at_px.iter().all(|x| x.is_finite()).then_some(Projected { at_px, depth_m, px_per_m })
+    }
+
+    /// The ray through a point of the picture \[pixels from the top left corner\]: origin \[m\] and unit direction.
+    #[cfg(test)]
+    pub(super) fn ray(&self, at_px: [f64; 2]) -> [Vector3<f64>; 2] {
+        let [width, height] = self.size_px.map(f64::from);
+        let (x, y) = (at_px[0] / width * 2.0 - 1.0, 1.0 - at_px[1] / height * 2.0);
+        match self.lens {
+            Lens::Perspective([across, half]) => {
+                [self.eye_m, (self.right * (x * across) + self.up * (y * half) - self.back).normalize()]
+            }
+            Lens::Parallel([across, half]) => {
+                [self.eye_m + self.right * (x * across) + self.up * (y * half), -self.back]
+            }
+        }
+    }
+}
+
+/// Right, up and back of a camera in this direction from its target.
+fn axes(azimuth_deg: f64, elevation_deg: f64) -> [Vector3<f64>; 3] {
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth_deg.to_radians().sin_cos(), elevation_deg.to_radians().sin_cos());
+    let back = Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e);
+    let right = Vector3::new(-sin_a, cos_a, 0.0);
+    [right, back.cross(&right), back]
+}
+
+fn aspect([width, height]: [u32; 2]) -> f64 {
+    f64::from(width) / f64::from(height.max(1))
+}
+
+/// A distance behind all balls, for parallel projection.
+fn far_behind(back: Vector3<f64>, balls: &[(Vector3<f64>, f64)]) -> f64 {
+    let (mut nearest, mut farthest) = (f64::NEG_INFINITY, f64::INFINITY);
+    for (centre, radius) in balls {
+        nearest = nearest.max(back.dot(centre) + radius);
+        farthest = farthest.min(back.dot(centre) - radius);
+    }
+    if nearest.is_finite() { nearest + (nearest - farthest).max(1.0) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Framing solves linear equations: right to some units of rounding of a picture's width.
+    const ROUNDING_PX: f64 = 1e-6;
+
+    fn edges(camera: &Camera, balls: &[(Vector3<f64>, f64)]) -> [f64; 4] {
+        let mut sides = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
+        for &(centre, radius) in balls {
+            // The outline of a ball, from many tangent rays around it.
+            for k in 0..720_u32 {
+                let (sin, cos) = f64::from(k).to_radians().sin_cos();
+                let across = camera.right * cos + camera.up * sin;
+                let point = match camera.lens {
+                    Lens::Parallel(_) => centre + across * radius,
+                    Lens::Perspective(_) => {
+                        let to_eye = camera.eye_m - centre;
+                        let distance = to_eye.norm();
+                        let axis = to_eye / distance;
+                        let across = (across - axis * axis.dot(&across)).normalize();
+                        let cosine = radius / distance;
+                        centre + (axis * cosine + across * (1.0 - cosine * cosine).sqrt()) * radius
+                    }
+                };
+                let at = camera.project(point).expect("ahead").at_px;
+                sides = [sides[0].min(at[0]), sides[1].max(at[0]), sides[2].min(at[1]), sides[3].max(at[1])];
+            }
+        }
+        sides
+    }
+
+    #[test]
+    fn framing_shows_every_ball_whole_and_wastes_no_room() {
+        let balls = [([0.0, 0.0, 0.0], 1.0), ([12.0, 3.0, 0.0], 0.5), ([5.0, -4.0, 2.0], 1.5)]
+            .map(|(centre, radius)| (Vector3::from(centre), radius));
+        let specs = ["iso", "top", "front", "side", "20,70,9"].map(|text| CameraSpec::from_str(text).expect(text));
+        for spec in &specs {
+            for size_px in [[1280, 720], [300, 900], [64, 64]] {
+                let camera = Camera::framing(spec, &balls, size_px);
+                let [left, right, top, bottom] = edges(&camera, &balls);
+                let [width, height] = size_px.map(f64::from);
+                let free = [left, width - right, height - bottom, top];
+                let wanted = [0, 1, 2, 3].map(|side| MARGINS[side] * if side < 2 { width } else { height } / 2.0);
+                let spare = [0, 1, 2, 3].map(|side| free[side] - wanted[side]);
+                // The outline is sampled at half degrees: 1e-4 of a ball's size.
+                let tolerance = ROUNDING_PX + 2e-4 * width.max(height);
+                assert!(spare.iter().all(|&spare| spare >= -tolerance), "{spec:?} {size_px:?}: {spare:?}");
+                let tight = [spare[0] + spare[1], spare[2] + spare[3]];
+                assert!(tight[0].min(tight[1]) <= 2.0 * tolerance, "{spec:?} {size_px:?}: {spare:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_through_the_image_of_a_point_meets_the_point() {
+        let balls = [(Vector3::new(1.0, 2.0, 3.0), 2.0), (Vector3::new(-4.0, 0.0, 1.0), 1.0)];
+        for spec in [CameraSpec::Iso, CameraSpec::Top] {
+            let camera = Camera::framing(&spec, &balls, [640, 480]);
+            let [origin, direction] = camera.ray(camera.project(balls[0].0).expect("ahead").at_px);
+            let miss = (balls[0].0 - origin).cross(&direction).norm();
+            assert!(miss < 1e-9, "{spec:?}: {miss} m");
+        }
+    }
+
+    #[test]
+    fn nothing_to_frame_is_no_reason_to_fail() {
+        for balls in [vec![], vec![(Vector3::zeros(), 0.0)], vec![(Vector3::repeat(f64::NAN), 1.0)]] {
+            let camera = Camera::framing(&CameraSpec::Iso, &balls, [10, 10]);
+            assert!(camera.project(Vector3::zeros()).is_some(), "{balls:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_camera_is_refused() {
+        for text in ["", "isometric", "follow:", "1,2", "1,2,3,4", "a,b,c"] {
+            let refused = CameraSpec::from_str(text);
+            let said = refused.expect_err(text).to_string();
+            assert_eq!(said, format!("`{text}` is not a camera"));
+        }
+        for text in ["nan,0,1", "0,91,1", "0,0,0", "0,0,-1", "0,0,nan", "0,0,1e10"] {
+            let said = CameraSpec::from_str(text).expect_err(text).to_string();
+            assert!(said.starts_with(&format!("the camera `{text}` has a")), "{said}");
+        }
+        assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow("cf 7".to_owned())));
+    }
+}

@@ -1,0 +1,377 @@
+//! Words about what is seen: caption, verdict, legend, numbers of the vehicles, the closest pair.
+
+use super::builder::SceneBuilder;
+use super::camera::Projected;
+use super::colour::Colour;
+use super::draw_list::{Annotation, pixels};
+use super::geometry::has_few_edges;
+use super::labels::{LabelLayout, width};
+use tautline_audit::Violation;
+use tautline_core::swarm::Pair;
+use tautline_core::text::at_least;
+use tautline_sim::plan::Plan;
+
+/// Most vehicles whose names are written on them; of more, those that are closer than delta to another are named.
+const NAMED: usize = 64;
+/// Most pairs closer than delta whose distance is written beside them: the worst ones.
+const LABELLED: usize = 3;
+/// Colours of the scale in the legend.
+const SHADES: i16 = 16;
+/// Widest picture \[pixels\] that has no room for a legend, and lowest.
+const NO_LEGEND_PX: [u32; 2] = [420, 260];
+/// Longest name that is written in full.
+const LONGEST_NAME: usize = 40;
+/// Fewest letters of a name that are worth writing.
+const FEWEST_LETTERS: usize = 4;
+/// Opacity of what is behind words.
+const BACKING: f32 = 0.72;
+
+impl SceneBuilder<'_> {
+    pub(super) fn caption(&self, labels: &mut LabelLayout) {
+        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.margin());
+        let width_px = self.view.size_px[0] as f32;
+        let mut y = self.banner(labels);
+        let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
+        let (bottom, taken) = labels.placed();
+        // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
+        let large_px = 1.35 * size_px;
+        let time = match self.timeline.plan.as_ref().map(|plan| plan.leg_at(self.frame.time_s)) {
+            Some((leg, legs)) if legs > 1 => format!("leg {} of {legs}, t = {:.2} s", leg + 1, self.frame.time_s),
+            _ => format!("t = {:.2} s", self.frame.time_s),
+        };
+        let mut free_px = width_px - 2.0 * margin;
+        if width(large_px, &time) > free_px {
+            return;
+        }
+        free_px = labels.put([width_px - margin, y], [1.0, 0.0], large_px, theme.ink(), &time)[0][0] - 2.0 * margin;
+        let below = y + 1.8 * size_px;
+        let (verdicts, colour) = self.verdict();
+        let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
+        let verdict_px = verdict.map(|text| labels.put([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
+        labels.back(taken, bottom, ground, room_px);
+        let (_, taken) = labels.placed();
+        if let Some(name) = cut(&shortened(&self.timeline.name), large_px, free_px) {
+            labels.put([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
+            labels.back(taken, bottom, ground, room_px);
+        }
+        y = below;
+        let (_, taken) = labels.placed();
+        let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
+        if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
+            labels.put([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
+            labels.back(taken, bottom, ground, room_px);
+        }
+    }
+
+    /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
+    fn banner(&self, labels: &mut LabelLayout) -> f32 {
+        let Some(&(violation, drawn_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
+        let Violation { min_m, min_at_s, limit_m, .. } = *violation;
+        let (pair, limit) = (self.pair(violation.pair), metres(limit_m));
+        let apart = if drawn_m < limit_m {
+            format!("{} apart", metres(drawn_m))
+        } else if min_m < limit_m {
+            format!("{} apart at {min_at_s:.2} s", metres(min_m))
+        } else {
+            "too close".to_owned()
+        };
+        let more = match self.violated.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let texts = [
+            format!("VIOLATION  vehicles {pair} {apart}, delta {limit}{more}"),
+            format!("VIOLATION {pair} {apart}"),
+            "VIOLATION".to_owned(),
+        ];
+        self.alarm(labels, &texts)
+    }
+
+    /// The same where nobody is too near to another vehicle, and somebody to an obstacle.
+    fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
+        let Some(near) = self.too_near.first() else { return self.margin() };
+        let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+        let more = match self.too_near.len() - 1 {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let texts = [
+            format!("VIOLATION  vehicle {vehicle} too near to {obstacle}{more}"),
+            format!("VIOLATION {vehicle} {obstacle}"),
+            "VIOLATION".to_owned(),
+        ];
+        self.alarm(labels, &texts)
+    }
+
+    /// Writes the first of three texts that has room across the top, and frames the picture; gives where the caption begins.
+    fn alarm(&self, labels: &mut LabelLayout, texts: &[String; 3]) -> f32 {
+        let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
+        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
+        let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
+        let bottom = 1.9 * size_px;
+        labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
+        let corners_px = [[0.0, 0.0], [width_px, height_px]];
+        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: 5.0 * self.view.unit_px() });
+        let ink = self.view.theme.on_alarm();
+        labels.put([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, ink, text);
+        labels.reserve([[0.0, 0.0], [width_px, bottom]]);
+        bottom + 0.6 * self.margin()
+    }
+
+    /// What can be said up to now, in a few words and in fewer.
+    fn verdict(&self) -> (Vec<String>, Colour) {
+        let (theme, now_s) = (self.view.theme, self.frame.time_s);
+        if let Some(why) = self.timeline.unjudged() {
+            return (vec![format!("not judged: {why}"), "not judged".to_owned()], theme.soft_ink());
+        }
+        let began: Vec<_> = self.timeline.begun(now_s).collect();
+        let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
+        if began.is_empty()
+            && let Some(near) = self.timeline.too_near_by(now_s).next()
+        {
+            let at = format!("violated at {:.2} s", near.from_s);
+            let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+            let texts = vec![format!("{at} by {vehicle} near {obstacle}"), at, "violated".to_owned()];
+            return (texts, theme.alarm());
+        }
+        match (began.first(), undecided_s) {
+            (None, None) if self.timeline.assumes_straight => {
+                let texts =
+                    ["clear so far, if straight between samples", "clear so far, if straight", "if straight: clear"];
+                (texts.map(str::to_owned).to_vec(), theme.good())
+            }
+            (None, None) => (vec!["clear so far".to_owned()], theme.good()),
+            (None, Some(from_s)) => {
+                let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.range_s()[0]));
+                (vec![since, "undecided".to_owned()], theme.soft_ink())
+            }
+            (Some(span), _) => {
+                let at = match began.len() {
+                    1 => format!("violated at {:.2} s", span.from_s),
+                    many => format!("{many} violations, the first at {:.2} s", span.from_s),
+                };
+                let mut texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
+                if let Some((hit_s, pair, closing_m_s)) = self.timeline.hit.filter(|&(hit_s, ..)| hit_s <= now_s) {
+                    let hit = format!("hulls of {} hit at {hit_s:.2} s, {closing_m_s:.2} m/s", self.pair(pair));
+                    texts.splice(..0, [format!("{}; {hit}", texts[0]), hit, "violated, hulls hit".to_owned()]);
+                }
+                (texts, theme.alarm())
+            }
+        }
+    }
+
+    /// The closest approach up to now, at length and in short.
+    fn closest_so_far(&self) -> Vec<String> {
+        let Some(approach) = self.frame.so_far else { return Vec::new() };
+        let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
+        let at = format!("{:.2} s", approach.time_s);
+        let scaled = if self.timeline.metric.is_metres() { "" } else { ", scaled" };
+        let delta = |delta_m| format!("  (delta {}{scaled})", metres(delta_m));
+        let delta = self.timeline.delta_m.map_or(String::new(), delta);
+        vec![
+            format!("closest so far {separation}, vehicles {pair} at {at}{delta}"),
+            format!("closest so far {separation}, {pair}{delta}"),
+            format!("closest so far {separation}"),
+        ]
+    }
+
+    pub(super) fn legend(&self, labels: &mut LabelLayout) {
+        let [width_px, height_px] = self.view.size_px;
+        if width_px < NO_LEGEND_PX[0] || height_px < NO_LEGEND_PX[1] {
+            return;
+        }
+        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.margin());
+        let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.soft_ink());
+        let (mut x, y) = (margin, height_px as f32 - margin);
+        let (bottom, taken) = labels.placed();
+        let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px as f32 - margin;
+        // Writes words at a place from the left; gives where the next ones begin.
+        let write = |labels: &mut LabelLayout, x: f32, text: &str| {
+            labels.put([x, y], [0.0, 1.0], size_px, ink, text)[1][0] + 1.5 * size_px
+        };
+        if let Some(plan) = plan.filter(|_| layers.edges) {
+            let hidden = format!("{} edges, not drawn", plan.graph.edge_count());
+            if has_few_edges(plan) {
+                let [left, scale] = [x, 9.0 * size_px];
+                let colours = (-SHADES..=SHADES).map(|k| theme.tension(f32::from(k) / f32::from(SHADES))).collect();
+                let corners_px = [[left, y - 0.6 * size_px], [left + scale, y]];
+                labels.draw(Annotation::Scale { corners_px, colours });
+                labels.reserve(corners_px);
+                for (text, part) in [("push", 0.0), ("rest", 0.5), ("pull", 1.0)] {
+                    labels.put([left + part * scale, y - 0.9 * size_px], [part, 1.0], size_px, ink, text);
+                }
+                x += scale + 2.0 * size_px;
+            } else if fits(x, &hidden) {
+                x = write(labels, x, &hidden);
+            }
+        }
+        let (width_px, arm, middle) = (1.6 * self.view.unit_px(), 0.32 * size_px, y - size_px / 2.0);
+        let ring =
+            |x, radius_px, colour, width_px| Annotation::Ring { at_px: [x, middle], radius_px, colour, width_px };
+        if layers.marks && fits(x + size_px, "start") {
+            for down in [arm, -arm] {
+                let ends_px = [[x, middle - down], [x + 2.0 * arm, middle + down]];
+                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
+            }
+            x = write(labels, x + size_px, "start");
+        }
+        if layers.marks && plan.is_some() && fits(x + size_px, "goal slot") {
+            labels.draw(ring(x + arm, 1.1 * arm, ink, width_px));
+            x = write(labels, x + size_px, "goal slot");
+        }
+        let has_reference = plan.is_some_and(|plan| plan.reference_at(self.frame.time_s).is_some());
+        if layers.marks && has_reference && fits(x + size_px, "reference") {
+            let middle_x = x + arm;
+            let corners = [[middle_x, middle - arm], [middle_x + arm, middle], [middle_x, middle + arm], [x, middle]];
+            for side in 0..4 {
+                let ends_px = [corners[side], corners[(side + 1) % 4]];
+                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
+            }
+            x = write(labels, x + size_px, "reference");
+        }
+        let is_ball = self.timeline.metric.is_metres();
+        let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
+        if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
+            labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
+            write(labels, x + 1.2 * size_px, shell);
+        }
+        labels.back(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
+    }
+
+    /// Keeps words off the vehicles that have names.
+    pub(super) fn keep_off_vehicles(&self, labels: &mut LabelLayout) {
+        for (k, at) in self.named() {
+            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
+            labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
+        }
+    }
+
+    /// The distance of the closest pair, and of the worst pairs closer than delta, beside the line that joins them; not
+    /// where that is outside the picture or has no room.
+    pub(super) fn distances(&self, labels: &mut LabelLayout) {
+        let theme = self.view.theme;
+        let size_px = self.view.text_px(1.0);
+        let alarmed = self.violated.iter().take(LABELLED).map(|&(violation, drawn_m)| (violation.pair, drawn_m, true));
+        let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
+        for (pair, distance_m, alarm) in alarmed.chain(nearest) {
+            let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
+            let text = metres(distance_m);
+            let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
+            let at = middle.and_then(|middle| labels.find(middle.at_px, &distances_px, size_px, &text));
+            let Some(at) = at else { continue };
+            let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
+            let corners_px = [[at[0] - half, at[1] - 0.68 * size_px], [at[0] + half, at[1] + 0.68 * size_px]];
+            let (ground, ink) =
+                if alarm { (theme.alarm(), theme.on_alarm()) } else { (theme.background().at(0.82), theme.ink()) };
+            labels.draw(Annotation::Box { corners_px, colour: ground, round_px: 0.3 * size_px });
+            labels.put(at, [0.5, 0.5], size_px, ink, &text);
+            labels.reserve(corners_px);
+        }
+    }
+
+    /// The vehicles that have names, with where they are: all of few, else those of the worst violations.
+    fn named(&self) -> impl Iterator<Item = (usize, Projected)> {
+        let mut named: Vec<usize> = Vec::new();
+        if self.timeline.count() <= NAMED {
+            named.extend(0..self.timeline.count());
+        } else {
+            for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
+                if named.len() < NAMED && !named.contains(&k) {
+                    named.push(k);
+                }
+            }
+        }
+        named.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
+    }
+
+    /// The names of the vehicles, on those that are large enough and beside the others.
+    pub(super) fn names(&self, labels: &mut LabelLayout) {
+        let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
+        for (k, at) in self.named() {
+            // One that is too close to another is often behind it.
+            let is_hidden = self.is_hidden(k, at);
+            if is_hidden && !self.alarmed[k] {
+                continue;
+            }
+            let leads = self.timeline.plan.as_ref().and_then(Plan::leader) == Some(k);
+            let name = shortened(&self.timeline.vehicles[k]) + if leads { " leads" } else { "" };
+            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
+            let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
+            if fitting >= 8.0 && !is_hidden {
+                let (at_px, anchor, colour) = ([x, y], [0.5, 0.5], theme.background());
+                labels.draw(Annotation::Words { at_px, anchor, size_px: fitting, colour, text: name });
+                continue;
+            }
+            let offset = f64::from(radius + 0.2 * size_px);
+            let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k) };
+            // Above to the right, above to the left, below to the right, below to the left: where there is room.
+            for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
+                let beside = [
+                    at.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
+                    at.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
+                ];
+                if labels.put_if_free(beside, [left, above], 0.85 * size_px, colour, &name) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Whether another vehicle is in front of the middle of this one.
+    fn is_hidden(&self, k: usize, own: Projected) -> bool {
+        let others = (0..self.timeline.count()).filter(|&other| other != k);
+        others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
+            let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
+            at.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * at.px_per_m
+        })
+    }
+
+    /// A pair by the names of its vehicles.
+    fn pair(&self, pair: Pair) -> String {
+        let name = |k: usize| self.timeline.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
+        format!("{}-{}", name(pair.first()), name(pair.second()))
+    }
+
+    fn margin(&self) -> f32 {
+        16.0 * self.view.unit_px()
+    }
+}
+
+/// A length to the millimetre, rounded down: what is said to be clear is clear.
+pub(crate) fn metres(length_m: f64) -> String {
+    format!("{} m", at_least(length_m, 3))
+}
+
+/// As much of a name as has room, with an ellipsis where it is cut; none where even a few letters have none.
+fn cut(name: &str, size_px: f32, room_px: f32) -> Option<String> {
+    if width(size_px, name) <= room_px {
+        return Some(name.to_owned());
+    }
+    let start = |letters: usize| name.chars().take(letters).chain(['…']).collect::<String>();
+    (FEWEST_LETTERS..name.chars().count()).rev().map(start).find(|start| width(size_px, start) <= room_px)
+}
+
+fn shortened(name: &str) -> String {
+    let name: String = name.chars().filter(|c| !c.is_control()).collect();
+    if name.chars().count() <= LONGEST_NAME {
+        return name;
+    }
+    name.chars().take(LONGEST_NAME - 1).chain(['…']).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distance_is_never_shown_larger_than_it_is() {
+        assert_eq!([1.999_999, 2.46, 2.0, 0.0].map(metres), ["1.999 m", "2.460 m", "2.000 m", "0.000 m"]);
+    }
+
+    #[test]
+    fn a_name_is_cut_to_its_room_or_left_out() {
+        assert_eq!(cut("pentagon", 10.0, 100.0).as_deref(), Some("pentagon"));
+        assert_eq!(cut("pentagon", 10.0, 40.0).as_deref(), Some("penta…"));
+        assert_eq!(cut("pentagon", 10.0, 20.0), None);
+    }
+}

@@ -1,0 +1,200 @@
+//! What has a place in space: vehicles, shells, edges, trails, start marks and goal slots.
+
+use nalgebra::Vector3;
+
+use super::builder::SceneBuilder;
+use super::camera::Lens;
+use super::colour::Theme;
+use super::draw_list::{Ball, Line, Scene, single};
+use tautline_core::swarm::Pair;
+use tautline_sim::plan::Plan;
+
+/// Most edges that are drawn: more hide what they join.
+const MOST_EDGES: usize = 2100;
+/// Most pieces of all trails together, and of one.
+const TRAIL_PIECES: usize = 60_000;
+const LONGEST_TRAIL: usize = 400;
+/// Part of a flight after which a trail has faded, and what is left of it then.
+const FADED_AFTER: f64 = 0.25;
+const FADED: f32 = 0.16;
+const FRESH: f32 = 0.95;
+/// Corners of a ring.
+const RING: u32 = 28;
+/// Radius of a goal slot over that of the hull.
+const SLOT: f64 = 1.45;
+/// Most vehicles that have start marks and goal slots.
+const MOST_MARKS: usize = 2000;
+/// Half of the diamond at the reference in a picture 720 pixels high \[pixels\].
+const REFERENCE_PX: f32 = 7.0;
+/// Least radius of a vehicle, of the cross where it started and of its goal slot in a picture 720 pixels high \[pixels\].
+const LEAST_PX: [f32; 3] = [2.0, 3.0, 4.0];
+
+/// Whether a graph has few enough edges to be drawn.
+pub(super) fn has_few_edges(plan: &Plan) -> bool {
+    plan.graph.edge_count() <= MOST_EDGES
+}
+
+impl SceneBuilder<'_> {
+    /// A radius at a place \[m\], or what so many pixels are there, whichever is more.
+    fn at_least(&self, place: Vector3<f64>, radius_m: f64, least_px: f32) -> f64 {
+        let px_per_m = self.camera.project(place).map_or(f64::INFINITY, |at| at.px_per_m);
+        radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
+    }
+
+    /// Radius of a vehicle's shell as seen from above \[m\], where it is shown.
+    fn shell_m(&self, k: usize) -> Option<f64> {
+        self.timeline.delta_m.filter(|_| self.view.layers.shells || self.alarmed[k]).map(|delta_m| delta_m / 2.0)
+    }
+
+    /// What the vehicles, and those of their shells that are shown, cover of the picture: middles and radii \[pixels\].
+    pub(super) fn covered_px(&self) -> Vec<([f64; 2], f64)> {
+        let cover = |k| {
+            let place = self.vehicle(k)?;
+            let at = self.camera.project(place)?;
+            let radius_m = self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]);
+            let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.metric.longest_m(shell_m));
+            Some((at.at_px, radius_m.max(shell_m) * at.px_per_m))
+        };
+        (0..self.timeline.count()).filter_map(cover).collect()
+    }
+
+    pub(super) fn vehicles(&self, scene: &mut Scene) {
+        let theme = self.view.theme;
+        let mut shells = Vec::new();
+        for k in 0..self.timeline.count() {
+            let Some(place) = self.vehicle(k) else { continue };
+            let alarm = self.alarmed[k];
+            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+            let ball = |radius_m, colour| Ball { centre_m: single(place), radius_m: radius_m as f32, colour };
+            let colour = self.body_colour(k);
+            match self.quadrotor(k) {
+                Some(quadrotor) => scene.balls.extend(quadrotor.body(colour, theme.ink())),
+                None => scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]), colour)),
+            }
+            if let Some(radius_m) = self.shell_m(k) {
+                let strength = if theme == Theme::Paper { 0.75 } else { 0.6 };
+                let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
+                let ball = ball(radius_m, colour);
+                // In parallel projection every line of sight is along the view.
+                let metric = self.timeline.metric;
+                let away = metric.scaled(place - self.camera.eye_m);
+                let power = match self.camera.lens {
+                    Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
+                    Lens::Parallel(_) if !metric.is_metres() => -away.dot(&metric.scaled(self.camera.back)),
+                    Lens::Parallel(_) => -self.camera.seen(Vector3::from(ball.centre_m.map(f64::from))).z,
+                };
+                shells.push((power, ball));
+            }
+        }
+        shells.sort_by(|a, b| b.0.total_cmp(&a.0));
+        scene.shells = shells.into_iter().map(|(_, ball)| ball).collect();
+    }
+
+    pub(super) fn edges(&self, lines: &mut Vec<Line>) {
+        let Some(plan) = self.timeline.plan.as_ref().filter(|plan| has_few_edges(plan)) else { return };
+        let many = plan.graph.edge_count() as f32;
+        let opacity = (36.0 / many).clamp(0.08, 0.9);
+        let width_px = (2.2 - many / 200.0).clamp(1.0, 2.2) * self.view.unit_px();
+        for pair in plan.graph.edges().map(|(i, j)| Pair::new(i, j)) {
+            let Some([from, to]) = self.ends(pair) else { continue };
+            let tension = plan.tension(pair, (to - from).norm(), self.frame.time_s);
+            // What acts is seen before what rests.
+            let strength = opacity * (0.45 + 0.55 * tension.abs());
+            lines.push(Line::new([from, to], self.view.theme.tension(tension).at(strength), width_px));
+        }
+    }
+
+    /// The pairs that must be seen: the closest one, and every one that is closer than delta.
+    pub(super) fn pairs(&self, lines: &mut Vec<Line>) {
+        let theme = self.view.theme;
+        // The worst one last, which is over the others.
+        let alarmed = self.violated.iter().rev().map(|(violation, _)| (violation.pair, theme.alarm(), 5.0));
+        let nearest = self.clear_nearest().map(|(pair, _)| (pair, theme.ink(), 2.6));
+        for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
+            let ends = self.ends(pair);
+            lines.extend(ends.map(|ends| Line::new(ends, colour, width * self.view.unit_px())));
+        }
+    }
+
+    /// Where every vehicle came from, as long ago as is asked for, fading with age. The corners are samples whose number is a multiple of a power of
+    /// two, so that a trail does not shimmer as time goes on.
+    pub(super) fn trails(&self, lines: &mut Vec<Line>) {
+        let (count, last, keyframes) = (self.timeline.count(), self.frame.keyframe, self.timeline.keyframes());
+        let ([first_s, last_s], now_s) = (self.timeline.range_s(), self.frame.time_s);
+        let fading_s = self.view.trail_s.unwrap_or(FADED_AFTER * (last_s - first_s)).max(1e-9);
+        let since_s = self.view.trail_s.map_or(first_s, |trail_s| now_s - trail_s);
+        let first = keyframes.partition_point(|keyframe| keyframe.time_s < since_s);
+        let most = (TRAIL_PIECES / count.max(1)).clamp(2, LONGEST_TRAIL);
+        let mut stride = 1;
+        while last.saturating_sub(first) / stride > most {
+            stride *= 2;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
+        let opacity = |time_s: f64| FADED + (FRESH - FADED) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
+        let width_px = if count < 50 { 2.0 } else { 1.3 } * self.view.unit_px();
+        let begins = self.timeline.positions_m(since_s).filter(|_| since_s > first_s);
+        let recorded = (first..=last).filter(|k| k.is_multiple_of(stride)).map(|k| &keyframes[k]);
+        let corners: Vec<_> = (begins.iter().map(|positions_m| (positions_m, opacity(since_s))))
+            .chain(recorded.map(|corner| (&corner.positions_m, opacity(corner.time_s))))
+            .chain([(&self.frame.positions_m, FRESH)])
+            .collect();
+        lines.reserve(count * corners.len());
+        for k in 0..count {
+            let colour = self.colour(k);
+            let corner = |positions_m, strength| Some((single(self.extent.place(positions_m, k)?), strength));
+            let mut from: Option<([f32; 3], f32)> = None;
+            for &(positions_m, strength) in &corners {
+                let to = corner(positions_m, strength);
+                if let (Some((start, faint)), Some((end, strong))) = (from, to)
+                    && start != end
+                {
+                    let colours = [colour.at(faint), colour.at(strong)];
+                    lines.push(Line { ends_m: [start, end], colours, width_px });
+                }
+                from = to;
+            }
+        }
+    }
+
+    /// Crosses where the vehicles started and rings where they belong at this time: the formation of the leg that is under
+    /// way, moved as the law leaves it free to be so that it fits best.
+    pub(super) fn starts_and_goals(&self, lines: &mut Vec<Line>) {
+        let count = self.timeline.count();
+        let Some(first) = self.timeline.keyframes().first().filter(|_| count <= MOST_MARKS) else { return };
+        let (right, up) = (self.camera.right, self.camera.up);
+        let width_px = 1.8 * self.view.unit_px();
+        // Many opaque ones would hide what they mark.
+        let opacity = (40.0 / count.max(1) as f32).clamp(0.05, 0.9);
+        for k in 0..count {
+            let Some(place) = self.extent.place(&first.positions_m, k) else { continue };
+            let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, LEAST_PX[1]);
+            for across in [(right + up) * arm, (right - up) * arm] {
+                lines.push(Line::new([place - across, place + across], self.colour(k).at(opacity), width_px));
+            }
+        }
+        let Some(plan) = &self.timeline.plan else { return };
+        let Some(slots_m) = plan.slots_at(self.frame.time_s, &self.frame.positions_m) else { return };
+        for (k, slot_m) in slots_m.into_iter().enumerate().take(count) {
+            let centre = slot_m - self.extent.origin_m();
+            let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, LEAST_PX[2]);
+            let corner = |n: u32| {
+                let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
+                centre + (right * cos + up * sin) * radius
+            };
+            let colour = self.colour(k).at(opacity);
+            lines.extend((0..RING).map(|n| Line::new([corner(n), corner(n + 1)], colour, width_px)));
+        }
+        if let Some(place_m) = plan.reference_at(self.frame.time_s) {
+            self.diamond(place_m - self.extent.origin_m(), width_px, lines);
+        }
+    }
+
+    /// Where the reference is.
+    fn diamond(&self, centre: Vector3<f64>, width_px: f32, lines: &mut Vec<Line>) {
+        let arm = self.at_least(centre, 0.0, REFERENCE_PX);
+        let [right, up] = [self.camera.right, self.camera.up].map(|axis| axis * arm);
+        let corners = [centre + up, centre + right, centre - up, centre - right];
+        let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.ink(), width_px);
+        lines.extend((0..4).map(side));
+    }
+}

@@ -1,0 +1,133 @@
+//! The ground with its scale, and axes.
+
+use nalgebra::Vector3;
+
+use super::builder::SceneBuilder;
+use super::colour::{Colour, Theme};
+use super::draw_list::Line;
+use super::labels::{LabelLayout, width};
+use tautline_core::text::decimals_of;
+
+/// Most lines of the ground in each direction.
+const MOST_LINES: u32 = 60;
+/// Sine of the elevation below which the ground is seen as a line.
+const EDGE_ON: f64 = 0.05;
+/// Length of the axes in distances of lines of the ground.
+const AXIS: f64 = 1.0;
+/// Colours of x, y and z on dark and on light ground: the usual red, green and blue, none of them pure.
+const AXES: [[Colour; 3]; 2] = [
+    [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
+    [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
+];
+
+impl SceneBuilder<'_> {
+    pub(super) fn ground(&self, lines: &mut Vec<Line>) {
+        let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
+        let width_px = self.view.unit_px().max(0.7);
+        for (along, across) in [(0, 1), (1, 0)] {
+            for k in 0..=steps(high[along] - low[along], step) {
+                let mut ends_m = [low, low];
+                ends_m[0][along] = low[along] + f64::from(k) * step;
+                ends_m[1] = ends_m[0];
+                ends_m[1][across] = high[across];
+                lines.push(Line::new(ends_m, self.view.theme.grid(), width_px));
+            }
+        }
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            lines.push(Line::new([low, low + Vector3::ith(axis, AXIS * step)], colour, 2.4 * width_px));
+        }
+    }
+
+    fn axes(&self) -> [Colour; 3] {
+        AXES[usize::from(self.view.theme != Theme::Dark)]
+    }
+
+    /// Metres along the two edges of the ground that are nearest to the camera, and the names of the axes.
+    pub(super) fn scale(&self, labels: &mut LabelLayout) {
+        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
+            let foreshortened = self.camera.back[axis].abs() > 0.97;
+            if let Some(at) = self.camera.project(tip).filter(|_| !foreshortened) {
+                labels.put_if_free(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
+            }
+        }
+        // A number over a ball would be taken for its name.
+        let covered_px = self.covered_px();
+        let is_covered = |[x, y]: [f64; 2], text: &str| {
+            let half = [width(size_px, text), size_px].map(|side| f64::from(side) / 2.0);
+            covered_px.iter().any(|([at_x, at_y], radius)| {
+                ((x - at_x).abs() - half[0]).max(0.0).hypot(((y - at_y).abs() - half[1]).max(0.0)) < *radius
+            })
+        };
+        let centre = (low + high) / 2.0;
+        for axis in 0..2 {
+            let other = 1 - axis;
+            // Edge-on there is no edge to write along.
+            if self.camera.back[axis].abs() > 0.97
+                || self.camera.back.z.abs() < EDGE_ON && axis == 1 && self.camera.back.y.abs() > 0.5
+            {
+                continue;
+            }
+            let edge = [low[other], high[other]].into_iter().max_by(|&a, &b| {
+                let height = |at: f64| {
+                    let mut point = centre;
+                    point[other] = at;
+                    self.camera.project(point).map_or(f64::NEG_INFINITY, |projected| projected.at_px[1])
+                };
+                height(a).total_cmp(&height(b))
+            });
+            let Some(edge) = edge else { continue };
+            let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
+            // Seen along the ground the numbers are below the line that it is.
+            let (anchor, below_px) = if self.camera.back.z.abs() < EDGE_ON {
+                ([0.5, 0.0], 0.4 * f64::from(size_px))
+            } else {
+                ([0.5; 2], 0.0)
+            };
+            // The unit is that of the last number that has room.
+            let mut unit = " m";
+            for k in (0..=steps(high[axis] - low[axis], step)).rev() {
+                let mut point = low;
+                point[axis] += f64::from(k) * step;
+                point[other] = edge + outwards * 0.42 * step;
+                let text = format!("{}{unit}", plain(point[axis] + origin_m[axis], step));
+                let Some(at) = self.camera.project(point) else { continue };
+                let [x, y] = at.at_px;
+                let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
+                if !is_covered(middle, &text) && labels.put_if_free([x, y + below_px], anchor, size_px, soft, &text) {
+                    unit = "";
+                }
+            }
+        }
+    }
+}
+
+/// How many whole steps there are in a length.
+fn steps(length: f64, step: f64) -> u32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let steps = (length / step).round() as u32;
+    steps.min(MOST_LINES)
+}
+
+/// A multiple of a step with as many decimals as the step has.
+fn plain(metres: f64, step: f64) -> String {
+    let decimals = decimals_of(step, 9);
+    // Adding 0 turns a negative zero into zero.
+    format!("{:.decimals$}", (metres / step).round() * step + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_shows_round_numbers() {
+        assert_eq!(
+            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)),
+            ["0", "4", "0.30", "-15"]
+        );
+        assert_eq!(steps(f64::INFINITY, 1.0), MOST_LINES);
+    }
+}

@@ -1,0 +1,380 @@
+use nalgebra::Vector3;
+
+use super::*;
+use crate::timeline::Timeline;
+use tautline_core::record::{Event, Sample};
+use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
+use tautline_laws::formation::Formation;
+use tautline_laws::graph::Graph;
+use tautline_laws::space::Metric;
+use tautline_sim::scenario::Scenario;
+
+/// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
+fn timeline() -> Timeline {
+    let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 3.0, 1.0, 0.0, 3.0, 1.0]));
+    let formation = Formation { slots_m: start.positions_m.clone() };
+    let scenario = Scenario::new("square", start.clone(), formation, 2.0, 10.0);
+    let mut timeline = Timeline::of(&scenario);
+    for k in 0..=10_u32 {
+        let time_s = f64::from(k);
+        let mut swarm = start.clone();
+        swarm.positions_m.column_mut(0).add_scalar_mut(time_s);
+        let separation = Some(ClosestApproach { pair: Pair::new(0, 1), separation_m: 3.0 - 0.1 * time_s, time_s });
+        let control = Rows::zeros(4);
+        timeline.take(&Sample { separation, ..Sample::new(time_s, u64::from(k), &swarm, &control) });
+    }
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 4.0 });
+    timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: 6.0, min_m: 1.5 });
+    timeline
+}
+
+fn scene(timeline: &Timeline, time_s: f64, view: &View) -> Scene {
+    let (frame, extent) = (timeline.at(time_s).expect("a frame"), Extent::of(timeline));
+    let camera = extent.camera(timeline, &frame, view).expect("a camera");
+    Scene::compose(timeline, &extent, &frame, view, camera)
+}
+
+fn words(scene: &Scene) -> Vec<&str> {
+    let text = |mark: &'_ Annotation| matches!(mark, Annotation::Words { .. });
+    scene
+        .annotations
+        .iter()
+        .filter(|annotation| text(annotation))
+        .map(|annotation| if let Annotation::Words { text, .. } = annotation { text } else { "" })
+        .collect()
+}
+
+fn camera(text: &str) -> View {
+    View { camera: text.parse().expect(text), ..View::default() }
+}
+
+#[test]
+fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
+    let timeline = timeline();
+    for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
+        let scene = scene(&timeline, 2.0, &camera(text));
+        assert_eq!((scene.balls.len(), scene.shells.len()), (4, 4), "{text}");
+        assert!(scene.balls.iter().all(|ball| ball.radius_m == 0.25), "{text}");
+        assert!(scene.shells.iter().all(|shell| shell.radius_m == 1.0), "{text}");
+    }
+}
+
+#[test]
+fn shells_come_farthest_first_along_every_line_of_sight() {
+    let mut timeline = timeline();
+    for (text, ratio) in
+        ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
+    {
+        let metric = Metric::of_ratio(ratio);
+        timeline.metric = metric;
+        let scene = scene(&timeline, 2.0, &camera(text));
+        assert_eq!(f64::from(scene.shell_ratio), ratio);
+        let camera = scene.camera;
+        let centre = |ball: &Ball| Vector3::from(ball.centre_m.map(f64::from));
+        // Where rays enter each shell, through points all over the picture, in lengths in which shells are balls.
+        for n in 0..400_u32 {
+            let at_px = [f64::from(n % 20) * 64.0, f64::from(n / 20) * 36.0];
+            let [origin, direction] = camera.ray(at_px);
+            let direction = metric.scaled(direction);
+            let length = direction.norm_squared();
+            let entries: Vec<f64> = scene
+                .shells
+                .iter()
+                .filter_map(|shell| {
+                    let to_centre = metric.scaled(centre(shell) - origin);
+                    let along = to_centre.dot(&direction) / length;
+                    let squared = 1.0 - (to_centre.norm_squared() - along * along * length);
+                    (squared > 0.0).then(|| along - (squared / length).sqrt())
+                })
+                .collect();
+            assert!(entries.windows(2).all(|pair| pair[0] >= pair[1]), "{text}, {ratio}: {entries:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_that_are_off_leave_nothing_behind() {
+    let timeline = timeline();
+    let bare = scene(&timeline, 2.0, &View { layers: Layers::NONE, ..View::default() });
+    assert_eq!((bare.balls.len(), bare.shells.len(), bare.lines.len(), bare.annotations.len()), (4, 0, 0, 0));
+    let whole = scene(&timeline, 2.0, &View::default());
+    assert!(whole.lines.len() > 6 + 4 * 2 && whole.annotations.len() > 10);
+}
+
+#[test]
+fn a_violation_shows_while_it_lasts_and_is_remembered() {
+    let timeline = timeline();
+    let alarm = Theme::Dark.alarm();
+    let red = |scene: &Scene| scene.balls.iter().filter(|ball| ball.colour == alarm).count();
+    let says = |scene: &Scene, what: &str| words(scene).iter().any(|text| text.contains(what));
+    let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&timeline, time_s, &View::default()));
+    assert_eq!([&before, &during, &after].map(red), [0, 2, 0]);
+    assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
+    assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
+    assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
+    // Of several, their number is said, and which was the first.
+    let mut again = timeline;
+    again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
+    let twice = scene(&again, 8.0, &View::default());
+    assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
+    let timeline = self::timeline();
+    // Even with every layer off, what is violated has its shell.
+    let bare = scene(&timeline, 5.0, &View { layers: Layers::NONE, ..View::default() });
+    assert_eq!(bare.shells.len(), 2);
+}
+
+#[test]
+fn a_violation_that_no_sample_shows_is_told_by_its_judge_and_drawn_as_it_is_known() {
+    let mut timeline = timeline();
+    let pair = Pair::new(2, 3);
+    timeline.note(&Event::ViolationBegan { pair, time_s: 8.2 });
+    timeline.note(&Event::ViolationEnded { pair, time_s: 8.4, min_m: 1.25 });
+    let violation = timeline.violations()[1];
+    assert_eq!((violation.min_m, violation.min_at_s), (1.25, 0.5 * (8.2 + 8.4)));
+    let scene = scene(&timeline, violation.min_at_s, &View::default());
+    let (banner, label) = ("VIOLATION  vehicles 3-4 1.250 m apart at 8.30 s, delta 2.000 m", "3.000 m");
+    assert!(words(&scene).contains(&banner) && words(&scene).contains(&label), "{:?}", words(&scene));
+    assert!(!words(&scene).contains(&"1.250 m"), "they are drawn 3 m apart");
+}
+
+#[test]
+fn what_the_judge_finds_after_the_last_sample_is_in_the_last_picture() {
+    let mut timeline = timeline();
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 10.01 });
+    let says = |time_s: f64| {
+        let scene = scene(&timeline, time_s, &View::default());
+        words(&scene).iter().any(|text| text.starts_with("VIOLATION  vehicles 3-4"))
+    };
+    assert_eq!([9.9, 10.0, 10.5].map(says), [false, true, true]);
+}
+
+#[test]
+fn what_the_judge_cannot_tell_is_not_called_clear() {
+    let mut timeline = timeline();
+    timeline.undecided_s = Some(2.0);
+    let verdict = |time_s: f64| {
+        let scene = scene(&timeline, time_s, &View::default());
+        words(&scene).into_iter().find(|text| text.starts_with("clear") || text.starts_with("und")).map(str::to_owned)
+    };
+    let said = [1.9, 2.0, 4.5].map(verdict);
+    assert_eq!(said, [Some("clear so far".to_owned()), Some("undecided from 2.00 s on".to_owned()), None]);
+    // What was assumed is said in the same line.
+    (timeline.undecided_s, timeline.assumes_straight) = (None, true);
+    let scene = scene(&timeline, 1.9, &View::default());
+    assert!(words(&scene).contains(&"clear so far, if straight between samples"), "{:?}", words(&scene));
+}
+
+#[test]
+fn the_caption_says_the_smallest_separation_so_far() {
+    let timeline = timeline();
+    let scene = scene(&timeline, 3.0, &View::default());
+    assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1-2 at 3.00 s")));
+    assert!(words(&scene).contains(&"t = 3.00 s") && words(&scene).contains(&"square"));
+}
+
+#[test]
+fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
+    let timeline = timeline();
+    let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
+    let scene = scene(&timeline, 10.0, &only);
+    let extent = Extent::of(&timeline);
+    // Two strokes of a cross for each start, then rings.
+    assert_eq!(scene.lines.len(), 4 * 2 + 4 * 28);
+    let middle = |line: &Line| {
+        let [a, b] = line.ends_m.map(|end| Vector3::from(end.map(f64::from)));
+        (a + b) / 2.0 + extent.origin_m()
+    };
+    assert!((middle(&scene.lines[0]) - Vector3::new(0.0, 0.0, 1.0)).norm() < 1e-6);
+    let ring: Vector3<f64> = scene.lines[8..36].iter().map(middle).sum::<Vector3<f64>>() / 28.0;
+    assert!((ring - Vector3::new(10.0, 0.0, 1.0)).norm() < 1e-6, "{ring}");
+}
+
+#[test]
+fn edges_push_below_their_rest_length_and_pull_beyond_it() {
+    let timeline = timeline();
+    let plan = timeline.plan.as_ref().expect("a plan");
+    assert_eq!(plan.graph, Graph::complete(4));
+    let tension = |distance_m| plan.tension(Pair::new(0, 1), distance_m, 0.0);
+    assert!(tension(3.0).abs() < 1e-12 && tension(2.5) < 0.0 && tension(4.0) > 0.0);
+    assert_eq!((tension(2.0), tension(2.001)), (-1.0, -1.0));
+    assert!(tension(1e3) > 0.999_999);
+}
+
+#[test]
+fn a_follower_of_nobody_is_told_whom_it_can_follow() {
+    let timeline = timeline();
+    let frame = timeline.at(0.0).expect("a frame");
+    let error = Extent::of(&timeline).camera(&timeline, &frame, &camera("follow:9")).expect_err("no vehicle 9");
+    assert_eq!(error.to_string(), "there is no vehicle `9` to follow; the flight has 1, 2, 3, 4");
+}
+
+#[test]
+fn no_size_of_picture_and_no_swarm_breaks_the_list() {
+    let timeline = timeline();
+    for size_px in [[1, 1], [64, 2000], [16_384, 16], [320, 180]] {
+        let scene = scene(&timeline, 5.0, &View { size_px, ..View::default() });
+        let finite = |at: &[f32; 2]| at.iter().all(|x| x.is_finite());
+        assert!(scene.annotations.iter().all(|annotation| if let Annotation::Words { at_px, .. } = annotation {
+            finite(at_px)
+        } else {
+            true
+        }));
+    }
+    let mut alone = Timeline::new("alone", 1);
+    let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
+    alone.take(&Sample::new(0.0, 0, &swarm, &Rows::zeros(1)));
+    assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
+    let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
+    let mut far_away = Timeline::new("far", 1);
+    far_away.take(&Sample::new(0.0, 0, &far, &Rows::zeros(1)));
+    assert_eq!(scene(&far_away, 0.0, &View::default()).balls[0].centre_m, [0.0; 3], "drawn around its own origin");
+}
+
+#[test]
+fn the_worst_pair_is_named_first_and_few_are_labelled() {
+    let mut timeline = timeline();
+    for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+        timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
+    }
+    let scene = scene(&timeline, 5.0, &View::default());
+    let banner = "VIOLATION  vehicles 1-2 1.500 m apart at 5.00 s, delta 2.000 m and 5 more";
+    assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
+    let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
+    assert!((1..=3).contains(&labels), "{:?}", words(&scene));
+}
+
+#[test]
+fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
+    let mut timeline = timeline();
+    "an exceedingly long name of a flight".clone_into(&mut timeline.name);
+    let said = |size_px| {
+        let scene = scene(&timeline, 3.0, &View { size_px, ..View::default() });
+        let [name, time] = ["an ex", "t = "].map(|start| words(&scene).iter().any(|text| text.starts_with(start)));
+        (name, time)
+    };
+    assert_eq!(
+        [[1280, 720], [320, 240], [90, 60], [40, 30]].map(said),
+        [(true, true), (true, true), (false, true), (false, false)]
+    );
+}
+
+#[test]
+fn what_is_too_small_to_see_is_a_dot() {
+    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 30e3, 0.0, 1.0]));
+    let mut timeline = Timeline::new("far", 2);
+    for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
+        swarm.positions_m[(1, 1)] = time_s;
+        let control = Rows::zeros(2);
+        timeline.take(&Sample::new(time_s, step as u64, &swarm, &control));
+    }
+    let scene = scene(&timeline, 0.0, &camera("top"));
+    let at = scene.camera.project(Vector3::zeros()).expect("ahead");
+    assert!(scene.balls.iter().all(|ball| f64::from(ball.radius_m) * at.px_per_m > 1.4), "{:?}", scene.balls);
+}
+
+#[test]
+fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit() {
+    let timeline = timeline();
+    for text in ["iso", "front", "side", "top"] {
+        let scene = scene(&timeline, 2.0, &camera(text));
+        let unit = words(&scene).iter().filter(|text| text.ends_with(" m") && !text.contains('.')).count();
+        assert!((1..=2).contains(&unit), "{text}: {:?}", words(&scene));
+    }
+    let front = scene(&timeline, 2.0, &camera("front"));
+    let ground = front.camera.project(Extent::of(&timeline).ground_m[0]).expect("ahead").at_px[1];
+    let numbers = front.annotations.iter().filter_map(|annotation| match annotation {
+        Annotation::Words { at_px, anchor: [_, 0.0], text, .. }
+            if text.trim_end_matches(" m").parse::<f64>().is_ok() =>
+        {
+            Some(at_px[1])
+        }
+        _ => None,
+    });
+    assert!(numbers.clone().count() > 2 && numbers.clone().all(|y| f64::from(y) > ground + 4.0));
+}
+
+#[test]
+fn of_many_vehicles_those_that_are_too_close_are_named() {
+    let places: Vec<f64> = (0..100_u32).flat_map(|k| [f64::from(k % 10) * 4.0, f64::from(k / 10) * 4.0, 5.0]).collect();
+    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&places));
+    swarm.positions_m[(99, 0)] = swarm.positions_m[(98, 0)] + 0.5;
+    let mut timeline = Timeline::new("many", 100);
+    timeline.delta_m = Some(1.0);
+    let control = Rows::zeros(100);
+    for time_s in [0.0, 1.0] {
+        timeline.take(&Sample::new(time_s, 0, &swarm, &control));
+    }
+    timeline.note(&Event::ViolationBegan { pair: Pair::new(98, 99), time_s: 0.5 });
+    let named = |time_s| {
+        let layers = Layers { labels: true, ..Layers::NONE };
+        let scene = scene(&timeline, time_s, &View { layers, ..camera("top") });
+        words(&scene).into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(named(0.0), Vec::<String>::new());
+    assert_eq!(named(1.0), ["99", "100"]);
+}
+
+#[test]
+fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
+    // One on the ground and three high above its edges, which are seen over them from above.
+    let places = [0.0, 0.0, 0.5, 6.0, 0.0, 9.0, 0.0, 6.0, 9.0, -6.0, -6.0, 9.0];
+    let swarm = Swarm::at_rest(Rows::from_row_slice(&places));
+    let mut timeline = Timeline::new("tower", 4);
+    timeline.delta_m = Some(2.0);
+    let control = Rows::zeros(4);
+    timeline.take(&Sample::new(0.0, 0, &swarm, &control));
+    let numbers = |view: &View| {
+        let scene = scene(&timeline, 0.0, view);
+        let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();
+        let at = |annotation: &Annotation| match annotation {
+            Annotation::Words { at_px, text, .. } if number(text) => Some(*at_px),
+            _ => None,
+        };
+        (scene.camera, scene.annotations.iter().filter_map(at).collect::<Vec<_>>())
+    };
+    let mut dropped = 0;
+    let sides = (0..360).step_by(20).flat_map(|azimuth| [5, 30, 60, 80].map(|elevation| (azimuth, elevation)));
+    for (azimuth, elevation) in sides {
+        let view = |shells| View {
+            layers: Layers { ground: true, shells, ..Layers::NONE },
+            ..camera(&format!("{azimuth},{elevation},18"))
+        };
+        let (camera, with) = numbers(&view(true));
+        let (_, without) = numbers(&view(false));
+        dropped += without.len() - with.len().min(without.len());
+        for k in 0..4 {
+            let place = Extent::of(&timeline).place(&timeline.at(0.0).expect("a frame").positions_m, k).expect("there");
+            let Some(ball) = camera.project(place) else { continue };
+            let clear = |at: &[f32; 2]| {
+                let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);
+                x.hypot(y) > 1.0 * ball.px_per_m
+            };
+            assert!(with.iter().all(clear), "{azimuth}, {elevation} degrees");
+        }
+    }
+    assert!(dropped > 0, "shells cover numbers from some side");
+}
+
+/// A leg later, behind a reference that moves: goals are the slots of that leg where the reference has carried them.
+#[test]
+fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
+    use tautline_laws::target::{Begins, Guidance, Leg, ReferenceMotion};
+
+    let start = Swarm::at_rest(Formation::line(4, 3.0).slots_m);
+    let mut scenario = Scenario::new("legs", start.clone(), Formation { slots_m: start.positions_m }, 2.0, 10.0);
+    scenario.law = tautline_laws::law::LawSpec::Displacement(tautline_laws::law::DisplacementKeys::default());
+    let next = Leg { begins: Begins::At(1.0), ..Leg::first(Formation::grid(4, 5.0)) };
+    scenario.legs.push(next);
+    scenario.reference = Some(Guidance {
+        motion: ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::new(0.5, 0.0, 0.0) },
+        known_by: tautline_laws::graph::Pinning::Leader(2),
+        feed_forward: true,
+    });
+    let mut plan = tautline_sim::plan::Plan::of(&scenario);
+    plan.note(&tautline_core::record::Event::LegBegan { leg: 1, time_s: 1.0 });
+    let slot = |time_s: f64, k: usize| plan.slots_at(time_s, &Rows::zeros(4)).expect("slots")[k];
+    let first_m = row(&scenario.legs[0].formation.slots_m, 1);
+    assert_eq!(slot(0.5, 1), first_m + Vector3::new(0.25, 0.0, 0.0));
+    assert_eq!(slot(2.0, 1), Vector3::new(5.0 + 1.0, 0.0, 0.0));
+    assert_eq!((plan.leg_at(0.5), plan.leg_at(2.0), plan.leader()), ((0, 2), (1, 2), Some(2)));
+}

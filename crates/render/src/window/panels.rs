@@ -1,0 +1,321 @@
+//! What the window shows around the picture, and what the mouse does.
+
+use egui::{
+    Button, Color32, Key, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2,
+};
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::player::Player;
+use super::plot::plot;
+use super::state::WindowState;
+use crate::gpu::paint;
+use crate::scene::{Extent, Projected, Scene, metres};
+use crate::timeline::Frame;
+use tautline_core::swarm::{Pair, row};
+use tautline_sim::plan::Plan;
+
+/// Degrees that the camera turns for a point that the mouse is dragged.
+const TURN_DEG: f64 = 0.35;
+/// Most neighbours of the picked vehicle that are listed.
+const LISTED: usize = 8;
+/// Room for the button of the help \[points\].
+const HELP_HEIGHT: f32 = 28.0;
+
+/// Keys and what they do, for the help.
+const HELP: [(&str, &str); 14] = [
+    ("Space", "play, pause"),
+    ("Left, Right", "a sample back, on"),
+    ("Home, End", "to the start, to the end"),
+    ("N", "to the closest approach"),
+    ("- , +", "slower, faster"),
+    ("drag, W A S D", "turn the camera"),
+    ("right drag", "move the camera"),
+    ("wheel, Page Up, Page Down", "nearer, farther"),
+    ("click, V", "pick a vehicle, the next one"),
+    ("F, T", "frame everything, change colours"),
+    ("1 to 8", "shells, edges, trails, marks, ground, names, closest pair, caption"),
+    ("Tab", "to the next button"),
+    ("P", "write a picture beside you"),
+    ("H, Q", "this help, quit"),
+];
+
+/// The picture, and what is in it.
+pub(super) struct Viewport<'a> {
+    pub(super) texture: TextureId,
+    pub(super) extent: &'a Extent,
+    /// The flight at this time and its draw list; none before its first sample.
+    pub(super) drawn: Option<&'a (Frame, Scene)>,
+}
+
+impl Viewport<'_> {
+    /// Where a vehicle is in the picture and how large \[pixels\].
+    fn on_picture(&self, k: usize, player: &Player) -> Option<(Projected, Vec2, f32)> {
+        let (frame, scene) = self.drawn?;
+        let at = scene.camera.project(self.extent.place(&frame.positions_m, k)?)?;
+        #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+        let [x, y, radius] = [at.at_px[0], at.at_px[1], player.timeline.radius_m[k] * at.px_per_m].map(|v| v as f32);
+        Some((at, vec2(x, y), radius))
+    }
+
+    /// The nearest vehicle whose ball, or a few pixels around its middle, is at a point of the picture.
+    fn pick(&self, point: Vec2, player: &Player) -> Option<usize> {
+        let depth_m = |k: usize| {
+            let (at, place, radius) = self.on_picture(k, player)?;
+            ((place - point).length() <= radius.max(8.0)).then_some(at.depth_m)
+        };
+        let hit = (0..player.timeline.count()).filter_map(|k| Some((k, depth_m(k)?)));
+        hit.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    }
+}
+
+/// Draws the panels and the picture; gives the area that is left for the picture \[points\].
+pub(super) fn show(ui: &mut Ui, state: &mut WindowState, player: &mut Player, viewport: &Viewport<'_>) -> Rect {
+    egui::Panel::bottom("time").show(ui, |ui| controls(ui, state, player));
+    egui::Panel::right("sides").default_size(230.0).show(ui, |ui| sides(ui, state, player, viewport));
+    egui::CentralPanel::no_frame().show(ui, |ui| picture(ui, state, player, viewport)).inner
+}
+
+fn picture(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewport<'_>) -> Rect {
+    let area = ui.available_rect_before_wrap();
+    let response = ui.allocate_rect(area, Sense::click_and_drag());
+    let points = ui.ctx().pixels_per_point();
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    let painter = ui.painter_at(area);
+    painter.image(viewport.texture, area, whole, Color32::WHITE);
+    if let Some((_, scene)) = viewport.drawn {
+        paint(&painter, &scene.annotations, area.min.to_vec2(), points);
+    }
+    if let Some((_, at, radius)) = state.picked.and_then(|picked| viewport.on_picture(picked, player)) {
+        let stroke = Stroke::new(2.0, ui.visuals().strong_text_color());
+        painter.circle_stroke(area.min + at / points, (radius / points).max(6.0) + 4.0, stroke);
+    }
+    let drag = response.drag_delta();
+    if response.dragged_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) {
+        state.turn(-f64::from(drag.x) * TURN_DEG, f64::from(drag.y) * TURN_DEG);
+    } else if response.dragged()
+        && let Some((_, scene)) = viewport.drawn
+    {
+        state.pan(drag, &scene.camera, area.height());
+    }
+    if response.hovered() {
+        let wheel = ui.input(|input| input.smooth_scroll_delta().y);
+        if wheel != 0.0 {
+            state.approach((-f64::from(wheel) * 0.003).exp());
+        }
+    }
+    if response.clicked()
+        && let Some(at) = response.interact_pointer_pos()
+    {
+        state.picked = viewport.pick((at - area.min) * points, player);
+    }
+    if state.help {
+        help(ui.ctx(), &mut state.help);
+    }
+    area
+}
+
+fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewport<'_>) {
+    ui.add_space(4.0);
+    ui.label(RichText::new("Layers").strong());
+    ui.columns(2, |columns| {
+        for (k, (name, shown)) in state.layers().into_iter().enumerate() {
+            columns[k % 2].checkbox(shown, format!("{} {name}", k + 1));
+        }
+    });
+    ui.separator();
+    ui.label(RichText::new("Separation").strong());
+    plot(ui, player);
+    ui.separator();
+    let height = (ui.available_height() - HELP_HEIGHT).max(0.0);
+    egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (state.picked, viewport.drawn) {
+        (Some(picked), Some((frame, _))) if picked < player.timeline.count() => vehicle(ui, player, frame, picked),
+        _ => {
+            ui.label("Click a vehicle to see its distances and forces.");
+        }
+    });
+    ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
+        if ui.button("Help (H)").clicked() {
+            state.help = true;
+        }
+    });
+}
+
+/// Play, step, scrub, speed.
+fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
+    ui.add_space(3.0);
+    ui.horizontal(|ui| {
+        let play = Button::new(if player.playing { "Pause" } else { "Play" }).min_size(vec2(56.0, 18.0));
+        let buttons = [
+            (Button::new("|<"), "to the start (Home)", Key::Home),
+            (Button::new("<"), "a sample back (Left)", Key::ArrowLeft),
+            (play, "Space", Key::Space),
+            (Button::new(">"), "a sample on (Right)", Key::ArrowRight),
+            (Button::new(">|"), "to the end (End)", Key::End),
+        ];
+        for (button, what, key) in buttons {
+            if ui.add(button).on_hover_text(what).clicked() {
+                state.press(key, player);
+            }
+        }
+        let [first_s, last_s] = player.timeline.range_s();
+        let mut time_s = player.time_s;
+        ui.spacing_mut().slider_width = (ui.available_width() - 230.0).max(60.0);
+        let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9))
+            .custom_formatter(|time_s, _| format!("{time_s:.2}"))
+            .suffix(" s");
+        if ui.add(slider).changed() {
+            player.playing = false;
+            player.seek(time_s);
+        }
+        if ui.small_button("-").on_hover_text("slower (-)").clicked() {
+            player.faster(false);
+        }
+        ui.label(format!("{} x", player.speed));
+        if ui.small_button("+").on_hover_text("faster (+)").clicked() {
+            player.faster(true);
+        }
+        if player.is_live() {
+            ui.label(RichText::new("live").strong());
+        }
+    });
+    // Its line is always there, so that the picture keeps its size.
+    ui.add(egui::Label::new(player.said.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
+    ui.add_space(2.0);
+}
+
+/// What is known of a vehicle at a time.
+fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
+    let timeline = &player.timeline;
+    ui.label(RichText::new(format!("Vehicle {}", timeline.vehicles[k])).strong());
+    let place = row(&frame.positions_m, k);
+    ui.label(format!("at ({:.3}, {:.3}, {:.3}) m", place.x, place.y, place.z));
+    if let Some(attitude) = frame.attitude(k) {
+        let (tilt_deg, heading_deg) = tilt_and_heading_deg(&attitude);
+        ui.label(format!("tilted {tilt_deg:.1}\u{b0}, heading {heading_deg:.0}\u{b0}"));
+    }
+    if let Some(control) = &frame.control_m_s2 {
+        let control = row(control, k);
+        ui.label(format!("commanded {:.3} m/s\u{b2}", control.norm()));
+        ui.label(format!("  ({:.3}, {:.3}, {:.3})", control.x, control.y, control.z));
+    }
+    let mut others: Vec<(f64, usize)> = (0..timeline.count())
+        .filter(|&other| other != k)
+        .map(|other| (frame.distance_m(Pair::new(k, other)), other))
+        .filter(|(distance_m, _)| distance_m.is_finite())
+        .collect();
+    others.sort_by(|a, b| a.0.total_cmp(&b.0));
+    egui::Grid::new("neighbours").num_columns(3).show(ui, |ui| {
+        let row = |ui: &mut Ui, cells: [&str; 3]| {
+            for cell in cells {
+                ui.label(cell);
+            }
+            ui.end_row();
+        };
+        row(ui, ["to", "distance", "tension"]);
+        for (distance_m, other) in others.into_iter().take(LISTED) {
+            let tension =
+                timeline.plan.as_ref().map(|plan| in_words(plan, Pair::new(k, other), distance_m, frame.time_s));
+            row(ui, [&timeline.vehicles[other], &metres(distance_m), &tension.unwrap_or_default()]);
+        }
+    });
+}
+
+/// How far a vehicle's axis of thrust is from upright, and where it looks, from the x axis towards the y axis \[degrees\].
+fn tilt_and_heading_deg(attitude: &UnitQuaternion<f64>) -> (f64, f64) {
+    let (up, ahead) = (attitude * Vector3::z(), attitude * Vector3::x());
+    (up.xy().norm().atan2(up.z).to_degrees(), ahead.y.atan2(ahead.x).to_degrees())
+}
+
+/// How hard an edge pulls or pushes, or by how much it is too long where the law has no tension.
+fn in_words(plan: &Plan, pair: Pair, distance_m: f64, time_s: f64) -> String {
+    if plan.graph.later_neighbours(pair.first()).all(|other| other != pair.second()) {
+        return "no edge".to_owned();
+    }
+    match plan.pull_m_s2(pair, distance_m, time_s) {
+        Some(pull) if pull == f64::NEG_INFINITY => "inside delta".to_owned(),
+        Some(pull) if pull.abs() < 0.005 => "rest".to_owned(),
+        Some(pull) if pull < 0.0 => format!("push {:.2} m/s\u{b2}", -pull),
+        Some(pull) => format!("pull {pull:.2} m/s\u{b2}"),
+        None => {
+            let elongation = plan.elongation(pair, distance_m, time_s);
+            format!("{:.0} % too {}", 100.0 * elongation.abs(), if elongation < 0.0 { "short" } else { "long" })
+        }
+    }
+}
+
+fn help(context: &egui::Context, open: &mut bool) {
+    egui::Window::new("Keys and mouse").open(open).collapsible(false).resizable(false).show(context, |ui| {
+        egui::Grid::new("help").num_columns(2).spacing([18.0, 4.0]).show(ui, |ui| {
+            for (keys, what) in HELP {
+                ui.label(RichText::new(keys).strong());
+                ui.label(what);
+                ui.end_row();
+            }
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_core::swarm::{Rows, Swarm, row};
+    use tautline_laws::graph::Graph;
+    use tautline_sim::scenario::{Scenario, Source};
+
+    fn plan(name: &str) -> Plan {
+        Plan::of(&Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in"))
+    }
+
+    #[test]
+    fn the_table_gives_the_acceleration_of_an_edge_and_no_share_of_a_limit() {
+        let (plan, pair) = (plan("pentagon"), Pair::new(0, 1));
+        let pushed = plan.pull_m_s2(pair, 2.001, 0.0).expect("a tension");
+        assert!(
+            pushed < -10.0 && plan.tension(pair, 2.001, 0.0) == -1.0,
+            "{pushed} m/s^2, far below the limit of the colour"
+        );
+        assert_eq!(in_words(&plan, pair, 2.001, 0.0), format!("push {:.2} m/s\u{b2}", -pushed));
+        let pulled = plan.pull_m_s2(pair, 9.0, 0.0).expect("a tension");
+        assert_eq!(in_words(&plan, pair, 9.0, 0.0), format!("pull {pulled:.2} m/s\u{b2}"));
+        let rest_m = plan.formation_at(0.0).desired_distance(0, 1);
+        assert_eq!(in_words(&plan, pair, rest_m, 0.0), "rest");
+        assert_eq!(in_words(&plan, pair, 2.0, 0.0), "inside delta");
+    }
+
+    #[test]
+    fn tilt_is_from_upright_and_heading_from_x_to_y() {
+        let (ahead, left) = (Vector3::x_axis(), Vector3::y_axis());
+        let yawed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5);
+        let (tilt, heading) = tilt_and_heading_deg(&(yawed * UnitQuaternion::from_axis_angle(&left, 0.3)));
+        assert!((tilt.to_radians() - 0.3).abs() < 1e-12 && (heading.to_radians() - 0.5).abs() < 1e-12);
+        let (over, _) = tilt_and_heading_deg(&UnitQuaternion::from_axis_angle(&ahead, std::f64::consts::PI));
+        assert!((over - 180.0).abs() < 1e-9, "{over}");
+    }
+
+    #[test]
+    fn the_accelerations_of_its_edges_add_up_to_what_the_law_commands() {
+        let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
+        let (plan, swarm) = (Plan::of(&scenario), Swarm::at_rest(scenario.start.positions_m.clone()));
+        let mut control = Rows::zeros(swarm.count());
+        scenario.law().expect("a law").command(&scenario.observation(&swarm), &mut control).expect("a command");
+        for i in 0..swarm.count() {
+            let others = (0..swarm.count()).filter(|&j| j != i);
+            let pulls = others.map(|j| {
+                let to_other = row(&swarm.positions_m, j) - row(&swarm.positions_m, i);
+                to_other.normalize() * plan.pull_m_s2(Pair::new(i, j), to_other.norm(), 0.0).expect("a tension")
+            });
+            assert!((pulls.sum::<Vector3<f64>>() - row(&control, i)).norm() < 1e-12, "vehicle {}", i + 1);
+        }
+    }
+
+    #[test]
+    fn two_without_an_edge_have_no_tension_and_springs_are_long_or_short() {
+        let mut ring = plan("pentagon");
+        ring.graph = Graph::ring(5);
+        assert_eq!(in_words(&ring, Pair::new(0, 2), 3.0, 0.0), "no edge");
+        let springs = plan("pentagon-laplacian");
+        let rest_m = springs.formation_at(0.0).desired_distance(0, 1);
+        assert_eq!(in_words(&springs, Pair::new(0, 1), 1.5 * rest_m, 0.0), "50 % too long");
+    }
+}
