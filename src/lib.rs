@@ -38,7 +38,6 @@
 pub mod cli;
 #[cfg(feature = "viewer")]
 pub use tautline_render as render;
-pub mod validate;
 
 pub use tautline_audit as audit;
 use tautline_core::text;
@@ -48,3 +47,4 @@ pub use tautline_recordings::{export, mcap, read};
 pub use tautline_report::{figures, replay, report, run};
 pub use tautline_sim::{continuous, feedback, link, metrics, plan, plant, preflight, scenario, sim, vehicle};
 pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics};
+pub use tautline_validate as validate;

@@ -5,13 +5,13 @@ use nalgebra::Vector3;
 use super::claim::Claim;
 use super::flights::{builtin, certified_m, continuous, larger, reached_at_s, separation_m, times};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
-use crate::continuous::{self, Tolerances};
-use crate::graph::{Graph, Pinning};
-use crate::law::{DisplacementKeys, Law, LawError, LawSpec};
-use crate::observation::Observation;
-use crate::scenario::{PlantSpec, Scenario};
-use crate::swarm::{Rows, Swarm, row};
-use crate::target::{Guidance, ReferenceMotion};
+use tautline_core::swarm::{Rows, Swarm, row};
+use tautline_laws::graph::{Graph, Pinning};
+use tautline_laws::law::{DisplacementKeys, Law, LawError, LawSpec};
+use tautline_laws::observation::Observation;
+use tautline_laws::target::{Guidance, ReferenceMotion};
+use tautline_sim::continuous::{self, Tolerances};
+use tautline_sim::scenario::{PlantSpec, Scenario};
 
 /// Units of work.
 pub(super) const WORK: u64 = 4 + 3;
@@ -150,7 +150,7 @@ fn on_a_ring() -> Result<Claim, Untried> {
         let keys = DisplacementKeys { k_per_s2: share, zeta_per_s: share, alpha: 1.0 };
         let mut scenario = scenario("pentagon", keys)?;
         let count = 12;
-        let slots = crate::formation::Formation::circle(count, 6.0);
+        let slots = tautline_laws::formation::Formation::circle(count, 6.0);
         let mut start = slots.clone();
         // The slowest mode of the ring: all of one half too far to one side.
         for i in 0..count {
@@ -236,7 +236,7 @@ fn lags() -> Result<Claim, Untried> {
         let circle = ReferenceMotion::Circle { centre_m: Vector3::zeros(), radius_m: RADIUS_M, period_s: PERIOD_S };
         let begins = circle.at(0.0);
         for i in 0..5 {
-            crate::swarm::set_row(&mut on_slots.start.velocities_m_s, i, begins.velocity_m_s);
+            tautline_core::swarm::set_row(&mut on_slots.start.velocities_m_s, i, begins.velocity_m_s);
         }
         let scenario = led(on_slots, 0, circle, fed);
         let last = super::flights::end(&scenario, Tolerances::default())?;

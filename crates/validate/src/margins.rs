@@ -3,12 +3,12 @@
 use super::claim::Claim;
 use super::flights::{builtin, larger};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
-use crate::graph::Graph;
-use crate::law::{DisplacementKeys, LawSpec, Linear};
-use crate::record::{Event, RecordError, Sample, Sink};
-use crate::scenario::{PlantSpec, Scenario};
-use crate::sim::{self, Ending, Parts};
-use crate::swarm::{Swarm, mean_row, row, set_row};
+use tautline_core::record::{Event, RecordError, Sample, Sink};
+use tautline_core::swarm::{Swarm, mean_row, row, set_row};
+use tautline_laws::graph::Graph;
+use tautline_laws::law::{DisplacementKeys, LawSpec, Linear};
+use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::sim::{self, Ending, Parts};
 
 /// Units of work.
 pub(super) const WORK: u64 = 3 * GRAPHS.len() as u64 + 2;
@@ -91,7 +91,7 @@ fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, Untried> {
     scenario.time.duration_s = SHORT_S;
     (scenario.time.dt_s, scenario.time.record_hz) = (1.0 / LOOKS_HZ, LOOKS_HZ);
     scenario.arrival.hold_s = 0.0;
-    scenario.breathing.mode = crate::target::BreathingMode::Off;
+    scenario.breathing.mode = tautline_laws::target::BreathingMode::Off;
     Ok(scenario)
 }
 

@@ -5,14 +5,14 @@ use std::ops::ControlFlow;
 use nalgebra::Vector3;
 
 use super::interface::Untried;
-use crate::continuous::{self, Solution, Tolerances};
-use crate::formation::{Formation, largest_edge_error_m};
-use crate::graph::Graph;
-use crate::law::Law;
-use crate::record::{Event, RecordError, Sample, Sink};
-use crate::scenario::{PlantSpec, Scenario, Source};
-use crate::sim::{self, Ending, Flight, Parts};
-use crate::swarm::{ClosestApproach, Swarm, mean_row, row};
+use tautline_core::record::{Event, RecordError, Sample, Sink};
+use tautline_core::swarm::{ClosestApproach, Swarm, mean_row, row};
+use tautline_laws::formation::{Formation, largest_edge_error_m};
+use tautline_laws::graph::Graph;
+use tautline_laws::law::Law;
+use tautline_sim::continuous::{self, Solution, Tolerances};
+use tautline_sim::scenario::{PlantSpec, Scenario, Source};
+use tautline_sim::sim::{self, Ending, Flight, Parts};
 
 /// The embedded scenario of this name.
 pub(super) fn builtin(name: &str) -> Result<Scenario, Untried> {

@@ -7,11 +7,11 @@ use serde::Serialize;
 use super::claim::Claim;
 use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
 use super::interface::{Judged, Progress, Untried, stated};
-use crate::continuous::Tolerances;
-use crate::plant::{Path, rapier};
-use crate::scenario::Scenario;
-use crate::swarm::{Rows, Swarm, row, set_row};
-use crate::text::bound;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_core::text::bound;
+use tautline_sim::continuous::Tolerances;
+use tautline_sim::plant::{Path, rapier};
+use tautline_sim::scenario::Scenario;
 
 /// Steps per second, from coarse to fine.
 pub(super) const STEPS_HZ: [f64; 9] = [60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0, 7680.0, 15360.0];

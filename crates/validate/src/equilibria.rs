@@ -5,11 +5,11 @@ use nalgebra::Vector3;
 use super::claim::Claim;
 use super::flights::{continuous, end};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
-use crate::continuous::Tolerances;
-use crate::formation::{Formation, largest_edge_error_m};
-use crate::scenario::{Scenario, Space, offset, random, scatter};
-use crate::swarm::{Rows, Swarm, row, set_row};
-use crate::text::bound;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_core::text::bound;
+use tautline_laws::formation::{Formation, largest_edge_error_m};
+use tautline_sim::continuous::Tolerances;
+use tautline_sim::scenario::{Scenario, Space, offset, random, scatter};
 
 /// Orderings of five vehicles on a line, counted up to their mirror image.
 const ORDERINGS: u64 = 60;

@@ -5,11 +5,11 @@ use nalgebra::Vector3;
 use super::claim::Claim;
 use super::flights::{builtin, certified_m, continuous, end, larger, reached_at_s, times};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
-use crate::continuous::{Solution, Tolerances};
-use crate::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
-use crate::scenario::Scenario;
-use crate::swarm::{Rows, Swarm, row, set_row};
-use crate::text::bound;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_core::text::bound;
+use tautline_laws::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
+use tautline_sim::continuous::{Solution, Tolerances};
+use tautline_sim::scenario::Scenario;
 
 /// Length of the paper's flights \[s\].
 const DURATION_S: f64 = 120.0;

@@ -4,12 +4,12 @@ use super::claim::Claim;
 use super::flights::{larger, relative_speed_squared, relative_velocities};
 use super::interface::{Judged, Progress, Untried, stated};
 use super::starts::{DELTA_M, random_starts};
-use crate::formation::Formation;
-use crate::graph::Graph;
-use crate::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
-use crate::observation::Observation;
-use crate::swarm::{Rows, Swarm, mean_row, row, set_row};
-use crate::text::bound;
+use tautline_core::swarm::{Rows, Swarm, mean_row, row, set_row};
+use tautline_core::text::bound;
+use tautline_laws::formation::Formation;
+use tautline_laws::graph::Graph;
+use tautline_laws::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
+use tautline_laws::observation::Observation;
 
 /// Random states that each claim is tried on; every one with each kind of graph.
 const STATES: usize = 200;

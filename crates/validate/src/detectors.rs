@@ -3,11 +3,11 @@
 use super::claim::Claim;
 use super::flights::{builtin, engine, separation_m};
 use super::interface::{Judged, Progress, Untried, stated};
-use crate::audit::Status;
-use crate::figures::RunHistory;
-use crate::metrics::Metrics;
-use crate::sim::Flight;
-use crate::swarm::Pair;
+use tautline_audit::Status;
+use tautline_core::swarm::Pair;
+use tautline_report::figures::RunHistory;
+use tautline_sim::metrics::Metrics;
+use tautline_sim::sim::Flight;
 
 /// Both detectors place the first contact within a step; they may differ by rounding \[s\].
 const CONTACT_TOLERANCE_S: f64 = 1e-9;

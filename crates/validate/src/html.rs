@@ -3,7 +3,7 @@
 use super::claim::{Claim, Group, Kind};
 use super::convergence::Refinement;
 use super::result::Validation;
-use crate::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
+use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
 /// What the claims rest on.
 const ASSUMED: [&str; 3] = [

@@ -7,6 +7,8 @@
 //! A statement of the paper that fails is reported as refuted, with our own measurement: what must hold then is the
 //! refutation. [`Validation::pass`] asks every claim to be as expected.
 
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
 mod certificate;
 mod claim;
 mod convergence;

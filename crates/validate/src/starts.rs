@@ -1,9 +1,9 @@
 //! Random swarms and shapes, the same on every machine.
 
 use super::interface::Untried;
-use crate::formation::Formation;
-use crate::scenario::{Scenario, Space, offset, random, scatter};
-use crate::swarm::{Swarm, set_row};
+use tautline_core::swarm::{Swarm, set_row};
+use tautline_laws::formation::Formation;
+use tautline_sim::scenario::{Scenario, Space, offset, random, scatter};
 
 /// Fewest and most vehicles of a random start.
 pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 3..=8;

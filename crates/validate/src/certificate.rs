@@ -4,13 +4,13 @@ use super::claim::Claim;
 use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
 use super::starts::{COUNTS, DELTA_M, random_starts};
-use crate::continuous::{self, IdealError, Tolerances};
-use crate::formation::Formation;
-use crate::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
-use crate::scenario::Scenario;
-use crate::sim::Ending;
-use crate::swarm::Swarm;
-use crate::text::bound;
+use tautline_core::swarm::Swarm;
+use tautline_core::text::bound;
+use tautline_laws::formation::Formation;
+use tautline_laws::law::{EdgeTension, EdgeTensionKeys, Law, LawSpec, ParameterError};
+use tautline_sim::continuous::{self, IdealError, Tolerances};
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim::Ending;
 
 /// Random starts.
 pub(super) const STARTS: usize = 500;
@@ -197,8 +197,8 @@ mod tests {
     use rayon::prelude::*;
 
     use super::*;
-    use crate::law::LawError;
-    use crate::swarm::Rows;
+    use tautline_core::swarm::Rows;
+    use tautline_laws::law::LawError;
 
     /// Starts in a short form of the claim.
     const FEW: usize = 24;
@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(passes(lost), [true, true, false, true], "a separation that is no number keeps no promise");
     }
 
-    use crate::observation::Observation;
+    use tautline_laws::observation::Observation;
 
     /// The edge-tension law with the sign of its tension flipped: the tension turns with the positions, the damping does
     /// not.

@@ -5,13 +5,13 @@ use nalgebra::{DMatrix, Vector3};
 use super::claim::Claim;
 use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
 use super::interface::{Judged, Progress, Untried, stated, try_each};
-use crate::continuous::Tolerances;
-use crate::formation::{Formation, largest_edge_error_m};
-use crate::graph::Graph;
-use crate::scenario::{Scenario, Space};
-use crate::sim::Ending;
-use crate::swarm::{Rows, Swarm, mean_row, set_row};
-use crate::text::bound;
+use tautline_core::swarm::{Rows, Swarm, mean_row, set_row};
+use tautline_core::text::bound;
+use tautline_laws::formation::{Formation, largest_edge_error_m};
+use tautline_laws::graph::Graph;
+use tautline_sim::continuous::Tolerances;
+use tautline_sim::scenario::{Scenario, Space};
+use tautline_sim::sim::Ending;
 
 const A22_PER_S: f64 = 0.1;
 /// The hexagon of the paper's second example.

@@ -2,8 +2,8 @@
 
 use super::claim::Claim;
 use super::interface::{Judged, Progress, Untried, stated};
-use crate::law::EdgeTension;
-use crate::text::bound;
+use tautline_core::text::bound;
+use tautline_laws::law::EdgeTension;
 
 /// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, and prints the constant of delta = 1 m.
 const FIGURE_1_DELTA_M: f64 = 0.5;

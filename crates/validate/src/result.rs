@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::claim::{Claim, Group};
 use super::convergence::Refinement;
-use crate::figures::Figure;
-use crate::report::Tool;
+use tautline_report::figures::Figure;
+use tautline_report::report::Tool;
 
 /// Version of the keys of `validate.json`: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;

@@ -4,7 +4,7 @@ use super::convergence::Refinement;
 use super::detectors::{Flights, Flown};
 use super::interface::Untried;
 use super::tension;
-use crate::figures::{self, Figure, Step};
+use tautline_report::figures::{self, Figure, Step};
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
 pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, Untried> {
