@@ -36,14 +36,13 @@
 //! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
 
 pub mod cli;
-#[cfg(feature = "viewer")]
-pub use tautline_render as render;
 
 pub use tautline_audit as audit;
-use tautline_core::text;
 pub use tautline_core::{record, swarm, track};
 pub use tautline_laws::{formation, graph, law, observation, space, target, wind};
 pub use tautline_recordings::{export, mcap, read};
+#[cfg(feature = "viewer")]
+pub use tautline_render as render;
 pub use tautline_report::{figures, replay, report, run};
 pub use tautline_sim::{continuous, feedback, link, metrics, plan, plant, preflight, scenario, sim, vehicle};
 pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics};

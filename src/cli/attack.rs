@@ -11,9 +11,9 @@ use super::outputs::{self, is_standard_output, write};
 use super::run::{self, RunArguments, interruption};
 use super::scenario::ScenarioArguments;
 use super::{Exit, Failure};
-use crate::attack::{Asked, Attack, AttackError, AttackPage, Method, Plan, Variation};
-use crate::compare::Watch;
-use crate::scenario::Override;
+use tautline_sim::scenario::Override;
+use tautline_studies::attack::{Asked, Attack, AttackError, AttackPage, Method, Plan, Variation};
+use tautline_studies::compare::Watch;
 
 /// Most flights of a search.
 const MOST_FLIGHTS: u64 = 10_000_000;

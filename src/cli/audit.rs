@@ -12,11 +12,11 @@ use super::open::Open;
 use super::own::OwnRecording;
 use super::places;
 use super::replays::{self, Instants};
-use crate::audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
-use crate::read;
-use crate::report::recorded::{Clock, RecordedReport, Source};
-use crate::report::write_atomically;
-use crate::track::Item;
+use tautline_audit::recorded::{Outcome, Presence, RecordedError, Settings, TrackAuditor};
+use tautline_core::track::Item;
+use tautline_recordings::read;
+use tautline_report::report::recorded::{Clock, RecordedReport, Source};
+use tautline_report::report::write_atomically;
 
 /// Items that are read before the first is judged: usual intervals are learnt from them.
 const OPENING: usize = 65_536;

@@ -13,12 +13,12 @@ use super::obstacles;
 use super::outputs;
 use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
-use crate::audit::envelope::Limit;
-use crate::audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
-use crate::read::{Format, Recording};
-use crate::report::recorded::{Basis, Between};
-use crate::text::counted;
-use crate::track::Item;
+use tautline_audit::envelope::Limit;
+use tautline_audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
+use tautline_core::text::counted;
+use tautline_core::track::Item;
+use tautline_recordings::read::{Format, Recording};
+use tautline_report::report::recorded::{Basis, Between};
 
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]

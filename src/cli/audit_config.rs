@@ -9,9 +9,9 @@ use serde::Deserialize;
 use super::Failure;
 use super::audit_arguments::AuditArguments;
 use super::text_file;
-use crate::audit::envelope::{Limit, Quantity};
-use crate::audit::recorded::Motion;
-use crate::read::ArrayAxis;
+use tautline_audit::envelope::{Limit, Quantity};
+use tautline_audit::recorded::Motion;
+use tautline_recordings::read::ArrayAxis;
 
 /// What the file is called.
 const NAME: &str = "tautline.toml";

@@ -11,11 +11,11 @@ use sha2::{Digest as _, Sha256};
 use super::Failure;
 use super::audit_arguments::AuditArguments;
 use super::open::Open;
-use crate::audit::Status;
-use crate::audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
-use crate::read;
-use crate::report::recorded::Clock;
-use crate::report::write_atomically;
+use tautline_audit::Status;
+use tautline_audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
+use tautline_recordings::read;
+use tautline_report::report::recorded::Clock;
+use tautline_report::report::write_atomically;
 
 /// Names of the column of time that the checker knows.
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];

@@ -8,8 +8,8 @@ use super::audit_config;
 use super::console::{self, Console};
 use super::judgement::Judgement;
 use super::{Exit, Failure, events, summary};
-use crate::report::recorded::RecordedReport;
-use crate::report::write_atomically;
+use tautline_report::report::recorded::RecordedReport;
+use tautline_report::report::write_atomically;
 
 /// Recordings that could not be judged, and why.
 type Failures = [(String, Failure)];

@@ -13,9 +13,9 @@ use super::command::{Arguments, Command, obey, quiet_guarded_panics};
 use super::console::Console;
 use super::diagnostic::{Exit, Failure};
 use super::own::OwnRecording;
-use crate::read::{ReadError, Recording};
-use crate::report::recorded::RecordedReport;
-use crate::track::Tracks;
+use tautline_core::track::Tracks;
+use tautline_recordings::read::{ReadError, Recording};
+use tautline_report::report::recorded::RecordedReport;
 
 /// What a command answered.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::scenario::{ScenarioError, Source};
+use tautline_sim::scenario::{ScenarioError, Source};
 
 /// What a scenario is called that a program gives as text.
 const GIVEN: &str = "TOML";

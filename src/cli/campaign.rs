@@ -10,11 +10,11 @@ use super::campaign_worst::{self, Looks};
 use super::console::{self, Console};
 use super::run::{RECORDING, RunArguments, interruption};
 use super::{Exit, Failure};
-use crate::campaign::{
+use tautline_report::report::write_atomically;
+use tautline_studies::campaign::{
     ANSWER, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, listed, parse,
 };
-use crate::compare::Watch;
-use crate::report::write_atomically;
+use tautline_studies::compare::Watch;
 
 /// The page for people.
 const PAGE: &str = "campaign.html";
@@ -213,7 +213,8 @@ impl Asked {
         })?;
         let mut spec = Spec::read(&shown, &text)?;
         if self.until_width.is_some() || self.until_decided.is_some() {
-            let stop = spec.stop.unwrap_or(Stop { of: crate::campaign::Asked::Clear, width: None, decided: None });
+            let stop =
+                spec.stop.unwrap_or(Stop { of: tautline_studies::campaign::Asked::Clear, width: None, decided: None });
             spec.stop = Some(Stop {
                 width: self.until_width.or(stop.width),
                 decided: self.until_decided.or(stop.decided),

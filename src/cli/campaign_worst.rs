@@ -9,13 +9,13 @@ use super::console::{self, Console};
 use super::pictures;
 use super::run::{Left, RECORDING, RunArguments, fly_into};
 use super::{Exit, Failure};
-use crate::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
-use crate::compare::Outcome;
-use crate::mcap::{Header, McapRecorder};
-use crate::replay::PAGE_BYTES;
-use crate::report::page::Picture;
-use crate::splitting::{self, StateAt};
-use crate::text::metres;
+use tautline_core::text::metres;
+use tautline_recordings::mcap::{Header, McapRecorder};
+use tautline_report::replay::PAGE_BYTES;
+use tautline_report::report::page::Picture;
+use tautline_studies::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
+use tautline_studies::compare::Outcome;
+use tautline_studies::splitting::{self, StateAt};
 
 /// What helps where a flight that is flown again is another one.
 const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
@@ -166,7 +166,7 @@ pub(super) fn fly_bad(folder: &Folder, law: &Law, [run, bad]: [u64; 2], place: &
 
 /// Refuses a flight that did not end as it did in the campaign.
 fn check(left: &Left, run: u64, law: &Law, state_hash: &str) -> Result<(), Failure> {
-    if left.report.run.ended_early.as_deref() == Some(crate::report::INTERRUPTED) {
+    if left.report.run.ended_early.as_deref() == Some(tautline_report::report::INTERRUPTED) {
         return Ok(());
     }
     let found = &left.report.run.state_hash;
@@ -209,7 +209,7 @@ fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> Wors
 fn closest(left: &Left, said: &str) -> Option<Picture> {
     #[cfg(feature = "viewer")]
     {
-        let place = crate::render::snapshot_names().iter().position(|name| *name == "closest")?;
+        let place = tautline_render::snapshot_names().iter().position(|name| *name == "closest")?;
         let picture = left.pictures.get(place)?;
         Some(Picture { description: said.to_owned(), data_uri: picture.data_uri.clone() })
     }

@@ -5,7 +5,7 @@ use clap::Args;
 use super::console::{self, Console};
 use super::scenario::{self, ScenarioArguments};
 use super::{Exit, Failure};
-use crate::preflight::Preflight;
+use tautline_sim::preflight::Preflight;
 
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]

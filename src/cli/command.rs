@@ -10,7 +10,7 @@ use super::{
 };
 #[cfg(feature = "viewer")]
 use super::{render, view};
-use crate::read;
+use tautline_recordings::read;
 
 /// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
 ///
@@ -67,7 +67,7 @@ pub(super) fn quiet_guarded_panics() {
         let speak = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
             #[cfg(feature = "viewer")]
-            if crate::render::is_in_window_library() {
+            if tautline_render::is_in_window_library() {
                 std::process::exit(view::lose_display() as i32);
             }
             if !read::is_guarded() {

@@ -11,8 +11,8 @@ use super::scenario::ScenarioArguments;
 #[cfg(feature = "viewer")]
 use super::worst;
 use super::{Exit, Failure};
-use crate::compare::{CompareError, ComparePage, Comparison, Plan, Watch};
-use crate::scenario::{Override, Template};
+use tautline_sim::scenario::{Override, Template};
+use tautline_studies::compare::{CompareError, ComparePage, Comparison, Plan, Watch};
 
 /// Largest seed that a scenario file can say, less the most runs.
 const LAST_SEED: u64 = i64::MAX as u64 - MOST_RUNS;
@@ -89,7 +89,7 @@ impl CompareArguments {
     fn worst(&self, plan: &Plan, comparison: &Comparison) -> Vec<(String, String)> {
         let jitter = plan.jitter_m().map(|jitter_m| format!("start.jitter_m={jitter_m:?}"));
         let is_random = plan.template().flight_is_random();
-        let command = |law: &crate::compare::LawRow| {
+        let command = |law: &tautline_studies::compare::LawRow| {
             let seed = law.worst()?.seed;
             let noise = is_random.then(|| format!("noise.seed={seed}"));
             let seed = format!("start.seed={seed}");

@@ -6,13 +6,13 @@ use std::process::ExitCode;
 
 use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 
-use crate::export::ExportError;
-use crate::law::ParameterError;
-use crate::read::ReadError;
-use crate::record::RecordError;
-use crate::report::ArtefactError;
-use crate::scenario::{Place, ScenarioError};
-use crate::sim::SimError;
+use tautline_core::record::RecordError;
+use tautline_laws::law::ParameterError;
+use tautline_recordings::export::ExportError;
+use tautline_recordings::read::ReadError;
+use tautline_report::report::ArtefactError;
+use tautline_sim::scenario::{Place, ScenarioError};
+use tautline_sim::sim::SimError;
 
 /// Longest line of a source that is shown in a frame \[bytes\].
 const LONGEST_LINE: usize = 400;

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use super::Failure;
 use super::console::Console;
-use crate::mcap::McapRecording;
-use crate::read::{self, Fault, Format, ReadError, ReadOptions};
-use crate::render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
+use tautline_recordings::mcap::McapRecording;
+use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
+use tautline_render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
 
 /// Bytes of an MCAP file that hold the name of what wrote it.
 const FIRST_BYTES: u64 = 64;

@@ -4,10 +4,10 @@ use std::sync::atomic::Ordering;
 
 use super::open::Open;
 use super::{Failure, caller};
-use crate::audit::Slice;
-use crate::audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
-use crate::figures::{self, Encounter, Figure};
-use crate::report::recorded::interval;
+use tautline_audit::Slice;
+use tautline_audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
+use tautline_report::figures::{self, Encounter, Figure};
+use tautline_report::report::recorded::interval;
 
 /// Pairs, and approaches to obstacles, that are drawn.
 const DRAWN: usize = 3;

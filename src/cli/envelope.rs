@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::Failure;
 use super::text_file;
-use crate::audit::envelope::{Envelope, Fence, Limit, Quantity};
+use tautline_audit::envelope::{Envelope, Fence, Limit, Quantity};
 
 /// Largest file that is read \[bytes\].
 const MOST_BYTES: u64 = 16 << 20;

@@ -4,9 +4,9 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::Failure;
 use super::judgement::Judgement;
-use crate::report::Status;
-use crate::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
-use crate::text::counted;
+use tautline_core::text::counted;
+use tautline_report::report::Status;
+use tautline_report::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];

@@ -11,10 +11,10 @@ use super::console::Console;
 use super::reading::{self, ReadArguments, one_of};
 use super::run::interruption;
 use super::{Exit, Failure, outputs};
-use crate::export::{self, ExportOptions, WRITTEN};
-use crate::read::{self, Fault, Format, ReadError, Recording};
-use crate::report::write_atomically_with;
-use crate::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_recordings::export::{self, ExportOptions, WRITTEN};
+use tautline_recordings::read::{self, Fault, Format, ReadError, Recording};
+use tautline_report::report::write_atomically_with;
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::Failure;
-use crate::report::INTERRUPTED;
+use tautline_report::report::INTERRUPTED;
 
 /// A folder that is finished once it holds its report.
 pub(super) struct OutFolder {

@@ -1,8 +1,8 @@
 //! A recording that was judged, and what its verdict means to who asked.
 
 use super::Exit;
-use crate::report::Status;
-use crate::report::recorded::RecordedReport;
+use tautline_report::report::Status;
+use tautline_report::report::recorded::RecordedReport;
 
 /// A recording that was judged.
 pub(super) struct Judgement {

@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::console;
 use super::{Exit, Failure};
-use crate::mcap::McapRecording;
-use crate::scenario::builtin;
+use tautline_recordings::mcap::McapRecording;
+use tautline_sim::scenario::builtin;
 
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]

@@ -9,9 +9,9 @@ use super::outputs::{self, is_standard_output, write};
 use super::run::interruption;
 use super::scenario::ScenarioArguments;
 use super::{Exit, Failure};
-use crate::compare::Watch;
-use crate::margin::{Asked, Margin, MarginError, MarginPage, Plan, Question, Range};
-use crate::scenario::Override;
+use tautline_sim::scenario::Override;
+use tautline_studies::compare::Watch;
+use tautline_studies::margin::{Asked, Margin, MarginError, MarginPage, Plan, Question, Range};
 
 /// Most runs of a value.
 const MOST_RUNS: u64 = 1_000_000;
@@ -131,7 +131,7 @@ impl MarginArguments {
     /// The commands that fly the two sides of the bracket: a run that holds, and the first that does not.
     fn sides(&self, plan: &Plan, margin: &Margin) -> Vec<(String, String)> {
         let question = margin.question;
-        let side = |(probe, what): (&crate::margin::Probe, &str)| {
+        let side = |(probe, what): (&tautline_studies::margin::Probe, &str)| {
             let sets = plan.sets(probe.value, probe.worst_run(question));
             let sets = self.what.overrides.iter().chain(&sets).flat_map(|set| ["--set", set.as_str()]);
             let words = ["run", &self.what.scenario].into_iter().chain(sets).collect::<Vec<_>>();

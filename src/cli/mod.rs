@@ -66,8 +66,8 @@ pub use own::{OwnRecording, Witness};
 pub use pictures::flight_page;
 pub use run::run_verdict;
 
-pub use crate::figures::RunHistory;
-pub use crate::replay::Film;
+pub use tautline_report::figures::RunHistory;
+pub use tautline_report::replay::Film;
 
 use command::{Arguments, Command, obey, quiet_guarded_panics};
 use diagnostic::{Exit, Failure};

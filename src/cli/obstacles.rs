@@ -7,9 +7,9 @@ use serde::Deserialize;
 
 use super::Failure;
 use super::text_file;
-use crate::audit::Obstacle;
-use crate::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
-use crate::sim;
+use tautline_audit::Obstacle;
+use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
+use tautline_sim::sim;
 
 /// Largest file that is read \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
@@ -61,7 +61,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::audit::Shape;
+    use tautline_audit::Shape;
 
     fn read(text: &str) -> Result<Vec<Obstacle>, String> {
         parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.said.message)

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use super::folder::try_to_write_in;
 use super::{Failure, console};
-use crate::report::write_atomically;
+use tautline_report::report::write_atomically;
 
 /// The name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";

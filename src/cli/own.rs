@@ -8,13 +8,13 @@ use nalgebra::Vector3;
 use super::own_obstacles::OwnObstacles;
 use super::own_told::{Near, told};
 use super::{Failure, caller};
-use crate::audit::Status;
-use crate::audit::recorded::{Outcome, Settings, Told, ToldViolation};
-use crate::mcap::{Entry, McapRecording, RunVerdict};
-use crate::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
-use crate::report::recorded::EarlyEnd;
-use crate::scenario::{self, Scenario};
-use crate::swarm::{ClosestApproach, Pair};
+use tautline_audit::Status;
+use tautline_audit::recorded::{Outcome, Settings, Told, ToldViolation};
+use tautline_core::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
+use tautline_core::swarm::{ClosestApproach, Pair};
+use tautline_recordings::mcap::{Entry, McapRecording, RunVerdict};
+use tautline_report::report::recorded::EarlyEnd;
+use tautline_sim::scenario::{self, Scenario};
 
 /// Scaled distance at which two equal ellipsoids touch.
 const TOUCHING_ELLIPSOIDS: f64 = 2.0;

@@ -1,10 +1,10 @@
 //! What a recording of `tautline run` says of the obstacles that were flown past.
 
-use crate::audit::recorded::{Approach, ObjectPair, Outcome, Settings};
-use crate::audit::{Obstacle, Undecided, Violation};
-use crate::record::Event;
-use crate::scenario::Scenario;
-use crate::sim;
+use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings};
+use tautline_audit::{Obstacle, Undecided, Violation};
+use tautline_core::record::Event;
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim;
 
 /// Obstacles of a recording, and the times that the run saw a vehicle too near to one of them.
 #[derive(Clone, Debug, Default)]
@@ -156,9 +156,9 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::audit::recorded::audit;
-    use crate::audit::{Shape, Status};
-    use crate::track::{Item, Sample};
+    use tautline_audit::recorded::audit;
+    use tautline_audit::{Shape, Status};
+    use tautline_core::track::{Item, Sample};
 
     const BALL: ObjectPair = ObjectPair::Obstacle { vehicle: 0, obstacle: 0 };
 

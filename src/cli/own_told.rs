@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::audit::recorded::{Told, ToldViolation};
-use crate::record::OwnedSample;
-use crate::swarm::{ClosestApproach, Pair, row};
+use tautline_audit::recorded::{Told, ToldViolation};
+use tautline_core::record::OwnedSample;
+use tautline_core::swarm::{ClosestApproach, Pair, row};
 
 /// What a sample says of the time since the one before it; nothing where it names a vehicle that is not there.
 pub(super) fn told(

@@ -5,12 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::Failure;
-use crate::figures::{self, Criteria, Figure, RunHistory};
-use crate::preflight::Preflight;
-use crate::replay::{Film, NoReplay, PAGE_BYTES, Replay, Stage};
-use crate::report::{Report, RunPage, write_atomically};
-use crate::scenario::Scenario;
-use crate::sim;
+use tautline_report::figures::{self, Criteria, Figure, RunHistory};
+use tautline_report::replay::{Film, NoReplay, PAGE_BYTES, Replay, Stage};
+use tautline_report::report::{Report, RunPage, write_atomically};
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim;
 
 /// A flight and what was found on it, in so many bytes.
 pub(super) fn replay(scenario: &Scenario, film: &Film, report: &Report, room_bytes: usize) -> Result<Replay, NoReplay> {

@@ -2,11 +2,11 @@
 
 use super::Failure;
 use super::audit_arguments::AuditArguments;
-use crate::audit::Obstacle;
-use crate::audit::envelope::Quantity;
-use crate::audit::recorded::Settings;
-use crate::read::ReadError;
-use crate::track::{EarthOrigin, Item, Tracks};
+use tautline_audit::Obstacle;
+use tautline_audit::envelope::Quantity;
+use tautline_audit::recorded::Settings;
+use tautline_core::track::{EarthOrigin, Item, Tracks};
+use tautline_recordings::read::ReadError;
 
 /// Largest distance of level ground below the level plane of the origin at which z counts as a height \[m\].
 const MOST_DROP_M: f64 = 1.0;

@@ -8,7 +8,7 @@ use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, Typ
 use super::Failure;
 use super::own::OwnRecording;
 use super::run::RECORDING;
-use crate::read::{
+use tautline_recordings::read::{
     self, ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadError, ReadOptions, Recording,
     TimeUnit,
 };

@@ -14,10 +14,10 @@ use super::folder::try_to_write_in;
 use super::outputs::{self, Called};
 use super::reading::{self, ReadArguments};
 use super::{Exit, Failure};
-use crate::render::{
+use tautline_render::{
     CameraSpec, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, contact_sheet,
 };
-use crate::report::{write_atomically, write_atomically_with};
+use tautline_report::report::{write_atomically, write_atomically_with};
 
 /// Most pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
@@ -37,7 +37,7 @@ pub(super) struct RenderArguments {
     reading: ReadArguments,
     /// Format of the recording [default: recognised by its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
-    input_format: Option<crate::read::Format>,
+    input_format: Option<tautline_recordings::read::Format>,
     /// Safety distance for a recording that has none: shells of half of it, and violations of straight lines
     /// between samples [m].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]

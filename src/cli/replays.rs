@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use super::Failure;
 use super::encounters;
 use super::open::Open;
-use crate::audit::Slices;
-use crate::audit::recorded::{Motion, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
-use crate::figures::Figure;
-use crate::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
-use crate::report::recorded::RecordedReport;
-use crate::track::Item;
+use tautline_audit::Slices;
+use tautline_audit::recorded::{Motion, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
+use tautline_core::track::Item;
+use tautline_report::figures::Figure;
+use tautline_report::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use tautline_report::report::recorded::RecordedReport;
 
 /// Most times of a recording that are kept while it is judged.
 const MOST_TIMES: usize = 1 << 20;

@@ -16,15 +16,15 @@ use super::scenario::{self, ScenarioArguments};
 #[cfg(feature = "viewer")]
 use super::snapshots::Watched;
 use super::{Exit, Failure};
-use crate::figures::RunHistory;
-use crate::mcap::{Header, McapRecorder, RunVerdict};
-use crate::preflight::Preflight;
-use crate::record::Sink;
-use crate::replay::{Film, PAGE_BYTES};
-use crate::report::page::Picture;
-use crate::report::{INTERRUPTED, Report, RunPage, Status};
-use crate::run::{run_while, verify};
-use crate::scenario::Scenario;
+use tautline_core::record::Sink;
+use tautline_recordings::mcap::{Header, McapRecorder, RunVerdict};
+use tautline_report::figures::RunHistory;
+use tautline_report::replay::{Film, PAGE_BYTES};
+use tautline_report::report::page::Picture;
+use tautline_report::report::{INTERRUPTED, Report, RunPage, Status};
+use tautline_report::run::{run_while, verify};
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::Scenario;
 
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
@@ -206,7 +206,7 @@ fn fly(
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     #[cfg(feature = "viewer")]
     {
-        recording = recording.with(Box::new(crate::render::FoxgloveScene::of(scenario)))?;
+        recording = recording.with(Box::new(tautline_render::FoxgloveScene::of(scenario)))?;
     }
     let progress = console.progress(scenario.time.steps(), scenario.name.clone());
     let mut carry_on = |step: u64| {

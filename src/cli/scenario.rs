@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::Failure;
 use super::caller::source;
-use crate::scenario::{Override, Scenario, ScenarioError, Source};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
 
 /// Which scenario, and what is changed of it.
 #[derive(Debug, Args)]

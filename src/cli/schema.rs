@@ -2,7 +2,7 @@
 
 use super::console;
 use super::{Exit, Failure};
-use crate::scenario;
+use tautline_sim::scenario;
 
 pub(super) fn schema() -> Result<Exit, Failure> {
     console::json(&scenario::schema())?;

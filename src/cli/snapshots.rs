@@ -7,12 +7,12 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use super::Failure;
 use super::console::Console;
 use super::pictures::write_files;
-use crate::record::{Event, RecordError, Sample, Sink};
-use crate::render::{
+use tautline_core::record::{Event, RecordError, Sample, Sink};
+use tautline_render::{
     self, RenderError, Renderer, Snapshot, Theme, Timeline, View, data_uri, snapshot_names, snapshots_of_run,
 };
-use crate::report::page::Picture;
-use crate::scenario::Scenario;
+use tautline_report::report::page::Picture;
+use tautline_sim::scenario::Scenario;
 
 /// Room for pictures on a page \[bytes\].
 const PAGE_BYTES: usize = 900 << 10;
@@ -77,13 +77,13 @@ impl Sink for Watched {
 }
 
 /// A picture as PNG, small enough for a page with so many.
-pub(super) fn on_page(picture: &render::Picture, count: usize) -> Result<Vec<u8>, Failure> {
+pub(super) fn on_page(picture: &tautline_render::Picture, count: usize) -> Result<Vec<u8>, Failure> {
     let [_, small] = encoded(picture, PAGE_BYTES / count.max(1))?;
     Ok(small)
 }
 
 /// A picture as PNG, and smaller where that takes more than its room on a page \[bytes\].
-fn encoded(picture: &render::Picture, room: usize) -> Result<[Vec<u8>; 2], Failure> {
+fn encoded(picture: &tautline_render::Picture, room: usize) -> Result<[Vec<u8>; 2], Failure> {
     let png = picture.to_png()?;
     let (mut small, mut smaller) = (png.clone(), picture.clone());
     while small.len() > room {

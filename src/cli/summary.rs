@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::Failure;
 use super::judgement::Judgement;
-use crate::report::Status;
-use crate::text::{at_least, counted, fixed};
+use tautline_core::text::{at_least, counted, fixed};
+use tautline_report::report::Status;
 
 /// A summary in Markdown: a row for each recording, and behind it what was found of each that is not clear.
 pub(super) fn markdown(judged: &[Judgement], failures: &[(String, Failure)]) -> String {

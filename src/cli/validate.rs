@@ -9,8 +9,8 @@ use super::folder::OutFolder;
 use super::pictures::{svg_files, write_files};
 use super::run::threads;
 use super::{Exit, Failure};
-use crate::report::write_atomically;
-use crate::validate::{self, Validation};
+use tautline_report::report::write_atomically;
+use tautline_validate::{self as validate, Validation};
 
 /// The page for people.
 const PAGE: &str = "validate.html";

@@ -11,11 +11,11 @@ use super::drawing;
 use super::reading::{self, ReadArguments};
 use super::scenario;
 use super::{Exit, Failure};
-use crate::read::{Format, ReadOptions};
-use crate::record::{Event, RecordError, Sample, Sink};
-use crate::render::{LiveUpdate, Theme, Timeline, show};
-use crate::scenario::Scenario;
-use crate::sim::{self, Parts};
+use tautline_core::record::{Event, RecordError, Sample, Sink};
+use tautline_recordings::read::{Format, ReadOptions};
+use tautline_render::{LiveUpdate, Theme, Timeline, show};
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim::{self, Parts};
 
 /// Samples of a flight in the air that wait for the window.
 const WAITING: usize = 256;

@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 
 use super::Failure;
 use super::snapshots::on_page;
-use crate::compare::{Comparison, FlightRow, Plan};
-use crate::preflight::Preflight;
-use crate::render::{Renderer, Theme, Timeline, View, data_uri};
-use crate::report::page::Picture;
-use crate::run::run_while;
-use crate::scenario::NamedLaw;
+use tautline_render::{Renderer, Theme, Timeline, View, data_uri};
+use tautline_report::report::page::Picture;
+use tautline_report::run::run_while;
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::NamedLaw;
+use tautline_studies::compare::{Comparison, FlightRow, Plan};
 
 /// One picture a law, of its flight with the smallest separation at that instant. The flight is flown again up to there.
 pub(super) fn pictures(plan: &Plan, comparison: &Comparison, adapter: &str) -> Result<Vec<Picture>, Failure> {
@@ -27,7 +27,7 @@ pub(super) fn pictures(plan: &Plan, comparison: &Comparison, adapter: &str) -> R
         let description = format!(
             "{}: {} m apart at {min_at_s:.2} s{pair}, the closest of {} flights (start.seed {}).",
             law.name,
-            crate::text::at_least(min_m, 3),
+            tautline_core::text::at_least(min_m, 3),
             comparison.runs,
             worst.seed
         );
