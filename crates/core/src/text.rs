@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 /// Formats a number with `decimals` decimals, or in powers of ten if it is 1e15 or more. Zero has no sign.
+#[must_use]
 pub fn fixed(number: f64, decimals: usize) -> String {
     const LONG: f64 = 1e15;
     if number.abs() >= LONG {
@@ -16,6 +17,7 @@ pub fn fixed(number: f64, decimals: usize) -> String {
 }
 
 /// Like [`fixed`], rounded down: what is said to be "never closer than" this never is.
+#[must_use]
 pub fn at_least(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
     let shown = fixed(number, places);
@@ -26,6 +28,7 @@ pub fn at_least(number: f64, decimals: u8) -> String {
 }
 
 /// Like [`fixed`], rounded up: what is said to be "at most" this is.
+#[must_use]
 pub fn at_most(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
     let shown = fixed(number, places);
@@ -36,6 +39,7 @@ pub fn at_most(number: f64, decimals: u8) -> String {
 }
 
 /// A limit with at least three decimals, and as many as it has: rounded it would be another one.
+#[must_use]
 pub fn exact(limit: f64) -> String {
     let is_limit = |shown: &String| shown.parse() == Ok(limit);
     (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
@@ -43,6 +47,7 @@ pub fn exact(limit: f64) -> String {
 
 /// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller; by less than anybody
 /// reads it is just below.
+#[must_use]
 pub fn metres_below(number: f64, limit_m: f64) -> String {
     const JUST: f64 = 1e-9;
     if number >= limit_m * (1.0 - JUST) {
@@ -56,11 +61,13 @@ pub fn metres_below(number: f64, limit_m: f64) -> String {
 }
 
 /// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.
+#[must_use]
 pub fn metres(number: f64) -> String {
     if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { fixed(number, 3) } else { format!("{number:.1e}") }
 }
 
 /// Words without what turns the order of letters around, which foreign names may hold: it would turn what follows them.
+#[must_use]
 pub fn in_order(words: &str) -> String {
     const TURNS: [char; 12] = [
         '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
@@ -70,11 +77,13 @@ pub fn in_order(words: &str) -> String {
 }
 
 /// A time with its unit.
+#[must_use]
 pub fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))
 }
 
 /// A number to so many significant digits, at most 8 of them behind the point.
+#[must_use]
 pub fn significant(number: f64, digits: u8) -> String {
     let magnitude = if number == 0.0 { 0.0 } else { number.abs().log10().floor() };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 8")]
@@ -100,6 +109,7 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
 }
 
 /// Decimals that the multiples of a step of 1, 2 or 5 times a power of ten need, at most so many.
+#[must_use]
 pub fn decimals_of(step: f64, most: u8) -> usize {
     /// Rounding must not take a step for the next smaller power.
     const ROUNDING: f64 = 1.000_001;
@@ -109,6 +119,7 @@ pub fn decimals_of(step: f64, most: u8) -> usize {
 }
 
 /// A rounding or truncation error beside what is allowed, as `below 1e-9`: its exact size differs between machines.
+#[must_use]
 pub fn bound(error: f64, allowed: f64) -> String {
     if error.abs() <= allowed {
         format!("below {allowed:e}")
@@ -128,12 +139,14 @@ pub fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) 
 }
 
 /// A number as a whole one where it is, which keys of either kind take.
+#[must_use]
 pub fn as_toml(value: f64) -> String {
     const WHOLE: f64 = 1e15;
     if value.abs() < WHOLE { value.to_string() } else { format!("{value:?}") }
 }
 
 /// So many of a thing.
+#[must_use]
 pub fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }

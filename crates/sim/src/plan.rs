@@ -31,6 +31,7 @@ pub struct Plan {
 
 impl Plan {
     /// Formations, graph and law of a scenario.
+    #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self {
             course: Course::new(&scenario.legs),
@@ -79,6 +80,7 @@ impl Plan {
 
     /// What lays the slots of a time \[s\] over the vehicles as well as the law leaves them free to be moved; none where
     /// positions are not known.
+    #[must_use]
     pub fn laid_at(&self, time_s: f64, positions_m: &Rows) -> Option<RigidMotion> {
         let formation = self.formation_at(time_s);
         let moved = |translation_m| RigidMotion { rotation: Matrix3::identity(), translation_m };
@@ -95,22 +97,26 @@ impl Plan {
     }
 
     /// Where the slots are at a time \[s\], laid over the vehicles \[m\]; none where positions are not known.
+    #[must_use]
     pub fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
         let (laid, slots_m) = (self.laid_at(time_s, positions_m)?, &self.formation_at(time_s).slots_m);
         Some((0..slots_m.nrows()).map(|k| laid.apply(row(slots_m, k))).collect())
     }
 
     /// From when on each of the formations is under way \[s\], in order of time; the first from the start.
+    #[must_use]
     pub fn formations(&self) -> Vec<(f64, &Formation)> {
         self.course.formations()
     }
 
     /// Safety distance \[m\].
+    #[must_use]
     pub fn delta_m(&self) -> f64 {
         self.delta_m
     }
 
     /// Whether edges have a tension, and are no springs.
+    #[must_use]
     pub fn has_tension(&self) -> bool {
         matches!(self.law, LawSpec::EdgeTension(_))
     }
@@ -121,6 +127,7 @@ impl Plan {
     /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
     /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
+    #[must_use]
     pub fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
         let tension = match self.edge_tension(pair, time_s) {
             Some((alpha, edge)) => edge.derivative(distance_m) * edge.k_m() / alpha,
@@ -131,12 +138,14 @@ impl Plan {
 
     /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
     /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    #[must_use]
     pub fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
         let vehicles = self.graph.count() as f64;
         self.edge_tension(pair, time_s).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
     /// How much longer a distance \[m\] is than the desired one, over that one.
+    #[must_use]
     pub fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m

@@ -333,6 +333,7 @@ impl EnergyRise {
     pub const INTEGRATION: f64 = 1e-3;
 
     /// What integration does not explain \[m^2/s^2\], negative where it explains all.
+    #[must_use]
     pub fn unexplained(self) -> f64 {
         self.to - (1.0 + Self::INTEGRATION) * self.from
     }

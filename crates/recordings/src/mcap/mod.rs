@@ -99,7 +99,7 @@ pub struct RunVerdict {
     pub steps: u64,
     /// Time flown \[s\].
     pub duration_s: f64,
-    /// [`StateHash`](super::StateHash) of every sample.
+    /// [`StateHash`](tautline_core::record::StateHash) of every sample.
     pub state_sha256: String,
     /// Hash of the messages of `/scenario`, `/summary` and `/events`; the recorder computes it.
     pub told_sha256: String,

@@ -270,6 +270,7 @@ pub(super) fn may_name(name: &str) -> bool {
 }
 
 /// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
+#[must_use]
 pub fn is_read(name: &str) -> bool {
     let is_own = |heading: Heading<'_>| {
         (heading.role < EARTH || heading.role >= HEIGHT) && (heading.vehicle.is_empty() || heading.is_numbered())

@@ -118,7 +118,10 @@ pub struct Solid {
 }
 
 impl ObstacleTable {
-    /// What it means, or what is missing in it, in a sentence.
+    /// The solid that it describes.
+    ///
+    /// # Errors
+    /// What is wrong with the table, in one sentence.
     pub fn solid(self) -> Result<Solid, String> {
         let Self { name, ball, cuboid, capsule, half_space, at_m, path, clearance_m } = self;
         let in_space = capsule.is_some() || half_space.is_some();

@@ -78,7 +78,11 @@ pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
     }
 }
 
-/// Uniform positions, one after the other, each tried again until it keeps its distance from those before it.
+/// Uniform positions \[m\], `count` x 3 within `half_extent_m` of the origin along each axis, drawn one after the other,
+/// each again until it is at least `min_separation_m` from those before it.
+///
+/// # Errors
+/// [`ScenarioError`] where no place was found for a vehicle in many tries.
 pub fn scatter(
     count: usize,
     space: Space,

@@ -6,6 +6,7 @@ use super::text::Text;
 
 /// Whether a key of a scenario takes whole numbers alone: whether the type of its value asks for one. What the value must be
 /// beside that, such as positive, is no matter here.
+#[must_use]
 pub fn takes_whole_numbers_alone(source: &Source, overrides: &[Override], key: &str) -> bool {
     let Ok(set) = Override::parse(&format!("{key}=0.5")) else { return false };
     let Ok((name, toml)) = source.text() else { return false };
