@@ -1,0 +1,378 @@
+//! Whatever bytes a file holds, reading it ends: with motion or with an error, without a panic, in little memory.
+//!
+//! The cases are few by default; `TAUTLINE_FUZZ_CASES` sets how many there are of each kind.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{Cursor, Write as _};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+use tautline_core::track::Item;
+use tautline_recordings::export::{self, ExportOptions};
+use tautline_recordings::read::{self, Format, ReadOptions};
+
+use crate::messages::{cdr, mcap_with};
+use crate::recording::Whole;
+use crate::ulog::Log;
+
+/// Cases of each kind where nobody says otherwise.
+const CASES: u32 = 60;
+
+/// Longer than any file of a few kilobytes takes, on a slow and busy machine.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// More items than any file of a few kilobytes holds.
+const MANY: usize = 10_000_000;
+
+fn cases() -> u32 {
+    std::env::var("TAUTLINE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(CASES)
+}
+
+const CSV: &str =
+    "t,id,x,y,z,vx,vy,vz,radius\n0,1,1,2,3,0,0,0,0.1\n0,\"2\",-1.5,0.25,1e-3,,,,\n0.5,1,1.5,2,3,1,1,1,0.1\n";
+const WIDE: &str = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,,,\n";
+const TEXT: &str = "# t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
+const TUPLES: &str = "0 (1,2) (-1.5,.25)\n.5 (1.5, 2) (-1,.25)\n";
+const ONE: &str = "t,x,y,z\n0,1,2,3\n.5,1,2,4\n";
+const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
+const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
+    "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
+    {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"#;
+const VVIZ: &str = r#"{"defaultPositionRate": 2, "timeOffsetSecs": 1, "performances": [{"id": 0, "agentDescription":
+    {"homeX": 1, "homeY": 2, "homeZ": 3, "agentTraversal": [{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 1,
+    "dz": 0}, {"dx": 1, "dy": 0, "dz": 2}]}}]}"#;
+const MOTIVE: &str = "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n\n\
+    ,Type,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n,Name,a,a,a,a:1,a:1,a:1\n,ID,A,A,A,B,B,B\n\
+    ,,Position,Position,Position,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z,X,Y,Z\n\
+    0,0.00,1,2,3,1,2,3\n1,0.01,,,,1,2,3\n2,0.02,1,2,4,,,\n";
+const VICON: &str = "Trajectories\n100\n,,a:1,,,a:2,,,b,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n\
+    ,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6,7,8,9\n2,0,1,2,3,,,,7,8,9\n\nDevices\n1000\n";
+const EARTH: &str =
+    "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,47.301,8.5,400,0.1\n";
+const JSONL: &str =
+    "{\"t\": 0, \"id\": \"a\", \"pos\": [1, 2, 3]}\n{\"t\": 1.5, \"id\": 7, \"pos\": [1, 2, 3.5], \"q\": null}\n";
+const PX4: &str = "timestamp,x,y,z,ref_lat,ref_lon,ref_alt,xy_valid\n0,1,2,-3,47,8,400,1\n20000,1,2,-3,nan,8,400,1\n";
+const SPLIT: &str = "sec,nanosec,id,north,east,down\ns,ns,-,m,m,m\n1,5,a,1,2,3\n1,999999999,a,1,2,4\n";
+const DATES: &str = "time,id,x,y\n2023-11-14T22:13:20.5Z,a,1,2\n2023-11-14 23:13:21+01:00,a,1,2\n";
+const METADATA: &str = "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  compression_format: ''\n\
+    \x20 compression_mode: ''\n  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.mcap.zstd\n  message_count: 3\n";
+
+/// Valid files of every format.
+fn seeds() -> Vec<(&'static str, Vec<u8>)> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = folder.path().join("source.csv");
+    fs::write(&source, CSV).expect("written");
+    let exported = |format: export::Format| {
+        let path = folder.path().join(format.name());
+        let mut file = File::create(&path).expect("a file");
+        let open = || read::open(&source, &ReadOptions::default());
+        export::export(&open, format, &ExportOptions::default(), &mut file).expect("exported");
+        fs::read(&path).expect("read")
+    };
+    let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    gzip.write_all(CSV.as_bytes()).expect("written");
+    let zipped = |files: &[(&str, &str)]| {
+        let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in files {
+            zip.start_file(*name, zip::write::SimpleFileOptions::default()).expect("an entry");
+            zip.write_all(bytes.as_bytes()).expect("written");
+        }
+        zip.finish().expect("finished").into_inner()
+    };
+    let log = Log::new().gps(1, 1_700_000_000_000_000).global(1_000_000, 47.0, 8.0, 400.0);
+    let log = log.local(1_000_000, [1.0, 2.0, -3.0], 1, [47.0, 8.0]);
+    vec![
+        ("long", CSV.into()),
+        ("wide", WIDE.into()),
+        ("text", TEXT.into()),
+        ("tuples", TUPLES.into()),
+        ("polynomial", POLYNOMIAL.into()),
+        ("show", SHOW.into()),
+        ("gzip", gzip.finish().expect("finished")),
+        ("skyc", zipped(&[("show.json", SHOW), ("a.json", r#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}"#)])),
+        ("tables", zipped(&[("f/a.csv", ONE), ("f/b.txt", "0 1 2 3\n.5 1 2 4\n"), ("f/readme.txt", "1 2 3\n")])),
+        ("pieces", zipped(&[("a/1.csv", POLYNOMIAL), ("a/2.csv", POLYNOMIAL), ("b/1.csv", POLYNOMIAL)])),
+        ("parquet", exported(export::Format::Parquet)),
+        ("npz", exported(export::Format::Npz)),
+        ("mcap", exported(export::Format::Mcap)),
+        ("jsonl", JSONL.into()),
+        ("px4", PX4.into()),
+        ("split", SPLIT.into()),
+        ("dates", DATES.into()),
+        ("ulog", log.bytes()),
+        ("vviz", VVIZ.into()),
+        ("motive", MOTIVE.into()),
+        ("vicon", VICON.into()),
+        ("earth", EARTH.into()),
+        ("frames", frames()),
+        ("foreign", foreign(None)),
+        ("zstd", foreign(Some("zstd"))),
+    ]
+}
+
+/// What a seed needs to be read; of MCAP also what was not closed. Elsewhere such an option is refused before anything is
+/// read.
+fn options_of(seed: &str) -> ReadOptions {
+    let is_mcap =
+        ["mcap", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"].contains(&seed);
+    let frame = (seed == "frames").then(|| "map".to_owned());
+    ReadOptions { frame, allow_unfinished: is_mcap, ..ReadOptions::default() }
+}
+
+/// Poses in frames that transforms lead from, every message alone.
+fn frames() -> Vec<u8> {
+    const TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+    const TF: &str = "tf2_msgs/msg/TFMessage";
+    let transform = |nanosec: u32, parent, child| {
+        cdr(&(vec![(((1, nanosec), parent), child, ([1.0, 2.0, 3.0], TURN))],), nanosec.is_multiple_of(2))
+    };
+    let named = (((1, 5), "map"), vec![("cf1", ([1.0, 2.0, 3.0], TURN)), ("cf2", ([1.0, 2.0, 3.0], TURN))]);
+    let odometry = (((1, 5), "odom"), "base_link", ([1.0, 2.0, 3.0], TURN));
+    let fix = (((1, 5), "gps"), (0_i8, 1_u16), [47.0, 8.0, 400.0]);
+    let options = mcap::WriteOptions::new().compression(None).use_chunks(false);
+    let messages: Vec<_> = [
+        ("/tf_static", TF, transform(0, "base_link", "camera")),
+        ("/tf", TF, transform(1, "map", "odom")),
+        ("/tf", TF, transform(4, "odom", "base_link")),
+        ("/odom", "nav_msgs/msg/Odometry", cdr(&odometry, true)),
+        ("/swarm/poses", "motion_capture_tracking_interfaces/msg/NamedPoseArray", cdr(&named, false)),
+        ("/gps/fix", "sensor_msgs/msg/NavSatFix", cdr(&fix, true)),
+        ("/tf", TF, transform(9, "map", "odom")),
+    ]
+    .map(|(topic, schema, content)| (topic, schema, "cdr", 1, content))
+    .into();
+    mcap_with(options, &messages)
+}
+
+/// A recording of others: JSON and CDR, its chunks packed or not.
+fn foreign(compression: Option<&str>) -> Vec<u8> {
+    let options = mcap::WriteOptions::new().compression(None).use_chunks(false);
+    let mut out = options.create(Cursor::new(Vec::new())).expect("a writer");
+    let pose =
+        r#"{"timestamp": {"sec": 1, "nsec": 2}, "frame_id": "m", "poses": [{"position": {"x": 1, "y": 2, "z": 3}}]}"#;
+    let mut cdr = vec![0, 1, 0, 0];
+    let array = (((1, 2), "m"), vec![([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0])]);
+    cdr_encoding::to_writer::<_, byteorder::LittleEndian, _>(&mut cdr, &array).expect("encoded");
+    let protobuf = b"\x0a\x02\x08\x01\x12\x01m\x1a\x0b\x0a\x09\x09\0\0\0\0\0\0\xf0\x3f".to_vec();
+    for (topic, schema, encoding, content) in [
+        ("/json", "foxglove.PosesInFrame", "json", pose.as_bytes().to_vec()),
+        ("/cdr", "geometry_msgs/msg/PoseArray", "cdr", cdr),
+        ("/protobuf", "foxglove.PosesInFrame", "protobuf", protobuf),
+    ] {
+        let schema = out.add_schema(schema, encoding, b"").expect("a schema");
+        let channel_id = out.add_channel(schema, topic, encoding, &BTreeMap::new()).expect("a channel");
+        let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
+        out.write_to_known_channel(&header, &content).expect("a message");
+    }
+    out.finish().expect("finished");
+    let plain = out.into_inner().into_inner();
+    compression.map_or_else(|| plain.clone(), |name| packed(&plain, name))
+}
+
+/// The records between the magic bytes and the end of the data section in one packed chunk.
+fn packed(plain: &[u8], compression: &str) -> Vec<u8> {
+    let (mut at, mut header, mut records) = (mcap::MAGIC.len(), Vec::new(), Vec::new());
+    while plain[at] != mcap::records::op::DATA_END {
+        let length = u64::from_le_bytes(plain[at + 1..at + 9].try_into().expect("8 bytes"));
+        let end = at + 9 + usize::try_from(length).expect("fits");
+        let part = if plain[at] == mcap::records::op::HEADER { &mut header } else { &mut records };
+        part.extend_from_slice(&plain[at..end]);
+        at = end;
+    }
+    let data = zstd::encode_all(records.as_slice(), 1).expect("packed");
+    let mut chunk = [0; 16].to_vec();
+    chunk.extend_from_slice(&(records.len() as u64).to_le_bytes());
+    chunk.extend_from_slice(&[0; 4]);
+    chunk.extend_from_slice(&u32::try_from(compression.len()).expect("short").to_le_bytes());
+    chunk.extend_from_slice(compression.as_bytes());
+    chunk.extend_from_slice(&(data.len() as u64).to_le_bytes());
+    chunk.extend_from_slice(&data);
+    let mut file = mcap::MAGIC.to_vec();
+    file.extend_from_slice(&header);
+    file.push(mcap::records::op::CHUNK);
+    file.extend_from_slice(&(chunk.len() as u64).to_le_bytes());
+    file.extend_from_slice(&chunk);
+    file.extend_from_slice(&plain[at..]);
+    file
+}
+
+/// Reads a file to its end or to its error and looks at what it gave.
+fn survive(path: &Path, options: &ReadOptions) -> Result<(), String> {
+    let begin = Instant::now();
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let mut items = Vec::new();
+        let mut tracks = read::open(path, options).map_err(|error| (error.to_string(), error.help()))?;
+        while tracks.read(&mut items).map_err(|error| (error.to_string(), error.help()))? {
+            if items.len() > MANY {
+                return Ok(Some("there is no end of items".to_owned()));
+            }
+        }
+        Ok(fault_of(&items, tracks.vehicles().len()))
+    }));
+    if begin.elapsed() > PATIENCE {
+        return Err(format!("it took {:?}", begin.elapsed()));
+    }
+    match outcome {
+        Err(_) => Err("it panicked".to_owned()),
+        Ok(Ok(Some(fault))) => Err(fault),
+        Ok(Err((said, help))) if said.is_empty() || help.is_empty() => Err(format!("{said:?} {help:?}")),
+        Ok(_) => Ok(()),
+    }
+}
+
+/// What breaks the promises of a recording, if anything does.
+fn fault_of(items: &[Item], vehicles: usize) -> Option<String> {
+    let mut last = vec![f64::NEG_INFINITY; vehicles];
+    let mut now = f64::NEG_INFINITY;
+    for item in items {
+        let (time_s, vehicle) = (item.time_s(), item.vehicle());
+        let finite = match item {
+            Item::Sample(sample) => sample.position_m.iter().all(|x| x.is_finite()),
+            Item::Piece(piece) => {
+                piece.to_s > piece.from_s && piece.coefficients.iter().flatten().all(|x| x.is_finite())
+            }
+        };
+        if !finite || !time_s.is_finite() || time_s < now || vehicle >= vehicles || time_s <= last[vehicle] {
+            return Some(format!("{item:?} after {now} s"));
+        }
+        (now, last[vehicle]) = (time_s, time_s);
+    }
+    None
+}
+
+fn each(name: &str, strategy: impl Strategy<Value = Vec<u8>>, options: &ReadOptions) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("recording");
+    each_at(&path, &path, name, strategy, options);
+}
+
+/// Writes a file in many ways, and reads what is a recording with it.
+fn each_at(file: &Path, recording: &Path, name: &str, strategy: impl Strategy<Value = Vec<u8>>, options: &ReadOptions) {
+    let config = Config { cases: cases(), failure_persistence: None, ..Config::default() };
+    let done = TestRunner::new(config).run(&strategy, |bytes| {
+        fs::write(file, &bytes).expect("written");
+        survive(recording, options).map_err(|fault| TestCaseError::fail(format!("{name}: {fault}")))
+    });
+    if let Err(fault) = done {
+        panic!("{name}: {fault}");
+    }
+}
+
+/// A change of a file.
+#[derive(Clone, Debug)]
+enum Change {
+    Set(prop::sample::Index, u8),
+    /// A number that lengths like to be.
+    Length(prop::sample::Index, u64, usize),
+    Cut(prop::sample::Index),
+    Remove(prop::sample::Index, usize),
+    Repeat(prop::sample::Index, usize),
+    Insert(prop::sample::Index, Vec<u8>),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    let at = any::<prop::sample::Index>;
+    let lengths =
+        prop::sample::select(vec![0, 1, 0x7f, 0xff, 0x7fff, 0xffff, 0x7fff_ffff, 0xffff_ffff, u64::MAX / 2, u64::MAX]);
+    let words = ["nan", "inf", "-", ",", "\n", "\"", "1e308", "9223372036854775807", ";", "{", "[[", "]", "\0", "\r\n"];
+    prop_oneof![
+        (at(), any::<u8>()).prop_map(|(at, byte)| Change::Set(at, byte)),
+        (at(), lengths, prop::sample::select(vec![1, 2, 4, 8])).prop_map(|(at, n, width)| Change::Length(at, n, width)),
+        at().prop_map(Change::Cut),
+        (at(), 1..40_usize).prop_map(|(at, count)| Change::Remove(at, count)),
+        (at(), 1..200_usize).prop_map(|(at, count)| Change::Repeat(at, count)),
+        (at(), prop::sample::select(words.to_vec())).prop_map(|(at, word)| Change::Insert(at, word.into())),
+        (at(), prop::collection::vec(any::<u8>(), 1..9)).prop_map(|(at, bytes)| Change::Insert(at, bytes)),
+    ]
+}
+
+fn changed(mut bytes: Vec<u8>, changes: Vec<Change>) -> Vec<u8> {
+    for change in changes {
+        if bytes.is_empty() {
+            break;
+        }
+        let length = bytes.len();
+        match change {
+            Change::Set(at, byte) => bytes[at.index(length)] = byte,
+            Change::Length(at, number, width) => {
+                let at = at.index(length);
+                let end = (at + width).min(length);
+                bytes[at..end].copy_from_slice(&number.to_le_bytes()[..end - at]);
+            }
+            Change::Cut(at) => bytes.truncate(at.index(length)),
+            Change::Remove(at, count) => {
+                let at = at.index(length);
+                bytes.drain(at..(at + count).min(length));
+            }
+            Change::Repeat(at, count) => {
+                let at = at.index(length);
+                let part = bytes[at..(at + count).min(length)].to_vec();
+                bytes.splice(at..at, part);
+            }
+            Change::Insert(at, part) => {
+                let at = at.index(length);
+                bytes.splice(at..at, part);
+            }
+        }
+    }
+    bytes
+}
+
+#[test]
+fn changed_files_of_every_format_are_survived() {
+    for (name, seed) in seeds() {
+        let strategy = prop::collection::vec(change(), 1..6).prop_map(move |changes| changed(seed.clone(), changes));
+        each(name, strategy, &options_of(name));
+    }
+}
+
+#[test]
+fn changed_bags_are_survived() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let packed = zstd::encode_all(foreign(None).as_slice(), 1).expect("packed");
+    let files =
+        [("metadata.yaml", METADATA.as_bytes().to_vec()), ("bag_0.mcap", foreign(None)), ("bag_1.mcap.zstd", packed)];
+    for (name, bytes) in &files {
+        fs::write(folder.path().join(name), bytes).expect("written");
+    }
+    let whole = Whole::read(folder.path(), &ReadOptions::default()).expect_err("the same messages twice").to_string();
+    assert!(whole.contains("a second time"), "{whole}");
+    for (name, seed) in files {
+        let (file, valid) = (folder.path().join(name), seed.clone());
+        let strategy = prop::collection::vec(change(), 1..6).prop_map(move |changes| changed(seed.clone(), changes));
+        each_at(&file, folder.path(), name, strategy, &options_of(name));
+        fs::write(file, valid).expect("written");
+    }
+}
+
+#[test]
+fn random_bytes_are_survived_by_every_reader() {
+    for format in Format::ALL {
+        let options = ReadOptions { format: Some(format), ..ReadOptions::default() };
+        each(format.name(), prop::collection::vec(any::<u8>(), 0..2000), &options);
+    }
+    let magics: Vec<&[u8]> =
+        vec![b"PAR1", b"PK\x03\x04", b"\x89MCAP0\r\n", b"\x1f\x8b\x08\0\0\0\0\0\0\0", b"{", b"t,id,x,y,z\n"];
+    let begun = (prop::sample::select(magics), prop::collection::vec(any::<u8>(), 0..500));
+    each("begun", begun.prop_map(|(magic, rest)| [magic, &rest].concat()), &ReadOptions::default());
+}
+
+#[test]
+fn the_seeds_themselves_are_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("recording");
+    for (name, seed) in seeds() {
+        fs::write(&path, seed).expect("written");
+        let mut items = Vec::new();
+        let read = read::open(&path, &options_of(name)).and_then(|mut tracks| {
+            while tracks.read(&mut items)? {}
+            Ok(())
+        });
+        // The show of plain JSON refers to a part that only the archive has.
+        assert_eq!(read.is_ok(), name != "show", "{name}: {:?}", read.err().map(|error| error.to_string()));
+    }
+}

@@ -1,0 +1,216 @@
+//! VVIZ shows, and exports of motion capture as they are described by those who make them.
+
+use tautline_recordings::read::{ReadError, ReadOptions};
+
+use crate::messages::read_bytes;
+use crate::recording::Whole;
+
+fn read(text: &str) -> Result<Whole, ReadError> {
+    read_bytes("recording", text.as_bytes(), &ReadOptions::default())
+}
+
+fn whole(text: &str) -> Whole {
+    read(text).unwrap_or_else(|error| panic!("{error}\n{}", error.help()))
+}
+
+/// Each change of a valid text is refused with these words, and the text itself is read.
+fn refused(valid: &str, changes: &[(&str, &str, &str)]) {
+    whole(valid);
+    for (from, to, said) in changes {
+        assert!(valid.contains(from), "there is no {from}");
+        let error = read(&valid.replacen(from, to, 1)).expect_err(said);
+        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+        assert!(!error.help().is_empty() && !error.is_machine());
+    }
+}
+
+const VVIZ: &str = r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl",
+    "defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": [
+    {"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": [
+        {"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]},
+     "payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "b": 3, "frames": 4}]}]},
+    {"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": [
+        {"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}]}, "payloadDescription": []}]}"#;
+
+#[test]
+fn shows_of_vviz_begin_at_home_and_move_from_sample_to_sample() {
+    let found = whole(VVIZ);
+    assert_eq!(found.vehicles, ["0", "B"]);
+    assert_eq!(
+        found.samples(),
+        [
+            (100.0, "0", [-7.5, 3.0, 0.5]),
+            (100.0, "B", [1.0, 0.0, 0.0]),
+            (100.5, "B", [1.0, 0.0, 1.0]),
+            (101.5, "0", [-7.5, 3.0, 10.5]),
+            (102.0, "0", [-6.5, 5.0, 10.5]),
+        ]
+    );
+    assert!(found.notes.iter().any(|note| note.contains("z up")), "{:?}", found.notes);
+}
+
+#[test]
+fn a_drone_of_vviz_without_a_way_is_named() {
+    let still = VVIZ.replace(r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}"#, "");
+    let found = whole(&still);
+    assert_eq!(found.samples().len(), 3);
+    assert!(
+        found.notes.iter().any(|note| note.starts_with("not judged") && note.ends_with("`B`")),
+        "{:?}",
+        found.notes
+    );
+}
+
+#[test]
+fn shows_of_vviz_are_refused_where_they_are_wrong() {
+    refused(
+        VVIZ,
+        &[
+            ("\"ogl\"", "\"ned\"", "`ned`"),
+            ("\"id\": \"B\"", "\"id\": 0", "drone `0`: two drones have this id"),
+            ("\"dt\": 1.5", "\"dt\": 0", "drone `0`, sample 2: it comes 0.0 s after"),
+            ("\"dt\": 1.5", "\"dt\": -1", "drone `0`, sample 2"),
+            ("\"dx\": 1,", "\"dx\": 1e308, \"dx\": 2,", "duplicate field"),
+            ("\"dx\": 1,", "\"dx\": null,", "line 4"),
+            ("\"dx\": 1,", "", "missing field `dx`"),
+            ("-7.5", "1e309", "number out of range"),
+            ("\"defaultPositionRate\": 2.0", "\"defaultPositionRate\": 0", "drone `0`, sample 3: neither `dt`"),
+            ("\"performances\"", "\"drones\"", "missing field `performances`"),
+        ],
+    );
+    let error = read(&VVIZ[..VVIZ.len() / 2]).expect_err("cut").to_string();
+    assert!(error.contains("breaks off"), "{error}");
+}
+
+fn mm(length: f64) -> f64 {
+    length * 0.001
+}
+
+const MOTIVE: &str = "\
+Format Version,1.23,Take Name,Take 1,Take Notes,,Capture Frame Rate,100.000000,Export Frame Rate,100.000000,Capture Start \
+Time,2024-01-01 10.00.00.000 AM,Total Frames in Take,3,Total Exported Frames,3,Rotation Type,Quaternion,Length \
+Units,Millimeters,Coordinate Space,Global
+
+,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body Marker,Rigid Body \
+Marker,Rigid Body Marker,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
+,Name,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1:Marker 001,cf1:Marker 001,cf1:Marker 001,cf2,cf2,cf2,cf2,cf2,cf2,cf2,cf2
+,ID,A,A,A,A,A,A,A,A,B,B,B,C,C,C,C,C,C,C,C
+,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,Position,Position,Position,Rotation,\
+Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error
+Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,X,Y,Z,W,X,Y,Z,
+0,0.000000,0,0,0,1,1000.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,0.2
+1,0.010000,0,0,0,1,1001.0,1500.0,-250.0,0.1,9,9,9,,,,,,,,
+2,0.020000,0,0,0,1,1002.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,0.2
+";
+
+#[test]
+fn takes_of_motive_are_turned_and_who_is_lost_is_not_seen() {
+    let found = whole(MOTIVE);
+    let expected = [
+        (0.0, "cf1", [1.0, 0.25, 1.5]),
+        (0.0, "cf2", [0.0, -0.125, 0.5]),
+        (0.01, "cf1", [mm(1001.0), 0.25, 1.5]),
+        (0.02, "cf1", [mm(1002.0), 0.25, 1.5]),
+        (0.02, "cf2", [0.0, -0.125, 0.5]),
+    ];
+    assert_eq!(found.samples(), expected);
+    let metres = MOTIVE.replace("Millimeters", "Meters").replace("1000.0", "1.0");
+    assert_eq!(whole(&metres).samples()[0].2, [1.0, 250.0, 1500.0]);
+    assert_eq!(whole(&MOTIVE.replace('\n', "\r\n")).samples(), expected);
+    assert_eq!(whole(&format!("\u{feff}{}", MOTIVE.replace("\n\n", "\n"))).samples(), expected);
+}
+
+#[test]
+fn without_rigid_bodies_the_labelled_markers_of_a_name_are_a_vehicle() {
+    let markers = MOTIVE.replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Bone").replace(",cf2", ",cf1:x");
+    let found = whole(&markers);
+    assert_eq!(found.samples()[0], (0.0, "cf1", [mm(9.0), -mm(9.0), mm(9.0)]));
+    let two = "Format Version,1.23,Length Units,Meters\n,Type,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker\n\
+        ,Name,a:1,a:1,a:1,a:2,a:2,a:2,Unlabeled 7,Unlabeled 7,Unlabeled 7\n,ID,1,1,1,2,2,2,3,3,3\n\
+        ,,Position,Position,Position,Position,Position,Position,Position,Position,Position\n\
+        Frame,Time (Seconds),X,Y,Z,X,Y,Z,X,Y,Z\n0,0,1,1,1,3,1,1,9,9,9\n1,0.01,1,1,1,,,,9,9,9\n";
+    let found = whole(two);
+    assert_eq!(found.samples(), [(0.0, "a", [2.0, -1.0, 1.0])]);
+    assert!(found.notes.iter().any(|note| note.ends_with("is the place of a (2)")), "{:?}", found.notes);
+}
+
+#[test]
+fn takes_of_motive_are_refused_where_they_are_wrong() {
+    refused(
+        MOTIVE,
+        &[
+            ("Millimeters", "Hands", "unit of length is not known: `Hands`"),
+            ("Global", "Local", "`Local`"),
+            ("Time (Seconds)", "Clock", "no column of time"),
+            ("Frame,Time", "Frames,Time", "are missing"),
+            ("1001.0", "nan", "line 9: column `7` holds `nan`, which is not finite"),
+            ("1001.0", "lost", "line 9: column `7` holds `lost`"),
+            ("1001.0", "", "line 9: column `7` is empty"),
+            ("1,0.010000", "1,0.000000", "a second time at 0 s; the first is line 8"),
+            ("1,0.010000", "1,-1", "time runs backwards"),
+            ("0,0,0,1,1001.0,1500.0,-250.0,0.1,9,9,9,,,,,,,,", "0,0,0,1", "line 9: it has 6 fields"),
+        ],
+    );
+    let twice = MOTIVE.replace(",cf2", ",cf1");
+    assert!(read(&twice).expect_err("twice").to_string().contains("two rigid bodies are called `cf1`"));
+    let markers = MOTIVE.replace("Rigid Body Marker", "Body").replace("Rigid Body", "Marker").replace(",cf2", ",cf1");
+    assert!(read(&markers).expect_err("twice").to_string().contains("two markers are called `cf1`"));
+    let none = MOTIVE.replace(",Position", ",Place");
+    assert!(read(&none).expect_err("none").to_string().contains("neither the position of a rigid body"));
+    let scaled = ReadOptions { scale: 0.1, ..ReadOptions::default() };
+    let error = read_bytes("take.csv", MOTIVE.as_bytes(), &scaled).expect_err("scaled");
+    assert_eq!(error.help(), "leave --scale away");
+}
+
+const NEXUS: &str = "\
+Devices\n1000\n,,Force\nFrame,Sub Frame,Fx\n,,N\n1,0,5\n1,1,5\n\nTrajectories\n100\n,,cf1:front,,,cf1:back,,,ball,,\n\
+Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n1,0,100,0,1000,300,0,1000,-500,250,0\n\
+2,0,110,0,1000,310,0,1000,,,\n3,0,,,,320,0,1000,-500,250,0\n\nEvents\n100\n";
+
+const TRACKER: &str = "\
+Objects\n200\n,,cf1:cf1,,,,,,,cf2:cf2,,,,,,\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ,RX,RY,RZ,RW,TX,TY,TZ\n\
+,,,,,,mm,mm,mm,,,,,mm,mm,mm\n1,0,0,0,0,1,1000,2000,500,0,0,0,1,-1,-2,-4\n2,0,0,0,0,1,1000,2000,500,,,,,,,\n";
+
+#[test]
+fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
+    let found = whole(NEXUS);
+    let expected = [
+        (0.01, "cf1", [0.2, 0.0, 1.0]),
+        (0.01, "ball", [-0.5, 0.25, 0.0]),
+        (0.02, "cf1", [0.21, 0.0, 1.0]),
+        (0.03, "ball", [-0.5, 0.25, 0.0]),
+    ];
+    assert_eq!(found.samples(), expected);
+    assert!(found.notes.iter().any(|note| note.ends_with("is the place of cf1 (2)")), "{:?}", found.notes);
+    let found = whole(TRACKER);
+    let expected =
+        [(0.005, "cf1", [1.0, 2.0, 0.5]), (0.005, "cf2", [-0.001, -0.002, -0.004]), (0.01, "cf1", [1.0, 2.0, 0.5])];
+    assert_eq!(found.samples(), expected);
+    // Where both are there, objects go before markers.
+    let both = whole(&format!("{NEXUS}\n{TRACKER}"));
+    assert_eq!(both.samples(), expected);
+    let note = "not read, beside those of the section Objects: Force, ball";
+    assert!(both.notes.iter().any(|said| said == note), "{:?}", both.notes);
+}
+
+#[test]
+fn exports_of_vicon_are_refused_where_they_are_wrong() {
+    refused(
+        NEXUS,
+        &[
+            ("Trajectories\n100", "Trajectories\n0", "the rate of Trajectories is `0`"),
+            ("\n,,mm", "\n,,stone", "some of its places are in `stone` and some in `mm`"),
+            ("cf1:back", "cf1:front", "two markers are called `cf1:front`"),
+            ("Trajectories\n", "Joints\n", "neither objects nor trajectories"),
+            ("110", "inf", "line 15: column `3` holds `inf`"),
+            ("110", "", "line 15: column `3` is empty"),
+            ("2,0,110", "2,1,110", "it is part 1 of a frame"),
+            ("2,0,110", "1,0,110", "there a second time"),
+            ("2,0,110,0,1000,310,0,1000,,,", "2,0,110", "line 15: it has 3 fields"),
+        ],
+    );
+    refused(TRACKER, &[("cf2:cf2", "cf1:arm", "`cf1` has several segments")]);
+    let unknown = NEXUS.replace("mm", "deg");
+    assert!(read(&unknown).expect_err("degrees").to_string().contains("`deg`"));
+    assert!(read("Trajectories\n100\n,,a\n").expect_err("cut").to_string().contains("breaks off"));
+}

@@ -1,0 +1,237 @@
+//! Units and columns are taken for what their names say, or refused: nothing is guessed in silence.
+
+use std::fs;
+
+use tautline_recordings::read::{Dimensions, ReadError, ReadOptions, TimeUnit};
+
+use crate::recording::Whole;
+
+fn read_with(name: &str, content: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    fs::write(&path, content).expect("written");
+    Whole::read(&path, options)
+}
+
+fn read(content: &str) -> Result<Whole, ReadError> {
+    read_with("flight.csv", content, &ReadOptions::default())
+}
+
+/// The columns of a table of two rows, all of whose numbers are 1 and later 2.
+fn ones(header: &str) -> String {
+    let row = |number: &str| vec![number; header.split(',').count()].join(",");
+    format!("{header}\n{}\n{}\n", row("1"), row("2"))
+}
+
+/// What is refused says so, and what helps.
+fn refused(content: &str, options: &ReadOptions, said: &str, remedy: &str) {
+    let error = read_with("flight.csv", content, options).expect_err(content);
+    assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+    assert!(error.help().contains(remedy), "{}\ninstead of {remedy}", error.help());
+}
+
+#[test]
+fn units_of_length_are_honoured_wherever_a_name_says_them() {
+    for (header, metres) in [
+        ("t,x1 [mm],y1 [mm],z1 [mm]", 0.001),
+        ("t,a.x [mm],a.y [mm],a.z [mm]", 0.001),
+        ("t,x_cm,y_cm,z_cm", 0.01),
+        ("t,cf1_x_cm,cf1_y_cm,cf1_z_cm", 0.01),
+        ("t,x (ft),y (ft),z (ft)", 0.3048),
+        ("t,X[km],Y[km],Z[km]", 1000.0),
+        ("t,x [m],y,z", 1.0),
+        ("t,x_m,y_m,z_m", 1.0),
+    ] {
+        let whole = read(&ones(header)).unwrap_or_else(|error| panic!("{header}: {error}"));
+        assert_eq!(whole.samples()[0].2, [metres; 3], "{header}");
+    }
+    let mixed = read(&ones("t,x [m],y [cm],z [mm],vx [km/h],vy [mm/s],vz_m_s,radius (cm)")).expect("read");
+    let tautline_core::track::Item::Sample(sample) = &mixed.items[0] else { panic!("a piece") };
+    assert_eq!(sample.position_m.as_slice(), [1.0, 0.01, 0.001]);
+    assert_eq!(sample.velocity_m_s.map(|v| [v.x * 3.6, v.y, v.z]), Some([1.0, 0.001, 1.0]));
+    assert_eq!(sample.radius_m, Some(0.01));
+}
+
+#[test]
+fn units_that_are_not_known_or_contradict_each_other_are_refused() {
+    let scaled = ReadOptions { scale: 0.001, ..ReadOptions::default() };
+    let plain = ReadOptions::default();
+    for (header, options, said, remedy) in [
+        (
+            "t,id,x [px],y [px],z [px]",
+            &plain,
+            "column `x [px]` says a unit of length that is not known, `px`",
+            "--scale",
+        ),
+        ("t,x1 (deg),y1 (deg)", &plain, "`deg`", "write it in m"),
+        ("t,id,x,y,z,vx [mm],vy [mm],vz [mm]", &plain, "a unit of velocity that is not known, `mm`", "write it in"),
+        ("t,x [mm],y [mm],z", &plain, "column `y [mm]` says its unit, and column `z` none", "into its name"),
+        ("t,id,x [mm],y [mm],radius", &plain, "says its unit, and column `radius` none", "into its name"),
+        ("t,x [mm],y [mm]", &scaled, "says its unit, and --scale 0.001 another", "leave --scale away"),
+    ] {
+        refused(&ones(header), options, said, remedy);
+    }
+    // A column that the user names says its unit as well.
+    for (east, north) in [("east [mm]", "north (mm)"), ("east_mm", "north_mm")] {
+        let mut named = ReadOptions::default();
+        assert!(named.columns.set("x", east) && named.columns.set("y", north));
+        let whole = read_with("f.csv", &ones(&format!("t,id,{east},{north}")), &named).expect("read");
+        assert_eq!(whole.samples()[0].2, [0.001, 0.001, 0.0]);
+    }
+    // Metres are what a scale scales.
+    assert_eq!(read_with("f.csv", &ones("t,x [m],y"), &scaled).expect("read").samples()[0].2, [0.001, 0.001, 0.0]);
+    // A column that nobody reads may be in any unit.
+    assert!(read(&ones("t,id,x,y,z,gyro_x [deg/s]")).is_ok());
+}
+
+#[test]
+fn units_of_time_are_honoured_or_refused() {
+    let ms = read(&ones("Time [MS],x,y")).expect("read");
+    assert_eq!((ms.clock.unit, ms.clock.inferred), ("ms", false));
+    for header in ["time [min],x,y", "time (hours),id,x,y", "t_min,x1,y1", "timestamp [frames],x,y"] {
+        refused(&ones(header), &ReadOptions::default(), "a unit of time that is not known", "--time-scale");
+    }
+    let minutes = ReadOptions { times_per_second: Some(1.0 / 60.0), ..ReadOptions::default() };
+    let whole = read_with("f.csv", &ones("time [min],x,y"), &minutes).expect("read");
+    assert_eq!((whole.samples()[0].0, whole.samples()[1].0, whole.clock.inferred), (60.0, 120.0, false));
+    let said = ReadOptions { time_unit: Some(TimeUnit::Seconds), ..ReadOptions::default() };
+    assert_eq!(read_with("f.csv", &ones("time (utc),x,y"), &said).expect("read").samples()[1].0, 2.0);
+}
+
+#[test]
+fn numbers_of_frames_are_no_times() {
+    for header in ["frame,id,x,y", "Frame Number,x1,y1", "frame_idx,x,y", "step,id,x,y"] {
+        refused(&ones(header), &ReadOptions::default(), "the numbers of frames", "--fps 30");
+        let options = ReadOptions { times_per_second: Some(50.0), ..ReadOptions::default() };
+        let whole = read_with("f.csv", &ones(header), &options).expect("read");
+        assert_eq!(whole.samples()[1].0, 0.04, "{header}");
+    }
+    let mut named = ReadOptions::default();
+    named.columns.set("t", "frame");
+    refused(&ones("t,frame,id,x,y"), &named, "the numbers of frames", "--fps");
+    // Where there is a time, frames are beside the point.
+    assert_eq!(read(&ones("frame,t,id,x,y")).expect("read").samples()[1].0, 2.0);
+}
+
+#[test]
+fn quantities_are_no_vehicles() {
+    for extra in [
+        "gyro_x,gyro_y,gyro_z",
+        "a_x,a_y,a_z",
+        "v_x,v_y,v_z",
+        "speed_x,speed_y,speed_z",
+        "cf1/orientation/x,cf1/orientation/y,cf1/orientation/z",
+        "1.acc.x,1.acc.y,1.acc.z",
+        "imu0_x,imu0_y",
+    ] {
+        let whole =
+            read(&ones(&format!("t,x1,y1,z1,x2,y2,z2,{extra}"))).unwrap_or_else(|error| panic!("{extra}: {error}"));
+        assert_eq!(whole.vehicles, ["1", "2"], "{extra}");
+        let unused = format!("columns not used: {}", extra.replace(',', ", "));
+        assert!(whole.notes.contains(&unused), "{:?}", whole.notes);
+        refused(&ones(&format!("t,{extra}")), &ReadOptions::default(), "no column for the vehicle", "--column id");
+    }
+    // Vehicles called by letters are vehicles, and `a` is one of them.
+    assert_eq!(read(&ones("t,a_x,a_y,b_x,b_y")).expect("read").vehicles, ["a", "b"]);
+    assert_eq!(read(&ones("t,a.x,a.y,v.x,v.y")).expect("read").vehicles, ["a", "v"]);
+    let ambiguous = ones("t,cf1_x,cf1_y,cf2_x,cf2_y,a_x,a_y");
+    refused(&ambiguous, &ReadOptions::default(), "`a_x` may be of a vehicle, as `cf1_x` is", "longer name");
+}
+
+#[test]
+fn what_was_taken_as_a_vehicle_is_listed_where_it_was_guessed() {
+    let listed = |header: &str| {
+        let notes = read(&ones(header)).expect("read").notes;
+        notes.iter().find_map(|note| note.strip_prefix("vehicles, going by the names of columns: ").map(str::to_owned))
+    };
+    assert_eq!(listed("t,cf1.x,cf1.y,home.x,home.y").as_deref(), Some("`cf1`, `home`"));
+    assert_eq!(listed("t,x1,y1,x2,y2").as_deref(), Some("`1`, `2`"));
+    assert_eq!(listed("t,x,y").as_deref(), Some("`flight`"));
+    assert_eq!(listed("t,id,x,y"), None);
+}
+
+#[test]
+fn columns_that_are_repeated_are_not_dropped() {
+    for header in [
+        "t,px,py,pz,px.1,py.1,pz.1",
+        "t,id,px,py,pz,px.1,py.1,pz.1",
+        "t,x,y,z,x1,y1,z1",
+        "t,x,y,x,y",
+        "t,id,x,y,x_2,y_2",
+        "t,id,x,y,x[1],y[1]",
+    ] {
+        refused(&ones(header), &ReadOptions::default(), "both give the position along x", "--column");
+    }
+    assert_eq!(read(&ones("t,x.1,y.1,x.2,y.2")).expect("read").vehicles, ["1", "2"]);
+    assert_eq!(read(&ones("t,x[0],y[0],x[1],y[1]")).expect("read").vehicles, ["0", "1"]);
+    assert_eq!(read(&ones("t,drone[0].x,drone[0].y")).expect("read").vehicles, ["drone[0]"]);
+}
+
+#[test]
+fn plain_numbers_that_may_mean_several_things_are_asked_about() {
+    let text = |count: usize| format!("{}\n{}\n", vec!["0"; count].join(" "), vec!["1"; count].join(" "));
+    let vehicles = |count, dimensions| {
+        let options = ReadOptions { dimensions, ..ReadOptions::default() };
+        read_with("flight.txt", &text(count), &options).map(|whole| whole.vehicles.len())
+    };
+    // Ten numbers may be three vehicles, or one with velocity and acceleration. Eleven may be two with heading and speed.
+    for (count, ways) in [(5, "2 or 2+2"), (7, "2 or 3 or 3+3"), (10, "3"), (11, "2"), (13, "2 or 3 or 2+2 or 3+3")] {
+        let error = vehicles(count, None).expect_err("asked");
+        assert!(error.help().contains(&format!("--dimensions {ways}:")), "{}", error.help());
+    }
+    for (count, dimensions, expected) in [
+        (4, Some(Dimensions::Space), 1),
+        (10, Some(Dimensions::Space), 3),
+        (3, None, 1),
+        (7, Some(Dimensions::Space), 2),
+        (7, Some(Dimensions::Plane), 3),
+        (7, Some(Dimensions::SpaceVelocity), 1),
+        (9, Some(Dimensions::PlaneVelocity), 2),
+    ] {
+        assert_eq!(vehicles(count, dimensions).expect("read"), expected, "{count} numbers");
+    }
+    assert!(vehicles(8, Some(Dimensions::Space)).is_err());
+    let options = ReadOptions { dimensions: Some(Dimensions::Plane), ..ReadOptions::default() };
+    let whole = read_with("flight.txt", &text(7), &options).expect("read");
+    assert!(whole.notes.iter().any(|note| note.contains("of each of 3 vehicles")), "{:?}", whole.notes);
+    assert!(read_with("flight.csv", &ones("t,x1,y1"), &options).is_err(), "a header says it");
+}
+
+#[test]
+fn a_header_may_stand_behind_a_hash() {
+    for content in [
+        "# made up\n# t,id,x,y\n0,7,1,2\n",
+        "#t id x y\n0 7 1 2\n",
+        "# t, id, x, y\n0 7 1 2\n",
+        "#t,id,x,y\n0,cf7,1,2\n",
+    ] {
+        let whole = read_with("flight.txt", content, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((whole.vehicles[0].trim_start_matches("cf"), whole.samples()[0].2), ("7", [1.0, 2.0, 0.0]));
+    }
+    // A remark of as many words is none.
+    assert!(read("# one two three four\n0,7,1,2\n").is_err());
+}
+
+#[test]
+fn tuples_and_tables_of_one_vehicle_are_read() {
+    let rvo = read_with("rvo.txt", "0 (1,2) (-3,4.5)\n0.25 (1.5, 2) (-3,4)\n", &ReadOptions::default()).expect("read");
+    let samples = [(0.0, "1", [1.0, 2.0, 0.0]), (0.0, "2", [-3.0, 4.5, 0.0])];
+    assert_eq!(rvo.samples()[..2], samples);
+    assert_eq!(rvo.items.len(), 4);
+
+    let tum = "# timestamp tx ty tz qx qy qz qw\n5 1 2 3 0 0 0.6 0.8\n6 1 2 4 0 0 0 1\n";
+    let found = read_with("cf1.tum", tum, &ReadOptions::default()).expect("read");
+    assert_eq!((found.vehicles.clone(), found.samples()[1].2), (vec!["cf1".to_owned()], [1.0, 2.0, 4.0]));
+    assert!(read_with("no.tum", "5 1 2 3 9 9 9 9\n", &ReadOptions::default()).is_err(), "no attitude");
+
+    let kitti = "1 0 0 7 0 1 0 8 0 0 1 9\n1 0 0 8 0 1 0 8 0 0 1 9\n";
+    let asked = read_with("00.txt", kitti, &ReadOptions::default()).expect_err("no time");
+    assert!(asked.help().contains("--fps"), "{}", asked.help());
+    let options = ReadOptions { times_per_second: Some(10.0), ..ReadOptions::default() };
+    let found = read_with("00.txt", kitti, &options).expect("read");
+    assert_eq!(found.samples(), [(0.0, "00", [7.0, 8.0, 9.0]), (0.1, "00", [8.0, 8.0, 9.0])]);
+
+    let one = read(&ones("t,x,y,z,vx,vy,vz,qx,qy,qz,qw,roll,gyro.x")).expect("read");
+    assert_eq!(one.vehicles, ["flight"]);
+    refused(&ones("t,who,x,y,z"), &ReadOptions::default(), "no column for the vehicle", "--column id=NAME");
+}

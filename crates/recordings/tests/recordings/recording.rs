@@ -1,0 +1,41 @@
+//! Recordings read whole.
+#![allow(dead_code, reason = "each test uses its part")]
+
+use std::path::Path;
+
+use tautline_core::track::{Clock, Item, Sample};
+use tautline_recordings::read::{self, ReadError, ReadOptions};
+
+/// Everything that a recording gives.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Whole {
+    pub(crate) vehicles: Vec<String>,
+    pub(crate) items: Vec<Item>,
+    pub(crate) clock: Clock,
+    pub(crate) notes: Vec<String>,
+    pub(crate) assumed: Option<String>,
+}
+
+impl Whole {
+    pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let mut tracks = read::open(path, options)?;
+        let mut items = Vec::new();
+        while tracks.read(&mut items)? {}
+        let vehicles = tracks.vehicles().to_vec();
+        let (clock, notes) = (tracks.clock().clone(), tracks.notes().to_vec());
+        Ok(Self { vehicles, items, clock, notes, assumed: tracks.assumed().map(str::to_owned) })
+    }
+
+    /// The samples as (time, name, position).
+    pub(crate) fn samples(&self) -> Vec<(f64, &str, [f64; 3])> {
+        self.items
+            .iter()
+            .map(|item| match item {
+                Item::Sample(Sample { vehicle, time_s, position_m, .. }) => {
+                    (*time_s, self.vehicles[*vehicle].as_str(), (*position_m).into())
+                }
+                Item::Piece(piece) => panic!("a piece: {piece:?}"),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,322 @@
+//! Wrong recordings are refused with the file, the place, the value and the remedy.
+
+use std::fs::{self, File};
+use std::io::{Cursor, Write as _};
+use std::path::PathBuf;
+
+use tautline_recordings::export::{self, ExportOptions};
+use tautline_recordings::read::{self, ArrayAxis, Dimensions, Fault, Format, Place, ReadError, ReadOptions, TimeUnit};
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+use crate::recording::Whole;
+
+fn written(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).expect("written");
+    (folder, path)
+}
+
+fn refused(name: &str, bytes: &[u8]) -> ReadError {
+    refused_with(name, bytes, &ReadOptions::default())
+}
+
+fn refused_with(name: &str, bytes: &[u8], options: &ReadOptions) -> ReadError {
+    let (_folder, path) = written(name, bytes);
+    match Whole::read(&path, options) {
+        Err(error) => {
+            assert!(error.to_string().contains(name), "names no file: {error}");
+            assert!(!error.is_machine(), "{error}");
+            error
+        }
+        Ok(whole) => panic!("{name} was read: {} items", whole.items.len()),
+    }
+}
+
+const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,1,2,3\n0.5,1,1,2,3\n0.5,2,1,2,3\n";
+
+#[test]
+fn every_wrong_table_is_refused_where_it_is_wrong() {
+    let line = |number| Some(Place::Line(number));
+    let change = |from: &str, to: &str| LONG.replacen(from, to, 1);
+    let last = |to: &str| change("0.5,2,1,2,3", to);
+    for (content, place, said, remedy) in [
+        (change("t,id", "when,id"), line(1), "no column for time", "--column t=NAME"),
+        (change("t,id", "t,who"), line(1), "no column for the vehicle", "--column id=NAME"),
+        (change("x,y,z", "x,w,z"), line(1), "no column for the position along y", "--column y=NAME"),
+        ("t,x1,y1,z1,x2,z2\n0,1,2,3,4,5\n".to_owned(), line(1), "along y of vehicle `2`", "--column"),
+        (change("x,y,z", "x,x,y"), line(1), "both give", "--column"),
+        (last("0.5,2,one,2,3"), line(5), "column `x` holds `one`", "decimal point"),
+        (last("0.5,2,1,NaN,3"), line(5), "column `y` holds `NaN`, which is not finite", "leave the cells empty"),
+        (last("0.5,2,1,2,-inf"), line(5), "column `z` holds `-inf`", "leave the cells empty"),
+        (last("0.5,2,1,2,1e999"), line(5), "`1e999`, which is not finite", "leave the cells empty"),
+        (last("later,2,1,2,3"), line(5), "column `t` holds `later`", "decimal point"),
+        (last("12:00:01,2,1,2,3"), line(5), "column `t` holds `12:00:01`, a time of day", "in seconds"),
+        (LONG.replace('\n', "\r"), line(1), "its lines end with carriage returns alone", "line ends of Unix"),
+        (last("nan,2,1,2,3"), line(5), "column `t` holds `nan`", "each needs a time"),
+        (last(",2,1,2,3"), line(5), "column `t` is empty", "fill it"),
+        (last("0.5,,1,2,3"), line(5), "column `id` is empty", "fill it"),
+        (last("0.5,2,1,,3"), line(5), "column `y` is empty", "fill it"),
+        (last("0.5,2,1,2"), line(5), "4 fields where 5 are expected", "a field for each column"),
+        (last("0.5,1,1,2,4"), line(5), "vehicle `1` is there a second time at 0.5 s; the first is line 4", "take one"),
+        (last("0.5,2,1,5,2,3"), line(5), "6 fields where 5", "write them with points"),
+        (
+            LONG.replace(',', ";").replace("0.5;2", "0,5;2"),
+            line(5),
+            "`0,5`, a number with a decimal comma",
+            "decimal point",
+        ),
+        (last("0.5,\"2,1,2,3"), line(5), "quotes are not closed", "close the quotes"),
+        ("t,x1,y1,z1\n0,1,2,3\n1,1,2,3\n0.5,1,2,3\n".into(), line(4), "0.5 s comes after 1 s", "sort the lines"),
+        (
+            "t,x1,y1,z1\n0,1,2,3\n0,1,2,4\n".into(),
+            line(3),
+            "there a second time at 0 s; the first is line 2",
+            "take one",
+        ),
+        ("0,1,1,2,3\n0.5,1,1,2,3\n".into(), line(1), "numbers and no names of columns", "put a header above"),
+        ("t,id,x,y,z\n".into(), None, "a header and no rows", "record again"),
+        ("t,x1,y1,z1\r\n\r\n".into(), None, "a header and no rows", "record again"),
+        ("\n\n".into(), None, "it is empty", "record again"),
+        ("0 1 2 3\n0.5 1 2\n".into(), line(2), "3 fields where 4", "a field for each column"),
+        ("0 1 2 3 4\n".into(), line(1), "5 numbers, and nothing says how many", "--dimensions 2 or 2+2"),
+        ("0 1 2 3 4 5 6 7\n".into(), line(1), "8 numbers where time and 3", "t x y z x y z"),
+        ("0 1 2 3\n1 1 2 3\n0.5 1 2 3\n".into(), line(3), "time runs backwards", "sort the lines"),
+        ("t,id,x,y,z,radius\n0,1,1,2,3,-1\n".into(), line(2), "a negative radius", "0 or more"),
+        (
+            "t,id,x,y,z,radius\n0,a,1,2,3,1\n1,a,1,2,3,\n".into(),
+            line(3),
+            "`a` has no radius here and one at line 2",
+            "fill",
+        ),
+        ("t,id,x,y,z,vx,vy\n0,1,1,2,3,4,5\n".into(), line(1), "no column for the velocity along z", "--column vz=NAME"),
+        ("0,0 1,5 2,5 3,5\n".into(), line(1), "`0,0`, a number with a decimal comma", "decimal point"),
+        ("# at rest\n0 1,5 2 3\n".into(), line(2), "`1,5`, a number with a decimal comma", "decimal point"),
+        (change("0,2,1", "#0,2,1"), line(3), "column `t` holds `#0`", "decimal point"),
+    ] {
+        let error = refused("flight.csv", content.as_bytes());
+        assert_eq!(error.place, place, "{error}\n{content}");
+        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+        assert!(error.help().contains(remedy), "{}\ninstead of {remedy}", error.help());
+    }
+}
+
+#[test]
+fn the_table_that_the_wrong_ones_are_made_of_is_read() {
+    let (_folder, path) = written("flight.csv", LONG.as_bytes());
+    assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("read").items.len(), 4);
+}
+
+#[test]
+fn what_is_no_recording_is_refused() {
+    assert!(matches!(refused("nothing.csv", b"").fault, Fault::Empty));
+    assert!(matches!(refused("picture.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").fault, Fault::UnknownFormat));
+    assert!(matches!(refused("wide.txt", b"\xff\xfet\0,\0").fault, Fault::NotUtf8));
+    assert!(matches!(refused("latin.csv", b"t,id,x,y,z\n0,caf\xe9,1,2,3\n").fault, Fault::NotUtf8));
+    let missing = read::open(&PathBuf::from("/no/such/file.csv"), &ReadOptions::default()).err().expect("refused");
+    assert!(!missing.is_machine() && missing.to_string().contains("/no/such/file.csv"), "{missing}");
+    let error = refused("array.npy", b"\x93NUMPY\x01\x00");
+    assert!(error.help().contains("numpy.savez"), "{error}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let error = read::open(folder.path(), &ReadOptions::default()).err().expect("refused");
+    assert!(error.help().contains("polynomial"), "{error}");
+}
+
+#[test]
+fn a_line_of_ten_megabytes_is_refused_and_one_below_the_limit_is_not() {
+    let mut long = b"t,id,x,y,z\n0,1,1,2,".to_vec();
+    long.resize(10_000_000, b'3');
+    let error = refused("long.csv", &long);
+    assert!(matches!(error.fault, Fault::LineTooLong { .. }), "{error}");
+    assert_eq!(error.place, Some(Place::Line(2)));
+    let vehicles = 30_000;
+    let wide: String = std::iter::once("0".to_owned()).chain((0..vehicles).map(|k| format!(" {k} 2 3"))).collect();
+    let (_folder, path) = written("wide.txt", wide.as_bytes());
+    let options = ReadOptions { dimensions: Some(Dimensions::Space), ..ReadOptions::default() };
+    assert_eq!(Whole::read(&path, &options).expect("read").items.len(), vehicles);
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    out.write_all(bytes).expect("written");
+    out.finish().expect("finished")
+}
+
+/// One long recording in every format that can be cut.
+fn in_every_format() -> Vec<(&'static str, Vec<u8>)> {
+    let rows: Vec<_> = (0..2000).map(|k| format!("{},{},{k}.5,2,3\n", f64::from(k / 2), k % 2 + 1)).collect();
+    let csv = format!("t_s,id,x,y,z\n{}", rows.concat());
+    let (folder, source) = written("source.csv", csv.as_bytes());
+    let exported = |format: export::Format| {
+        let path = folder.path().join(format.name());
+        let open = || read::open(&source, &ReadOptions::default());
+        let mut file = File::create(&path).expect("a file");
+        export::export(&open, format, &ExportOptions::default(), &mut file).expect("exported");
+        fs::read(&path).expect("read")
+    };
+    vec![
+        ("flight.csv.gz", gzip(csv.as_bytes())),
+        ("flight.parquet", exported(export::Format::Parquet)),
+        ("flight.npz", exported(export::Format::Npz)),
+        ("flight.mcap", exported(export::Format::Mcap)),
+    ]
+}
+
+#[test]
+fn a_file_that_breaks_off_anywhere_is_refused() {
+    for (name, bytes) in in_every_format() {
+        let (_folder, path) = written(name, &bytes);
+        assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("whole").items.len(), 2000, "{name}");
+        for part in [0.1, 0.5, 0.9, 0.999] {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
+            let cut = (bytes.len() as f64 * part) as usize;
+            let error = refused(name, &bytes[..cut]);
+            let truncated = matches!(error.fault, Fault::Truncated { .. } | Fault::Unfinished);
+            assert!(truncated, "{name} at {part}: {error}");
+            assert!(error.help().contains("copy or record it again"), "{}", error.help());
+        }
+    }
+}
+
+#[test]
+fn a_changed_byte_is_seen_where_there_is_a_checksum() {
+    for (name, mut bytes) in in_every_format().into_iter().filter(|(name, _)| *name != "flight.parquet") {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+        let error = refused(name, &bytes);
+        assert!(matches!(error.fault, Fault::Damaged { .. } | Fault::Truncated { .. }), "{name}: {error}");
+    }
+}
+
+/// An archive whose entry is much larger than the file.
+fn bomb(name: &str, begin: &[u8]) -> Vec<u8> {
+    const INFLATED_BYTES: usize = 80 * 1024 * 1024;
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let packed = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
+    if name == "positions.npy" {
+        zip.start_file("t.npy", packed).expect("an entry");
+        let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1,), }\n";
+        zip.write_all(b"\x93NUMPY\x01\x00").expect("written");
+        zip.write_all(&[u8::try_from(header.len()).expect("short"), 0]).expect("written");
+        zip.write_all(header.as_bytes()).expect("written");
+        zip.write_all(&[0; 8]).expect("written");
+    }
+    zip.start_file(name, packed).expect("an entry");
+    zip.write_all(begin).expect("written");
+    let block = vec![b' '; 1024 * 1024];
+    for _ in 0..INFLATED_BYTES / block.len() {
+        zip.write_all(&block).expect("written");
+    }
+    zip.finish().expect("finished").into_inner()
+}
+
+#[test]
+fn archives_that_grow_beyond_all_measure_are_refused() {
+    let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 4000000, 3), }\n";
+    let mut array = b"\x93NUMPY\x01\x00".to_vec();
+    array.extend_from_slice(&[u8::try_from(header.len()).expect("short"), 0]);
+    array.extend_from_slice(header.as_bytes());
+    for (name, bytes) in [
+        ("show.skyc", bomb("show.json", b"{")),
+        ("flight.npz", bomb("positions.npy", &array)),
+        ("flight.csv.gz", {
+            let mut text = LONG.as_bytes().to_vec();
+            text.resize(80 * 1024 * 1024, b'\n');
+            gzip(&text)
+        }),
+    ] {
+        assert!(bytes.len() < 1024 * 1024, "{name} is no bomb");
+        let error = refused(name, &bytes);
+        assert!(matches!(error.fault, Fault::Bomb { .. }), "{name}: {error}");
+        assert!(error.help().contains("unpack it yourself"), "{}", error.help());
+    }
+}
+
+#[test]
+fn lengths_that_lie_cost_nothing() {
+    // A header that promises 10^15 numbers, and no number behind it.
+    let array = |shape: &str| {
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend_from_slice(&[u8::try_from(header.len()).expect("short"), 0]);
+        bytes.extend_from_slice(header.as_bytes());
+        bytes.extend_from_slice(&[0; 8]);
+        bytes
+    };
+    for shape in ["(1, 333333333333333, 3)", "(0, 999999999999999, 3)", "(1, 1000000000000000000, 3)"] {
+        let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in [("t.npy", array("(1,)")), ("positions.npy", array(shape))] {
+            zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+            zip.write_all(&bytes).expect("written");
+        }
+        refused("flight.npz", &zip.finish().expect("finished").into_inner());
+    }
+}
+
+#[test]
+fn a_show_is_refused_where_it_is_wrong() {
+    let show = |points: &str| {
+        format!(r#"{{"swarm": {{"drones": [{{"settings": {{"name": "A", "trajectory": {{"points": {points}}}}}}}]}}}}"#)
+    };
+    for (points, place, said) in [
+        ("[[0, [1, 2, 3], []], [0, [1, 2, 3], []]]", "drone `A`, point 2", "the same time"),
+        ("[[1, [1, 2, 3], []], [0, [1, 2, 3], []]]", "drone `A`, point 2", "time runs backwards"),
+        ("[[0, [1, 2]]]", "line 1", "an array of length 3"),
+        ("[[0, [1, 2, 1e999]]]", "line 1", "number out of range"),
+        ("[]", "", "no drone with a trajectory"),
+        ("[[0, [1, 2, 3]", "line 1", "breaks off"),
+    ] {
+        let whole = show(points);
+        let show = if said == "breaks off" { whole.split('}').next().expect("a part").to_owned() } else { whole };
+        let error = refused("show.json", show.as_bytes());
+        let shown = error.to_string();
+        assert!(shown.contains(place) && shown.contains(said), "{shown}\ninstead of {place}: {said}");
+    }
+}
+
+#[test]
+fn polynomials_are_refused_where_they_are_wrong() {
+    let header = "duration,x^0,x^1,y^0,y^1,z^0,z^1\n";
+    for (rows, place, said) in [
+        ("1,0,0,0,0,0,0\n1,0,zero,0,0,0,0\n", Some(Place::Line(3)), "column `x^1` holds `zero`"),
+        ("1,0,0,0,0,0,inf\n", Some(Place::Line(2)), "not finite"),
+        ("0,0,0,0,0,0,0\n", Some(Place::Line(2)), "lasts 0 s"),
+        ("-1,0,0,0,0,0,0\n", Some(Place::Line(2)), "lasts -1 s"),
+        ("1,0,0,0,0\n", Some(Place::Line(2)), "5 fields where 7"),
+        ("", None, "a header and no rows"),
+    ] {
+        let error = refused("cf1.csv", format!("{header}{rows}").as_bytes());
+        assert_eq!(error.place, place, "{error}");
+        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+    }
+    for (header, missing) in [("x^0,y^0", "z^0"), ("x^0,y^0,z^0,x^1,y^1", "z^1"), ("x^0,y^0,z^0,x^2,y^2,z^2", "x^1")] {
+        let said = refused("cf1.csv", format!("duration,{header}\n1,0,0\n").as_bytes()).to_string();
+        assert!(said.contains(&format!("no column `{missing}`")), "{said}");
+    }
+}
+
+#[test]
+fn a_format_that_is_forced_on_other_content_is_refused() {
+    let forced = |format| ReadOptions { format: Some(format), ..ReadOptions::default() };
+    for format in [Format::Parquet, Format::Npz, Format::Mcap, Format::Crazyflie, Format::Skybrush] {
+        let error = refused_with("flight.csv", LONG.as_bytes(), &forced(format));
+        let has_magic = matches!(format, Format::Parquet | Format::Npz | Format::Mcap);
+        assert_eq!(has_magic, matches!(error.fault, Fault::WrongFormat { .. }), "{format:?}: {error}");
+    }
+    let unit = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..ReadOptions::default() };
+    let error = refused_with("cf1.csv", b"duration,x^0,y^0,z^0\n1,0,0,0\n", &unit);
+    assert!(error.help().contains("leave --time-unit away"), "{error}");
+    for (options, option) in [
+        (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "--frame"),
+        (ReadOptions { layout: Some(ArrayAxis::LAYOUTS[0]), ..ReadOptions::default() }, "--layout"),
+        (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
+    ] {
+        let error = refused_with("flight.csv", LONG.as_bytes(), &options);
+        assert_eq!(error.help(), format!("leave {option} away"), "{error}");
+    }
+    for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let options = ReadOptions { scale, ..ReadOptions::default() };
+        assert!(refused_with("flight.csv", LONG.as_bytes(), &options).help().contains("positive"));
+    }
+}

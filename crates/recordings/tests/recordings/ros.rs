@@ -1,0 +1,385 @@
+//! What people record with ROS 2: poses of every kind, bags, frames in frames.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tautline_recordings::read::{ReadError, ReadOptions};
+use tempfile::TempDir;
+
+use crate::messages::{Message, NO_TURN, SEC, cdr, header, mcap_of, read_bytes, whole};
+use crate::recording::Whole;
+
+/// What is done to a folder that was whole.
+type Spoil = Box<dyn FnOnce(&Path)>;
+
+/// The quaternion of a quarter turn to the left.
+const QUARTER: [f64; 4] = [0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2];
+
+/// Rounding of a rotation of lengths of some metres.
+const ROUNDING_M: f64 = 1e-14;
+
+const TF: &str = "tf2_msgs/msg/TFMessage";
+const POSE: &str = "geometry_msgs/msg/PoseStamped";
+const ODOMETRY: &str = "nav_msgs/msg/Odometry";
+const NAMED: &str = "motion_capture_tracking_interfaces/msg/NamedPoseArray";
+
+fn options(frame: Option<&str>, topics: &[&str]) -> ReadOptions {
+    let topics = topics.iter().map(|topic| (*topic).to_owned()).collect();
+    ReadOptions { frame: frame.map(str::to_owned), topics, ..ReadOptions::default() }
+}
+
+fn in_frame(frame: &str) -> ReadOptions {
+    options(Some(frame), &[])
+}
+
+fn read(bytes: &[u8], options: &ReadOptions) -> Whole {
+    read_bytes("ros.mcap", bytes, options).unwrap_or_else(|error| panic!("{error}\n{}", error.help()))
+}
+
+fn refused(messages: &[Message], options: &ReadOptions) -> (String, String) {
+    let error = read_bytes("ros.mcap", &mcap_of(messages), options).expect_err("refused");
+    (error.to_string(), error.help())
+}
+
+fn bag(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/bags").join(name)
+}
+
+/// A transform at a time \[ns\].
+fn transform(ns: u32, parent: &'static str, child: &'static str, at: [f64; 3], turn: [f64; 4]) -> Vec<u8> {
+    cdr(&(vec![(((SEC, ns), parent), child, (at, turn))],), true)
+}
+
+fn pose(ns: u32, frame: &'static str, at: [f64; 3]) -> Vec<u8> {
+    cdr(&(((SEC, ns), frame), (at, NO_TURN)), true)
+}
+
+fn odometry(ns: u32, frame: &'static str, child: &'static str, at: [f64; 3]) -> Vec<u8> {
+    cdr(&(((SEC, ns), frame), child, ((at, NO_TURN), [[0.0; 6]; 6]), (([9.0; 3], [9.0; 3]), [[0.0; 6]; 6])), true)
+}
+
+#[test]
+fn poses_of_every_kind_are_read_in_both_byte_orders() {
+    let (at, covariance) = ([1.0, 2.0, 3.0], [[0.5; 6]; 6]);
+    for little in [true, false] {
+        let odometry = (header(5), "base_link", ((at, NO_TURN), covariance), (([9.0; 3], [9.0; 3]), covariance));
+        let named = (header(5), vec![("cf1", (at, NO_TURN)), ("cf22", (at, NO_TURN))]);
+        for (topic, kind, message, vehicles) in [
+            ("/r1/odom", ODOMETRY, cdr(&odometry, little), vec!["/r1/odom"]),
+            (
+                "/amcl_pose",
+                "geometry_msgs/msg/PoseWithCovarianceStamped",
+                cdr(&(header(5), ((at, NO_TURN), covariance)), little),
+                vec!["/amcl_pose"],
+            ),
+            ("/tag", "geometry_msgs/msg/PointStamped", cdr(&(header(5), at), little), vec!["/tag"]),
+            ("/poses", NAMED, cdr(&named, little), vec!["cf1", "cf22"]),
+        ] {
+            let found = whole("ros.mcap", &mcap_of(&[(topic, kind, "cdr", 7, message.clone())]));
+            let expected: Vec<_> = vehicles.iter().map(|name| (5e-9, *name, at)).collect();
+            assert_eq!(found.samples(), expected, "{kind}");
+            let cut = mcap_of(&[(topic, kind, "cdr", 7, message[..40].to_vec())]);
+            let error = read_bytes("cut.mcap", &cut, &ReadOptions::default()).expect_err("refused").to_string();
+            assert!(error.contains("message 1 on topic `/"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn velocities_of_odometry_are_not_used_and_it_is_said() {
+    let found =
+        whole("odom.mcap", &mcap_of(&[("/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3]))]));
+    assert!(
+        found.notes.iter().any(|note| note.starts_with("velocities of odometry are not used")),
+        "{:?}",
+        found.notes
+    );
+    let named = cdr(&(header(1), vec![("cf1", ([f64::NAN, 0.0, 0.0], NO_TURN))]), true);
+    let (said, help) = refused(&[("/poses", NAMED, "cdr", 1, named)], &ReadOptions::default());
+    assert!(said.contains("message 1 on topic `/poses`") && said.contains("not finite"), "{said}\n{help}");
+}
+
+/// Two vehicles that pass each other, as `bags.py` flies them.
+fn passing() -> Vec<(f64, &'static str, [f64; 3])> {
+    let at = |k: u32| f64::from(k) / 10.0;
+    let both = |k| [(at(k), "cf1", [at(k) - 1.0, 0.0, 1.0]), (at(k), "cf2", [1.0 - at(k), 0.5, 1.0])];
+    (0..=20).flat_map(both).collect()
+}
+
+#[test]
+fn a_bag_of_crazyswarm_names_each_vehicle_once() {
+    let found = Whole::read(&bag("crazyswarm"), &ReadOptions::default()).expect("read");
+    assert_eq!(found.samples(), passing());
+    assert!(found.notes.iter().any(|note| note.contains("which are not read: cf1, cf2")), "{:?}", found.notes);
+    let by_transforms = Whole::read(&bag("crazyswarm"), &options(None, &["/tf"])).expect("read");
+    assert_eq!(by_transforms.items, found.items);
+    let error = Whole::read(&bag("crazyswarm"), &options(None, &["/pose"])).expect_err("refused");
+    assert!(error.to_string().contains("`/pose`") && error.to_string().contains("/poses, /tf"), "{error}");
+}
+
+#[test]
+fn packed_splits_of_a_bag_are_one_recording() {
+    let found = Whole::read(&bag("split"), &ReadOptions::default()).expect("read");
+    assert_eq!((found.samples(), found.clock.epoch_ns), (passing(), i64::from(SEC) * 1_000_000_000));
+}
+
+#[test]
+fn poses_with_covariance_are_called_by_their_topics() {
+    let found = Whole::read(&bag("covariance"), &ReadOptions::default()).expect("read");
+    assert_eq!(found.vehicles, ["/r1/pose", "/r2/pose"]);
+    assert_eq!(found.samples()[5], (0.2, "/r2/pose", [2.0, 0.2, 0.0]));
+}
+
+/// A copy of the bag of two packed splits, changed.
+fn changed(change: impl FnOnce(&Path)) -> (TempDir, Result<Whole, ReadError>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for entry in fs::read_dir(bag("split")).expect("a bag") {
+        let path = entry.expect("a file").path();
+        fs::copy(&path, folder.path().join(path.file_name().expect("a name"))).expect("copied");
+    }
+    change(folder.path());
+    let read = Whole::read(folder.path(), &ReadOptions::default());
+    (folder, read)
+}
+
+fn edit(file: &Path, change: impl FnOnce(String) -> String) {
+    let text = fs::read_to_string(file).expect("text");
+    fs::write(file, change(text)).expect("written");
+}
+
+#[test]
+fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
+    let remove = |name: &'static str| move |folder: &Path| fs::remove_file(folder.join(name)).expect("removed");
+    let text = |from: &'static str, to: &'static str| {
+        move |folder: &Path| edit(&folder.join("metadata.yaml"), |text| text.replace(from, to))
+    };
+    let cut = |folder: &Path| {
+        let path = folder.join("split_1.mcap.zstd");
+        let bytes = fs::read(&path).expect("bytes");
+        fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
+    };
+    let foreign = |folder: &Path| fs::write(folder.join("split_1.mcap.zstd"), "no bag").expect("written");
+    let other = |folder: &Path| drop(fs::copy(folder.join("split_1.mcap.zstd"), folder.join("split_2.mcap")));
+    let cases: [(Spoil, &str, &str); 13] = [
+        (
+            Box::new(text("message_count: 21", "message_count: 22")),
+            "its files have 21 messages, and metadata.yaml counts 22",
+            "copy",
+        ),
+        (
+            Box::new(|folder: &Path| {
+                let split = folder.join("split_1.mcap.zstd");
+                fs::remove_file(&split).and_then(|()| fs::create_dir(&split)).expect("a folder in its place");
+            }),
+            "the bag lists this file, and it is none",
+            "copy",
+        ),
+        (
+            Box::new(remove("split_1.mcap.zstd")),
+            "split_1.mcap.zstd: the bag lists this file, and it is not there",
+            "copy",
+        ),
+        (Box::new(remove("split_0.mcap.zstd")), "split_0.mcap.zstd: the bag lists", "reindex"),
+        (Box::new(cut), "split_1.mcap.zstd: it breaks off", "copy or record it again"),
+        (Box::new(foreign), "split_1.mcap.zstd: it is not an MCAP file", "--format"),
+        (Box::new(other), "split_2.mcap lies beside the files of the bag", "reindex"),
+        (
+            Box::new(text("- split_1.mcap.zstd", "- ../split_1.mcap.zstd")),
+            "metadata.yaml: the bag lists `../split_1",
+            "copy",
+        ),
+        (Box::new(text("- split_1.mcap.zstd", "- split_0.mcap.zstd")), "lists `split_0.mcap.zstd` twice", "copy"),
+        (
+            Box::new(text("storage_identifier: mcap", "storage_identifier: sqlite3")),
+            "stored as `sqlite3`",
+            "rosbags-convert",
+        ),
+        (
+            Box::new(text("compression_mode: file", "compression_mode: MESSAGE")),
+            "in mode `MESSAGE`",
+            "ros2 bag convert",
+        ),
+        (Box::new(text("relative_file_paths", "relative_paths")), "metadata.yaml, line", "reindex"),
+        (Box::new(text("storage_identifier: mcap", "storage_identifier: [")), "metadata.yaml, line", "reindex"),
+    ];
+    for (change, said, remedy) in cases {
+        let error = changed(change).1.expect_err(said);
+        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+        assert!(error.help().contains(remedy), "{}\ninstead of {remedy}", error.help());
+    }
+}
+
+#[test]
+fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
+    let cut = |folder: &Path| {
+        let path = folder.join("split_1.mcap.zstd");
+        let bytes = zstd::decode_all(fs::File::open(&path).expect("a file")).expect("unpacked");
+        // The last bytes are those of the end and of the index, which a recorder that is killed does not write.
+        let index = mcap::Summary::read(&bytes).expect("an index").expect("an index");
+        let end = usize::try_from(index.chunk_indexes[0].chunk_start_offset).expect("an offset");
+        fs::write(&path, &bytes[..end]).expect("written");
+    };
+    let (folder, refused) = changed(cut);
+    assert!(refused.expect_err("not closed").help().contains("--allow-unfinished"));
+    let accepting = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
+    let found = Whole::read(folder.path(), &accepting).expect("accepted");
+    assert!(
+        found.samples().len() < passing().len() && passing().starts_with(&found.samples()),
+        "{:?}",
+        found.samples()
+    );
+    let counted = format!("its files have {} messages, and metadata.yaml counts 21", found.samples().len() / 2);
+    for note in ["the recording was not closed", &counted] {
+        assert!(found.notes.iter().any(|said| said.starts_with(note)), "{:?}", found.notes);
+    }
+    // A bag whose files were all closed has lost messages elsewhere.
+    let short = changed(|folder| edit(&folder.join("metadata.yaml"), |text| text.replace("t: 21", "t: 22"))).0;
+    assert!(Whole::read(short.path(), &accepting).is_err());
+}
+
+#[test]
+fn splits_are_read_in_the_order_that_the_bag_lists_and_given_in_that_of_time() {
+    let (_folder, swapped) = changed(|folder| {
+        edit(&folder.join("metadata.yaml"), |text| {
+            let (head, tail) = text.split_once("relative_file_paths:").expect("a list");
+            let tail = tail
+                .replacen("split_0", "split_x", 1)
+                .replacen("split_1", "split_0", 1)
+                .replacen("split_x", "split_1", 1);
+            format!("{head}relative_file_paths:{tail}")
+        });
+    });
+    let swapped = swapped.expect("read");
+    assert_eq!(swapped.samples(), passing());
+    assert!(swapped.notes.iter().any(|note| note.contains("sorted")), "{:?}", swapped.notes);
+}
+
+#[test]
+fn a_robot_known_through_a_chain_of_transforms_is_brought_into_the_map() {
+    let alone = Whole::read(&bag("robot"), &ReadOptions::default()).expect("read");
+    assert_eq!((alone.vehicles.clone(), alone.assumed), (vec!["/odom".to_owned()], None));
+    assert_eq!(alone.items.len(), 21);
+    // Odometry goes along x of a frame that is turned by a quarter and moves along y of the map as fast.
+    for (topics, name) in [(vec![], "/odom"), (vec!["/tf"], "base_link")] {
+        let found = Whole::read(&bag("robot"), &options(Some("map"), &topics)).expect("read");
+        assert_eq!(found.vehicles, [name]);
+        assert_eq!(found.items.len(), 21);
+        for (time_s, _, [x, y, z]) in found.samples() {
+            assert!(x.abs() < ROUNDING_M && (y - 2.0 * time_s).abs() < ROUNDING_M && z == 0.0, "{time_s}: {x} {y} {z}");
+        }
+        assert_eq!(found.assumed.as_deref(), Some("transforms even between their samples"));
+        let counted = "5 by those of their very time, 16 by some between two samples at most 1 s apart; 0 left out";
+        assert!(found.notes.iter().any(|note| note.contains(counted)), "{:?}", found.notes);
+    }
+    let direct = Whole::read(&bag("robot"), &options(None, &["/tf"])).expect("read");
+    assert_eq!((direct.vehicles, direct.items, direct.assumed), (vec!["base_link".to_owned()], alone.items, None));
+}
+
+#[test]
+fn transforms_that_stand_still_are_exact_and_nothing_is_assumed() {
+    let messages = [
+        ("/tf_static", TF, "cdr", 1, transform(0, "map", "room", [10.0, 0.0, 0.0], QUARTER)),
+        ("/room/pose", POSE, "cdr", 2, pose(1, "room", [1.0, 2.0, 3.0])),
+        ("/hall/pose", POSE, "cdr", 3, pose(1, "map", [5.0, 5.0, 5.0])),
+        ("/far/pose", POSE, "cdr", 3, pose(1, "elsewhere", [5.0, 5.0, 5.0])),
+    ];
+    assert!(refused(&messages, &ReadOptions::default()).1.contains("--frame"));
+    let found = read(&mcap_of(&messages), &in_frame("map"));
+    let samples = found.samples();
+    assert_eq!((found.vehicles.len(), samples[1], &found.assumed), (2, (1e-9, "/hall/pose", [5.0; 3]), &None));
+    let error = [8.0, 1.0, 3.0].iter().zip(samples[0].2).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(error < ROUNDING_M, "{samples:?}");
+    assert!(found.notes.iter().any(|note| note.ends_with("into `map`: /far/pose in elsewhere")), "{:?}", found.notes);
+    // The way back is as good.
+    let back = read(&mcap_of(&messages), &in_frame("room")).samples()[1].2;
+    assert!([5.0, 5.0, 5.0].iter().zip(back).all(|(a, b)| (a - b).abs() < ROUNDING_M), "{back:?}");
+}
+
+#[test]
+fn where_a_moving_transform_is_not_known_there_is_no_position() {
+    let moving = |ns, x| ("/tf", TF, "cdr", 1, transform(ns, "map", "odom", [x, 0.0, 0.0], NO_TURN));
+    let at = |ns| ("/odom", ODOMETRY, "cdr", 2, odometry(ns, "odom", "base_link", [0.0; 3]));
+    let messages = [moving(100, 1.0), moving(200, 2.0), at(50), at(100), at(150), at(201)];
+    let found = read(&mcap_of(&messages), &in_frame("map"));
+    let samples: Vec<_> = found.samples().iter().map(|(t, _, [x, ..])| (*t, *x)).collect();
+    assert_eq!(samples, [(100e-9, 1.0), (150e-9, 1.5)]);
+    assert!(found.notes.iter().any(|note| note.contains("1 by some between") && note.contains("2 left out")));
+    // Samples too far apart say nothing of what is between them.
+    let late = ("/tf", TF, "cdr", 9, cdr(&(vec![(((SEC + 2, 0), "map"), "odom", ([0.0; 3], NO_TURN))],), true));
+    let (said, _) = refused(&[moving(0, 1.0), late, at(150)], &in_frame("map"));
+    assert!(said.contains("no position is given in the frame `map`"), "{said}");
+    for (odd, said) in [
+        (transform(300, "map", "odom", [0.0; 3], [0.0; 4]), "is no rotation"),
+        (transform(300, "map", "odom", [f64::NAN, 0.0, 0.0], NO_TURN), "not finite"),
+        (transform(200, "map", "odom", [0.0; 3], NO_TURN), "in two places"),
+        (transform(300, "world", "odom", [0.0; 3], NO_TURN), "is given in `map` and in `world`"),
+    ] {
+        let all = [moving(100, 1.0), moving(200, 2.0), at(150), ("/tf", TF, "cdr", 5, odd)];
+        let found = refused(&all, &in_frame("map")).0;
+        assert!(found.contains(said), "{found}\ninstead of {said}");
+    }
+}
+
+#[test]
+fn a_vehicle_that_is_told_of_twice_is_refused_until_a_topic_is_named() {
+    let named = cdr(&(header(1), vec![("cf1", ([1.0, 0.0, 0.0], NO_TURN))]), true);
+    let poses = ("/poses", NAMED, "cdr", 1, named);
+    for (other, who) in [
+        (("/cf1/pose", POSE, "cdr", 1, pose(1, "map", [1.0, 0.0, 0.0])), "`cf1`"),
+        (("/more", NAMED, "cdr", 1, poses.4.clone()), "`cf1`"),
+    ] {
+        let both = [poses.clone(), other];
+        let (said, help) = refused(&both, &ReadOptions::default());
+        assert!(said.contains("both tell of") && said.contains(who) && help.contains("--topic"), "{said}");
+        assert_eq!(read(&mcap_of(&both), &options(None, &["/poses"])).vehicles, ["cf1"]);
+    }
+    let robot = [
+        ("/r1/odom", ODOMETRY, "cdr", 1, odometry(1, "map", "base_link", [0.0; 3])),
+        ("/r1/pose", POSE, "cdr", 1, pose(1, "map", [0.0; 3])),
+    ];
+    assert!(refused(&robot, &ReadOptions::default()).0.contains("`/r1`"));
+    // A vehicle that transforms alone tell of is never left out in silence.
+    let stranger = ("/tf", TF, "cdr", 1, transform(1, "map", "cf2", [0.0; 3], NO_TURN));
+    let (said, help) = refused(&[poses, stranger], &ReadOptions::default());
+    assert!(said.contains("transforms tell of `cf2`") && help.contains("--topic"), "{said}");
+}
+
+#[test]
+fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
+    let both = [
+        ("/r1/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
+        ("/r2/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
+    ];
+    let (said, help) = refused(&both, &ReadOptions::default());
+    assert!(said.contains("`/r1/odom` and `/r2/odom`") && help.contains("--frame odom"), "{said}\n{help}");
+    assert_eq!(read(&mcap_of(&both), &in_frame("odom")).vehicles.len(), 2);
+    let tf = |topic, x| (topic, TF, "cdr", 1, transform(1, "map", "odom", [x, 0.0, 0.0], NO_TURN));
+    let [one, two] = both;
+    let found = read(&mcap_of(&[one, two, tf("/r1/tf", 1.0), tf("/r2/tf", 2.0)]), &in_frame("map"));
+    assert_eq!(found.samples(), [(1e-9, "/r1/odom", [1.0, 0.0, 0.0]), (1e-9, "/r2/odom", [2.0, 0.0, 0.0])]);
+}
+
+#[test]
+fn transforms_on_topics_of_any_name_speak_of_one_tree() {
+    let kind = "geometry_msgs/msg/TransformStamped";
+    let at = |topic, child: &'static str| (topic, kind, "cdr", 1, cdr(&(header(1), child, ([1.0; 3], NO_TURN)), true));
+    let found = whole("vicon.mcap", &mcap_of(&[at("/vicon/cf1/cf1", "cf1"), at("/vicon/cf2/cf2", "vicon/cf2/cf2")]));
+    assert_eq!(found.vehicles, ["cf1", "vicon/cf2/cf2"]);
+}
+
+#[test]
+fn bodies_of_robots_in_namespaces_are_called_by_both() {
+    let robot = |topic, x| {
+        [
+            (topic, TF, "cdr", 1, transform(1, "map", "odom", [x, 0.0, 0.0], NO_TURN)),
+            (topic, TF, "cdr", 2, transform(1, "odom", "base_link", [0.0, 1.0, 0.0], NO_TURN)),
+            (topic, TF, "cdr", 3, transform(1, "base_link", "wheel", [0.0, 0.0, 9.0], NO_TURN)),
+        ]
+    };
+    let messages = [robot("/r1/tf", 1.0), robot("/r2/tf", 2.0)].concat();
+    let (said, _) = refused(&messages, &ReadOptions::default());
+    assert!(said.contains("`/r1` and `/r2` give positions in a frame `odom`"), "{said}");
+    let found = read(&mcap_of(&messages), &in_frame("map"));
+    assert_eq!(found.samples(), [(1e-9, "/r1/base_link", [1.0, 1.0, 0.0]), (1e-9, "/r2/base_link", [2.0, 1.0, 0.0])]);
+    assert_eq!(found.assumed, None);
+}

@@ -1,0 +1,171 @@
+//! Who is who in messages of others, and where: what does not say it is refused, and never judged as somebody else.
+
+use tautline_recordings::read::ReadOptions;
+
+use crate::messages::{Message, NO_TURN, cdr, header, mcap_of, read_bytes, whole};
+
+const POSE: &str = "geometry_msgs/msg/PoseStamped";
+const POSES: &str = "geometry_msgs/msg/PoseArray";
+const FIX: &str = "sensor_msgs/msg/NavSatFix";
+
+fn pose(topic: &'static str, frame: &str, nanosec: u32, x: f64) -> Message {
+    let message = ((header(nanosec).0, frame), ([x, 0.0, 0.0], NO_TURN));
+    (topic, POSE, "cdr", u64::from(nanosec), cdr(&message, true))
+}
+
+fn fix(topic: &'static str, nanosec: u32, place: [f64; 3]) -> Message {
+    let message = ((header(nanosec).0, "gps"), (0_i8, 1_u16), place);
+    (topic, FIX, "cdr", u64::from(nanosec), cdr(&message, true))
+}
+
+fn list(topic: &'static str, nanosec: u32, xs: &[f64]) -> Message {
+    let poses: Vec<_> = xs.iter().map(|&x| ([x, 0.0, 0.0], NO_TURN)).collect();
+    (topic, POSES, "cdr", u64::from(nanosec), cdr(&(header(nanosec), poses), true))
+}
+
+fn refused(messages: &[Message], options: &ReadOptions) -> String {
+    read_bytes("ros.mcap", &mcap_of(messages), options).expect_err("refused").to_string()
+}
+
+fn transform(topic: &'static str, nanosec: u32, parent: &str, child: &str, x: f64) -> Message {
+    let of = ((header(nanosec).0, parent), child, ([x, 0.0, 0.0], NO_TURN));
+    (topic, "tf2_msgs/msg/TFMessage", "cdr", u64::from(nanosec), cdr(&(vec![of],), true))
+}
+
+fn naming(topics: &[&str]) -> ReadOptions {
+    ReadOptions { topics: topics.iter().map(|topic| (*topic).to_owned()).collect(), ..ReadOptions::default() }
+}
+
+fn framed(frame: &str) -> ReadOptions {
+    ReadOptions { frame: Some(frame.to_owned()), ..ReadOptions::default() }
+}
+
+#[test]
+fn a_list_that_gets_shorter_does_not_say_who_was_lost() {
+    let said = refused(&[list("/poses", 1, &[0.0, 3.0, 6.0]), list("/poses", 2, &[3.0, 6.0])], &ReadOptions::default());
+    assert!(
+        said.contains("message 2 on topic `/poses`") && said.contains("it lists 2 poses, and those before 3"),
+        "{said}"
+    );
+    // An empty one says that nobody was seen.
+    let lists = [(1, &[0.0, 3.0][..]), (2, &[]), (3, &[0.0, 3.0])].map(|(ns, xs)| list("/poses", ns, xs));
+    let found = whole("ros.mcap", &mcap_of(&lists));
+    assert_eq!(found.samples().len(), 4);
+}
+
+#[test]
+fn a_goal_is_no_vehicle() {
+    let goal = [pose("/cf1/pose", "world", 1, 0.0), pose("/cf1/goal_pose", "world", 1, 0.1)];
+    let said = refused(&goal, &ReadOptions::default());
+    assert!(said.contains("`/cf1/goal_pose` and `/cf1/pose` both tell of `/cf1`"), "{said}");
+    assert_eq!(read_bytes("ros.mcap", &mcap_of(&goal), &naming(&["/cf1/pose"])).expect("read").vehicles, ["/cf1/pose"]);
+    let two = whole("ros.mcap", &mcap_of(&[pose("/mocap/cf1", "world", 1, 0.0), pose("/mocap/cf2", "world", 1, 3.0)]));
+    assert_eq!(two.vehicles, ["/mocap/cf1", "/mocap/cf2"]);
+}
+
+#[test]
+fn where_somebody_is_asked_to_be_is_no_vehicle_whatever_part_of_the_topic_says_it() {
+    for [position, wish] in [
+        ["/uav1/mavros/local_position/pose", "/uav1/mavros/setpoint_position/local"],
+        ["/uav1/pose", "/uav1/setpoint/pose"],
+        ["/drone0/self_localization/pose", "/drone0/motion_reference/pose"],
+        ["/firefly/odometry_sensor1/pose", "/firefly/command/pose"],
+        ["/optitrack/cf1", "/planner/cf1/goals"],
+        ["/robot/pose", "/clicked_point"],
+    ] {
+        let both = [pose(position, "world", 1, 0.0), pose(wish, "world", 1, 9.0)];
+        let error = read_bytes("ros.mcap", &mcap_of(&both), &ReadOptions::default()).expect_err(wish);
+        let said = error.to_string();
+        assert!(said.contains(&format!("topic `{wish}` tells by its name where somebody is asked to be")), "{said}");
+        assert!(said.contains(position) && error.help().contains("--topic"), "{said}");
+        let found = read_bytes("ros.mcap", &mcap_of(&both), &naming(&[position])).expect("read");
+        assert_eq!(found.vehicles, [position]);
+    }
+    // Lists and transforms are told apart from wishes as well.
+    let wish = || pose("/swarm/cf1/setpoint/pose", "world", 1, 0.0);
+    for other in [list("/swarm/poses", 1, &[0.0, 3.0]), transform("/tf", 1, "world", "cf1", 0.0)] {
+        let said = refused(&[wish(), other], &ReadOptions::default());
+        assert!(said.contains("asked to be"), "{said}");
+    }
+    // Where nothing else is told, that is what is judged.
+    let targets = ["/target_1/pose", "/target_2/pose"];
+    let found = whole("ros.mcap", &mcap_of(&targets.map(|topic| pose(topic, "world", 1, 0.0))));
+    assert_eq!(found.vehicles, targets);
+    assert!(found.notes.iter().any(|note| note.ends_with("not where a vehicle is: /target_1/pose, /target_2/pose")));
+}
+
+#[test]
+fn topics_that_are_named_are_vehicles_whatever_they_are_called() {
+    for topics in [["/chaser", "/target"], ["/chaser/pose", "/goal/pose"], ["/uav1/pose", "/uav1/ref"]] {
+        let both = topics.map(|topic| pose(topic, "world", 1, 0.0));
+        assert!(read_bytes("ros.mcap", &mcap_of(&both), &ReadOptions::default()).is_err());
+        let found = read_bytes("ros.mcap", &mcap_of(&both), &naming(&topics)).expect("read");
+        assert_eq!(found.vehicles, topics);
+        assert!(!found.notes.iter().any(|note| note.contains("asked to be")), "{:?}", found.notes);
+    }
+    let of_other_kinds = [pose("/mocap/cf1", "world", 1, 0.0), fix("/mocap/cf2", 1, [47.0, 8.0, 400.0])];
+    let said = refused(&of_other_kinds, &ReadOptions::default());
+    assert!(said.contains("both tell of `/mocap`"), "{said}");
+    let said = refused(&of_other_kinds, &naming(&["/mocap/cf1", "/mocap/cf2"]));
+    assert!(said.contains("positions are given in the frame"), "{said}");
+}
+
+#[test]
+fn a_topic_that_is_not_read_spoils_nothing() {
+    let vehicles = ["/uav1/pose", "/uav2/pose"];
+    let of_others = [
+        [list("/people", 1, &[0.0, 3.0]), list("/people", 2, &[0.0])],
+        [pose("/earth", "WGS 84", 1, 0.0), pose("/earth", "WGS 84", 2, 0.0)],
+        [("/torn", POSE, "cdr", 1, vec![0, 1, 0, 0, 7]), ("/odd", POSE, "json", 1, b"{}".to_vec())],
+        [transform("/tf", 1, "map", "base_link", 0.0), transform("/tf", 2, "odom", "base_link", 1.0)],
+    ];
+    for others in of_others {
+        let mut messages = vehicles.map(|topic| pose(topic, "world", 1, 0.0)).to_vec();
+        messages.extend(others);
+        let bytes = mcap_of(&messages);
+        let name = messages[3].0;
+        assert!(read_bytes("ros.mcap", &bytes, &ReadOptions::default()).is_err(), "{name}");
+        let found =
+            read_bytes("ros.mcap", &bytes, &naming(&vehicles)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(found.vehicles, vehicles);
+        assert!(read_bytes("ros.mcap", &bytes, &naming(&[name])).is_err(), "{name}");
+    }
+    let known = refused(&[pose("/a", "world", 1, 0.0), list("/b", 1, &[0.0])], &naming(&["/c"]));
+    assert!(known.contains("no topic `/c` with positions; those that it has are /a, /b"), "{known}");
+}
+
+#[test]
+fn degrees_are_never_metres() {
+    let fixes = [fix("/r1/fix", 1, [47.0, 8.0, 400.0]), fix("/r2/fix", 2, [47.0, 8.0001, 400.0])];
+    let said = refused(&fixes, &framed("WGS 84"));
+    assert!(said.contains("latitudes and longitudes"), "{said}");
+    let found = whole("ros.mcap", &mcap_of(&fixes));
+    let (_, _, [east_m, ..]) = found.samples()[1];
+    assert!((east_m - 7.606).abs() < 1e-3, "{east_m}");
+    let called = refused(&[pose("/cf1/pose", "WGS 84", 1, 0.0)], &ReadOptions::default());
+    assert!(called.contains("its frame is called `WGS 84`"), "{called}");
+}
+
+#[test]
+fn the_origin_is_a_place_that_is_read() {
+    let fixes = [fix("/base/fix", 1, [f64::NAN, 8.0, 400.0]), fix("/r2/fix", 2, [47.0, 8.0, 400.0])];
+    let found = read_bytes("ros.mcap", &mcap_of(&fixes), &naming(&["/r2/fix"])).expect("the other is not read");
+    assert_eq!(found.samples()[0].2, [0.0; 3]);
+}
+
+#[test]
+fn local_positions_of_autopilots_are_each_counted_from_its_own_start() {
+    let local = ["/uav1/mavros/local_position/pose", "/uav2/mavros/local_position/pose"];
+    let messages = local.map(|topic| pose(topic, "map", 1, 0.0));
+    let said = refused(&messages, &ReadOptions::default());
+    assert!(said.contains("of which each robot has one of its own as a rule"), "{said}");
+    assert_eq!(read_bytes("ros.mcap", &mcap_of(&messages), &framed("map")).expect("read").vehicles, local);
+}
+
+#[test]
+fn a_frame_that_stands_still_and_moves_is_nobodys_place() {
+    let torn = [("/tf_static", 1, 0.0), ("/tf", 2, 1.0), ("/tf", 3, 2.0)];
+    let torn = torn.map(|(topic, nanosec, x)| transform(topic, nanosec, "map", "r1/base_link", x));
+    let said = refused(&torn, &ReadOptions::default());
+    assert!(said.contains("stands still in more than one place, or moves as well"), "{said}");
+}

@@ -1,0 +1,13 @@
+//! Flights and what their reports say.
+
+#[path = "../../../sim/tests/flights/flight.rs"]
+mod flight;
+#[path = "../../../sim/tests/flights/numbers.rs"]
+#[expect(dead_code, reason = "tests of the simulation need more kinds of numbers")]
+mod numbers;
+
+mod missions;
+mod random_scenarios;
+mod rivals;
+mod steps;
+mod verdicts;

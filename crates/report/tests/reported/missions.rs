@@ -1,0 +1,391 @@
+//! References, leaders, legs and breaths under the displacement law.
+//!
+//! 20 random missions of three legs in continuous time; `TAUTLINE_RANDOM_MISSIONS=1000 cargo test --release --test reported
+//! missions -- --nocapture` flies 1,000 and prints what docs/validation.md says of them.
+
+use nalgebra::Vector3;
+use tautline_audit::Status;
+use tautline_core::record::Event;
+use tautline_core::swarm::{Rows, Swarm, row, separation, set_row};
+use tautline_laws::formation::Formation;
+use tautline_laws::graph::{Graph, Pinning};
+use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
+use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_report::run::run;
+use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::sim::Simulation;
+
+use crate::flight::{builtin, fly, read};
+use crate::numbers::Numbers;
+
+/// Three legs on some graph, behind some reference or none, from places at least 1.1 delta apart.
+fn mission(seed: u64) -> Scenario {
+    let mut numbers = Numbers(seed.wrapping_mul(0xa076_1d64_78bd_642f));
+    let sixth = 6.0 * numbers.unit();
+    let count = 3 + (1..6).filter(|&n| f64::from(n) <= sixth).count();
+    let in_space = numbers.unit() < 0.5;
+    let delta_m = numbers.over_decades(0.1, 10.0);
+    let extent_m = delta_m * numbers.between(2.0, 5.0);
+    let mut start = Rows::zeros(count);
+    for i in 0..count {
+        loop {
+            for axis in 0..if in_space { 3 } else { 2 } {
+                start[(i, axis)] = numbers.between(-extent_m, extent_m);
+            }
+            if (0..i).all(|j| separation(&start, i, j) > 1.1 * delta_m) {
+                break;
+            }
+        }
+    }
+    let mut legs = Vec::new();
+    for number in 0..3 {
+        let radius_m = delta_m * numbers.between(1.2, 2.0) / (std::f64::consts::PI / count as f64).sin();
+        let formation = match (3.0 * numbers.unit(), in_space) {
+            (..1.0, true) => Formation::sphere(count, 1.5 * radius_m),
+            (..2.0, _) => Formation::grid(count, delta_m * numbers.between(1.2, 2.5)),
+            _ => Formation::circle(count, radius_m),
+        };
+        let moved_m = Vector3::new(numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0), 0.0) * extent_m;
+        let leg = Leg { begins: Begins::At(2.0 * f64::from(number)), ..Leg::first(formation) };
+        legs.push(leg.placed(numbers.between(1.0, 1.5), numbers.between(-3.0, 3.0), moved_m));
+    }
+    let mut scenario = Scenario::new("mission", Swarm::at_rest(start), legs[0].formation.clone(), delta_m, 6.0);
+    scenario.graph = match 4.0 * numbers.unit() {
+        ..1.0 => Graph::complete(count),
+        ..2.0 => Graph::star(count),
+        ..3.0 => Graph::ring(count),
+        _ => Graph::path(count),
+    };
+    scenario.law = LawSpec::Displacement(DisplacementKeys { alpha: delta_m * delta_m, ..DisplacementKeys::default() });
+    scenario.a22_per_s = numbers.between(-0.5, 0.2);
+    scenario.plant = PlantSpec::Ideal;
+    scenario.breathing.mode = BreathingMode::Off;
+    scenario.hull_radius_m.fill(0.2 * delta_m);
+    scenario.hull_radius_m.iter_mut().for_each(|radius_m| *radius_m = radius_m.min(0.5 * delta_m - 0.011).max(1e-3));
+    scenario.legs = legs;
+    guide(&mut scenario, &mut numbers, extent_m);
+    scenario
+}
+
+/// Half of the missions have no reference; the others follow one that is known by all, by one, or flown by a leader.
+fn guide(scenario: &mut Scenario, numbers: &mut Numbers, extent_m: f64) {
+    let known_by = match 6.0 * numbers.unit() {
+        ..1.0 => Pinning::All,
+        ..2.0 => Pinning::Listed(vec![1]),
+        ..3.0 => Pinning::Leader(0),
+        _ => return,
+    };
+    let motion = match 3.0 * numbers.unit() {
+        ..1.0 => ReferenceMotion::Rest { position_m: Vector3::zeros() },
+        ..2.0 => ReferenceMotion::Velocity {
+            from_m: Vector3::zeros(),
+            velocity_m_s: Vector3::new(numbers.between(-0.3, 0.3), numbers.between(-0.3, 0.3), 0.0) * extent_m,
+        },
+        _ => ReferenceMotion::Circle {
+            centre_m: Vector3::zeros(),
+            radius_m: 0.5 * extent_m,
+            period_s: numbers.between(5.0, 20.0),
+        },
+    };
+    if known_by.leader().is_some() {
+        let begins = motion.at(0.0);
+        set_row(&mut scenario.start.velocities_m_s, 0, begins.velocity_m_s);
+        let place_m = row(&scenario.start.positions_m, 0) - begins.position_m;
+        for leg in &mut scenario.legs {
+            let moved_m = place_m - row(&leg.formation.slots_m, 0);
+            *leg = leg.clone().placed(1.0, 0.0, moved_m);
+        }
+    }
+    scenario.reference = Some(Guidance { motion, known_by, feed_forward: true });
+}
+
+#[test]
+fn no_random_mission_breaks_what_was_certified_before_its_first_step() {
+    let missions = std::env::var("TAUTLINE_RANDOM_MISSIONS").map_or(20, |n| n.parse().expect("a number"));
+    let (mut tightest, mut worst_rise) = (f64::INFINITY, 0.0_f64);
+    for seed in 0..missions {
+        let scenario = mission(seed);
+        scenario.validate().unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let (flight, log) = fly(&scenario);
+        assert_eq!(flight.ending, tautline_sim::sim::Ending::Completed, "seed {seed}");
+        let [first, second, third] = flight.certificate.legs[..] else { panic!("seed {seed}") };
+        let certified_m = flight.certificate.certified_m.expect("a promise");
+        assert_eq!(Some(certified_m), third.certified_m, "seed {seed}");
+        let closest_m = flight.audit.closest.expect("a pair").separation_m;
+        assert!(closest_m >= certified_m, "seed {seed}: {closest_m} {certified_m}");
+        tightest = tightest.min((closest_m - certified_m) / scenario.delta_m);
+        let began = |leg: usize| {
+            let begins = |event: &Event| matches!(event, Event::LegBegan { leg: of, .. } if *of == leg);
+            log.events.iter().find(|event| begins(event)).map_or(f64::NAN, Event::time_s)
+        };
+        assert_eq!([began(1), began(2)], [2.0, 4.0], "seed {seed}");
+        for sample in &log.samples {
+            let bound = [first, second, third][[2.0, 4.0].iter().filter(|&&from_s| sample.time_s >= from_s).count()];
+            let energy = sample.energy.expect("an energy");
+            assert!(energy <= bound.energy * (1.0 + 1e-9), "seed {seed} at {} s: {energy} {bound:?}", sample.time_s);
+        }
+        let rise = flight.energy_rise.expect("an energy");
+        worst_rise = worst_rise.max((rise.to - rise.from) / rise.from.max(1e-9 * third.energy));
+    }
+    println!(
+        "{missions} missions: least room above the certificate {tightest:.3e} delta, largest rise {worst_rise:.1e}"
+    );
+    assert!(worst_rise < 1e-6, "{worst_rise}");
+}
+
+/// Three legs with places behind way points, the last from a time on, in Rapier: each is reached, and what is
+/// certified holds.
+#[test]
+fn a_mission_is_flown_leg_by_leg_and_reported_so() {
+    let scenario = read(MISSION);
+    let report = run(&scenario, &mut ()).expect("a report");
+    assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
+    assert_eq!(report.legs.len(), 3);
+    let reached_s: Vec<_> = report.legs.iter().map(|leg| leg.reached_at_s.expect("reached")).collect();
+    assert!(reached_s.is_sorted() && report.legs[2].from_s == Some(40.0));
+    let certified_m: Vec<_> = report.legs.iter().map(|leg| leg.certified_m.expect("a promise")).collect();
+    assert!(certified_m.windows(2).all(|pair| pair[1] <= pair[0]));
+    assert!(report.separation.min_m > report.separation.certified_m);
+    assert!(report.headline().contains("3 of 3 legs reached"), "{}", report.headline());
+
+    // Negative twin: no time for the second leg.
+    let hurried = read(&MISSION.replace("start_s = 40.0", "start_s = 20.5"));
+    let report = run(&hurried, &mut ()).expect("a report");
+    assert!(!report.verdict.pass);
+    assert!(report.verdict.reasons.iter().any(|why| why.starts_with("Leg 2 was not reached before leg 3")));
+}
+
+const MISSION: &str = r#"
+swarm = { count = 6, a22_per_s = 0.05 }
+start = { shape = "line", spacing_m = 2.5 }
+formation = { shape = "circle", radius_m = 4.0 }
+law = { kind = "displacement", delta_m = 1.5 }
+graph = { kind = "star" }
+reference = { kind = "way-points", points_m = [[0, 0], [6, 0], [6, 4]], speed_m_s = 1.0 }
+time = { duration_s = 60.0 }
+[[leg]]
+shape = "grid"
+spacing_m = 2.5
+assignment = "optimal"
+[[leg]]
+start_s = 40.0
+scale = 1.5
+yaw_deg = 45.0
+move_m = [3, 0]
+"#;
+
+/// A leader that turns in a circle, without its acceleration fed forward to those who follow, is followed late: each lags
+/// by `(k sigma M)^-1 1 (a0 - a22 r')`, here exactly by `|r''|/k` on a star with a22 = 0.
+#[test]
+fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_where_it_is_not() {
+    let flown = |fed: bool| {
+        let sets = [
+            "law.kind=displacement",
+            "swarm.a22_per_s=0",
+            "graph.kind=star",
+            &format!("reference={{kind=\"velocity\", velocity_m_s=[0.5, 0], leader=1, feed_forward={fed}}}"),
+            "time.duration_s=40",
+            // A lag is not a jam.
+            "breathing.mode=off",
+        ];
+        let mut scenario = builtin("pentagon", &sets);
+        // A constant acceleration: a circle so large that its start is a parabola.
+        let Some(guidance) = &mut scenario.reference else { panic!("a reference") };
+        guidance.motion =
+            ReferenceMotion::Circle { centre_m: Vector3::zeros(), radius_m: 1e4, period_s: RADIUS_PERIOD_S };
+        let begins = guidance.motion.at(0.0);
+        (0..5).for_each(|i| set_row(&mut scenario.start.velocities_m_s, i, begins.velocity_m_s));
+        scenario.start.positions_m.copy_from(&scenario.legs[0].formation.slots_m);
+        let moved_m = -begins.position_m;
+        scenario.legs[0] = scenario.legs[0].clone().placed(1.0, 0.0, moved_m);
+        scenario.plant = PlantSpec::Rapier;
+        scenario.validate().unwrap_or_else(|error| panic!("{error}"));
+        let (flight, _) = fly(&scenario);
+        let slots_m = &scenario.formation().slots_m;
+        let offset_m = row(&flight.last.positions_m, 0) - row(slots_m, 0);
+        let off_m = |i: usize| (row(&flight.last.positions_m, i) - row(slots_m, i) - offset_m).norm();
+        let lags: Vec<f64> = (1..5).map(off_m).collect();
+        (lags, flight.certificate)
+    };
+    let (exact, certificate) = flown(true);
+    assert!(exact.iter().all(|&lag_m| lag_m < 1e-3), "{exact:?}");
+    assert!(certificate.certified_m.is_some());
+    let (late, certificate) = flown(false);
+    assert!(certificate.void.contains(&Void::ReferenceNotFed));
+    let rate_per_s = std::f64::consts::TAU / RADIUS_PERIOD_S;
+    let expected_m = 1e4 * rate_per_s * rate_per_s;
+    assert!(late.iter().all(|lag_m| (lag_m - expected_m).abs() < 0.01 * expected_m), "{late:?} {expected_m}");
+}
+
+/// |r''| = 0.1 m/s^2 at a radius of 10 km.
+const RADIUS_PERIOD_S: f64 = 1_986.917_653;
+
+#[test]
+fn a_reference_cures_the_drift_that_feeding_causes() {
+    let sets = [
+        "law.kind=displacement",
+        "swarm.a22_per_s=0.2",
+        "start.velocities_m_s=[[1, 0], [1, 0], [1, 0], [1, 0], [1, 0]]",
+        "time.duration_s=30",
+    ];
+    let drifts = run(&builtin("pentagon", &sets), &mut ()).expect("a report");
+    assert!(drifts.velocity.common_m_s > Some(100.0), "{:?}", drifts.velocity);
+    let known = [&sets[..], &["reference={kind=\"rest\"}"]].concat();
+    let held = run(&builtin("pentagon", &known), &mut ()).expect("a report");
+    assert!(held.verdict.pass && held.velocity.common_m_s < Some(1e-3), "{:?}", held.verdict);
+}
+
+/// 16 random vehicles on their way to given slots in a grid stand in each other's way.
+#[test]
+fn a_swarm_that_is_stuck_breathes_once_and_arrives_and_without_a_breath_does_not() {
+    let stuck = |mode: &str| read(&CROWD.replace("MODE", mode));
+    let held = run(&stuck("off"), &mut ()).expect("a report");
+    assert!(!held.formation.reached && held.audit.status == Status::Clear, "{}", held.headline());
+    let report = run(&stuck("auto"), &mut ()).expect("a report");
+    assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
+    assert!(!report.breaths.is_empty() && report.headline().contains("breath"), "{}", report.headline());
+    assert!(report.separation.min_m > report.separation.certified_m);
+    let first = &report.breaths[0];
+    assert!(first.scale == 2.0 && report.separation.certified_m <= first.certified_m, "{:?}", report.breaths);
+}
+
+/// Slots that are spread from the start, on a weakly damped star: what is certified before the first step counts that breath.
+#[test]
+fn a_breath_that_is_sure_to_come_is_part_of_what_is_certified() {
+    let weak = BREATH.replace("MODE", "start");
+    let scenario = read(&weak);
+    let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m.expect("a promise");
+    let report = run(&scenario, &mut ()).expect("a report");
+    let closest_m = report.separation.min_m.expect("a pair");
+    assert!(promised_m <= closest_m && closest_m < 1.1, "{promised_m} {closest_m}");
+    // Negative twin: without the breath that much would not be kept.
+    let still = read(&BREATH.replace("MODE", "off"));
+    let promised_m = tautline_sim::preflight::Preflight::of(&still).expect("a law").certified_m.expect("a promise");
+    assert!(promised_m > closest_m, "{promised_m} {closest_m}");
+}
+
+/// A leader stays where it is while slots are spread about it, and the energy does what the proof says.
+#[test]
+fn a_breath_around_a_leader_leaves_it_alone() {
+    let led = BREATH.replace("MODE", "start") + "reference = { kind = \"rest\", leader = 1 }\n";
+    let scenario = read(&led);
+    let (flight, log) = fly(&scenario);
+    let moved_m = |sample: &tautline_core::record::OwnedSample| {
+        (row(&sample.swarm.positions_m, 0) - row(&scenario.start.positions_m, 0)).norm()
+    };
+    assert!(log.samples.iter().all(|sample| moved_m(sample) < 1e-9));
+    let rise = flight.energy_rise.expect("an energy");
+    assert!(rise.to <= rise.from * (1.0 + 1e-3) && !flight.breaths.is_empty(), "{rise:?}");
+}
+
+const BREATH: &str = r#"
+swarm = { count = 5 }
+start = { positions_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
+formation = { shape = "points", points_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
+law = { kind = "displacement", delta_m = 1.0, zeta_per_s = 0.1 }
+graph = { kind = "star" }
+breathing = { mode = "MODE", scale = 4.0 }
+time = { duration_s = 60.0 }
+"#;
+
+/// What a stalled swarm is promised anew holds for the leg that is under way and those after it.
+#[test]
+fn legs_are_promised_anew_where_slots_are_spread() {
+    let text = CROWD.replace("MODE", "auto") + "[[leg]]\nscale = 1.2\n";
+    let report = run(&read(&text), &mut ()).expect("a report");
+    let breath = report.breaths.first().expect("a breath");
+    assert_eq!(report.legs[1].certified_m, breath.certified_m);
+    assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
+    assert!(report.legs[1].certified_m <= report.separation.certified_m, "{:?}", report.legs);
+    assert!(report.separation.min_m > report.separation.certified_m);
+}
+
+/// Interchangeable vehicles that are stuck get each other's slots, keep them on the leg that follows, and need no breath.
+#[test]
+fn interchangeable_vehicles_that_are_stuck_go_to_other_slots_and_need_no_breath() {
+    let anew = "assignment = \"when-stalled\"";
+    let text = CROWD.replace("MODE", "auto").replace("spacing_m = 1.4", &format!("spacing_m = 1.4, {anew}"))
+        + &format!("[[leg]]\nscale = 1.2\n{anew}\n");
+    let scenario = read(&text);
+    let report = run(&scenario, &mut ()).expect("a report");
+    assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
+    let [assignment] = report.assignments[..] else { panic!("{:?} {:?}", report.assignments, report.breaths) };
+    assert!(report.breaths.is_empty() && assignment.vehicles > 1, "{}", report.headline());
+    assert!(report.headline().contains("2 of 2 legs reached; 1 new assignment"), "{}", report.headline());
+    assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
+    assert_eq!(
+        (report.legs[1].certified_m, report.separation.certified_m),
+        (assignment.certified_m, assignment.certified_m)
+    );
+    assert!(report.separation.min_m > report.separation.certified_m);
+    let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m;
+    assert!(assignment.certified_m <= promised_m, "{assignment:?} {promised_m:?}");
+
+    // The scenario as it was flown is the same scenario.
+    assert_eq!(read(&scenario.resolved_toml()), scenario);
+
+    // A simulation that is saved before goes on to the same bits.
+    let mut simulation = Simulation::new(&scenario).expect("a flight");
+    while simulation.time_s() < assignment.time_s - 0.5 {
+        simulation.step();
+    }
+    let saved = simulation.save();
+    let go_on = |simulation: &mut Simulation| {
+        while simulation.time_s() < assignment.time_s + 3.0 {
+            simulation.step();
+        }
+        let changed: Vec<_> = simulation.events().filter(|event| matches!(event, Event::Assigned { .. })).collect();
+        (changed, simulation.state().clone())
+    };
+    let first = go_on(&mut simulation);
+    assert_eq!(first.0.len(), 1);
+    simulation.load(&saved, None);
+    assert_eq!(go_on(&mut simulation), first);
+}
+
+/// What a reference must be, each with a word of what is said otherwise.
+#[test]
+fn a_reference_or_a_leg_that_cannot_be_flown_is_refused_by_what_is_wrong() {
+    let refused = |reference: &str| {
+        let text = MISSION.lines().filter(|line| !line.starts_with("reference")).collect::<Vec<_>>().join("\n");
+        let text = format!("reference = {{ {reference} }}\n{text}");
+        let source = tautline_sim::scenario::Source::Text { name: "test".to_owned(), text };
+        tautline_sim::scenario::Scenario::read(&source, &[]).map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    for (reference, said) in [
+        ("kind = \"rest\", leader = 9", "there is no vehicle 9"),
+        ("kind = \"rest\", leader = 0", "there is no vehicle 0"),
+        ("kind = \"rest\", known_by = []", "no vehicle knows the reference"),
+        ("kind = \"rest\", leader = 1, known_by = \"all\"", "both `known_by` and `leader`"),
+        ("kind = \"circle\", radius_m = 3, period_s = 0.01", "too fast to be followed"),
+        ("kind = \"way-points\", points_m = [[0, 0], [1, 0]], times_s = [0, 0.001]", "too fast to be followed"),
+        ("kind = \"way-points\", points_m = [[0, 0], [1, 0]]", "either `times_s` or `speed_m_s`"),
+        ("kind = \"spline\", points_m = [[0, 0], [1, 0]], times_s = [0, 0]", "jumps at 0 s"),
+        ("kind = \"spline\", points_m = [[0, 0], [1, 0]], times_s = [0, 10]", "the flight lasts from 0 to 60 s"),
+        (
+            "kind = \"spline\", points_m = [[0, 0], [0, 0.1], [9, 0], [9, 0.1]], times_s = [0, 20, 40, 60]",
+            "jumps between 20 and 40 s",
+        ),
+    ] {
+        assert!(refused(reference).contains(said), "{reference}: {}", refused(reference));
+    }
+    assert_eq!(refused("kind = \"way-points\", points_m = [[0, 0], [0, 0], [3, 0]], speed_m_s = 1.0"), "");
+    let leg = |from: &str, to: &str| {
+        let source = tautline_sim::scenario::Source::Text { name: "test".to_owned(), text: MISSION.replace(from, to) };
+        tautline_sim::scenario::Scenario::read(&source, &[]).map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    assert!(leg("start_s = 40.0", "start_s = 70.0").contains("leg 3 begins at 70 s"));
+    assert!(leg("spacing_m = 2.5\nassign", "spacing_m = 1.0\nassign").contains("a desired distance of 1 m"));
+    assert!(leg("kind = \"displacement\"", "kind = \"edge-tension\"").contains("follows no reference"));
+    let short = "shape = \"points\"\npoints_m = [[0, 0], [3, 0]]\n";
+    assert!(leg("shape = \"grid\"\nspacing_m = 2.5\n", short).contains("leg 2 has 2 slots for 6 vehicles"));
+}
+
+const CROWD: &str = r#"
+swarm = { count = 16 }
+start = { shape = "random", half_extent_m = 3.8, min_separation_m = 1.15, seed = 5 }
+formation = { shape = "grid", spacing_m = 1.4 }
+law = { kind = "displacement", delta_m = 1.0 }
+breathing = { mode = "MODE" }
+time = { duration_s = 60.0, dt_s = 0.01 }
+"#;

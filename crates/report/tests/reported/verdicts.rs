@@ -1,0 +1,104 @@
+//! Flights whose verdict depends on what a step, a sample or a sensor does not show.
+
+use tautline_audit::Status;
+use tautline_report::report::Report;
+use tautline_report::run::run;
+use tautline_sim::scenario::{PlantSpec, Scenario};
+
+use crate::flight::{fly, read};
+
+fn report(toml: &str) -> Report {
+    run(&read(toml), &mut ()).expect("a report")
+}
+
+/// Three vehicles on a star, far from the origin, two of which approach at the end; the smallest separation in continuous time is
+/// 0.995142 m.
+const SLOW_APPROACH: &str = r#"
+start.positions_m = [[100, 100], [103, 100.75], [103, 99.25]]
+start.velocities_m_s = [[0, 0], [0, -0.0838], [0, 0.0838]]
+formation = { shape = "points", points_m = [[0, 0], [3, 0.501], [3, -0.501]] }
+graph.kind = "star"
+law = { kind = "edge-tension", delta_m = 1.0 }
+time.duration_s = 20
+"#;
+
+#[test]
+fn a_slow_approach_far_from_the_origin_is_a_violation_in_both_plants() {
+    for plant in [PlantSpec::Rapier, PlantSpec::Ideal] {
+        let (flight, _) = fly(&Scenario { plant, ..read(SLOW_APPROACH) });
+        let closest = flight.audit.closest.expect("pairs");
+        assert_eq!(flight.audit.status, Status::Violation, "{plant:?}: {closest:?}");
+        assert!((closest.separation_m - 0.995_142).abs() < 1e-5, "{plant:?}: {closest:?}");
+    }
+}
+
+/// Two vehicles change places within a swarm that reaches to 200 m; they meet after 1,350 s.
+#[test]
+fn vehicles_that_creep_beside_a_far_one_meet() {
+    if std::env::var_os("TAUTLINE_LONG").is_none() {
+        return;
+    }
+    let report = report(
+        r#"
+        start.positions_m = [[0, 0], [3, 0.1], [200, 0]]
+        formation = { shape = "points", points_m = [[3, 0.1], [0, 0], [200, 0]] }
+        law = { kind = "laplacian", delta_m = 1.0, f1_per_s2 = 0.0004 }
+        time.duration_s = 4000
+        "#,
+    );
+    assert_eq!(report.audit.status, Status::Violation, "{}", report.headline());
+}
+
+/// Three vehicles that go to slots 2 m apart under a gain of `k`.
+fn three(k_per_s2: f64, duration_s: f64) -> String {
+    format!(
+        "start.positions_m = [[0, 0], [3, 0.2], [6, 0]]\nformation = {{ shape = \"line\", spacing_m = 2.0 }}\n\
+         law = {{ kind = \"displacement\", delta_m = 1.0, k_per_s2 = {k_per_s2} }}\ntime.duration_s = {duration_s}\n"
+    )
+}
+
+#[test]
+fn vehicles_that_creep_towards_their_slots_are_still_moving() {
+    let short = report(&three(0.002, 100.0));
+    assert!(!short.formation.reached && short.formation.at_rest == Some(false), "{}", short.headline());
+    assert!(report(&three(0.002, 4000.0)).formation.reached, "more time helps");
+    let trapped = run(&crate::flight::builtin("pentagon-collinear", &[]), &mut ()).expect("a report");
+    assert_eq!(trapped.formation.at_rest, Some(true), "{}", trapped.headline());
+}
+
+#[test]
+fn a_slow_approach_is_no_stall_and_spreads_no_slots() {
+    let slow = report(&three(0.01, 900.0));
+    assert!(slow.formation.reached && slow.breaths.is_empty(), "{}: {:?}", slow.headline(), slow.breaths);
+    let off = report(&format!("breathing.mode = \"off\"\n{}", three(0.01, 900.0)));
+    assert_eq!(slow.formation.reached_at_s, off.formation.reached_at_s);
+}
+
+#[test]
+fn a_formation_that_is_left_between_two_samples_is_not_reached_before() {
+    let reached_at_s = |record_hz: f64, gust: &str| {
+        let toml = three(1.0, 60.0);
+        let wind = format!("vehicle.drag_per_s = 0.5\n{gust}\ntime.record_hz = {record_hz}\n");
+        report(&format!("{toml}{wind}")).formation.reached_at_s
+    };
+    let gust = "wind.gust = [{ at_s = 50.0, rise_s = 1.0, hold_s = 0.5, velocity_m_s = [0.0, 2.0], vehicles = [2] }]";
+    let calm_s = reached_at_s(0.2, "wind.mean_m_s = [0.0, 0.0, 0.0]").expect("reached");
+    assert!(calm_s < 50.0);
+    let [rare_s, often_s] = [0.2, 60.0].map(|record_hz| reached_at_s(record_hz, gust));
+    assert_eq!(rare_s, often_s, "what is recorded changes no arrival");
+    assert!(rare_s.is_none_or(|at_s| at_s > 50.0), "{rare_s:?}");
+}
+
+#[test]
+fn a_leg_that_only_biased_sensors_have_reached_is_not_reached() {
+    let legs = |bias_m: f64| {
+        let toml = three(1.0, 60.0);
+        let beside = format!("arrival.edge_error_m = 0.05\nsensing.position_bias_m = {bias_m}\n[[leg]]\nscale = 1.5\n");
+        report(&format!("{toml}{beside}"))
+    };
+    let exact = legs(0.0);
+    assert!(exact.legs[0].reached_at_s.is_some(), "{:?}", exact.legs);
+    let biased = legs(0.3);
+    assert!(biased.legs.iter().all(|leg| leg.reached_at_s.is_none()), "{:?}", biased.legs);
+    assert!(!biased.verdict.pass, "{}", biased.headline());
+}

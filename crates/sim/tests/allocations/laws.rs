@@ -1,0 +1,63 @@
+//! A step of a law and a look at the formation take no memory.
+
+use stats_alloc::Region;
+use tautline_core::swarm::{Rows, Swarm};
+use tautline_laws::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
+use tautline_laws::graph::Graph;
+use tautline_laws::law::{
+    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, LawSpec, Setting,
+};
+use tautline_laws::observation::Observation;
+use tautline_laws::space::NearPairs;
+
+use crate::ALLOCATOR;
+
+pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
+    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 0.1, a22_per_s: 0.1 };
+    for count in [5, 40, 300] {
+        let formation = Formation::sphere(count, 10.0);
+        let swarm = Swarm::at_rest(Formation::sphere(count, 12.0).slots_m);
+        let mut control = Rows::zeros(count);
+        for graph in [Graph::complete(count), Graph::ring(count)] {
+            let mut edge_tension = EdgeTensionLaw::new(&graph, &formation, parameters).expect("slots clear of delta");
+            let mut laplacian = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
+            let setting = Setting::new(&graph, &formation, 0.1, 0.1);
+            let mut displacement = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+            let laws: [&mut dyn Law; 3] = [&mut edge_tension, &mut laplacian, &mut displacement];
+            let at = Observation::exact(&swarm, &graph, &formation);
+            let region = Region::new(ALLOCATOR);
+            for law in laws {
+                for _ in 0..3 {
+                    law.command(&at, &mut control).expect("a state clear of delta");
+                    std::hint::black_box(law.energy(&at));
+                }
+            }
+            std::hint::black_box(largest_edge_error_m(&swarm.positions_m, &formation, &graph));
+            std::hint::black_box(procrustes_rms_m(&swarm.positions_m, &formation));
+            std::hint::black_box(best_rigid_motion(&swarm.positions_m, &formation));
+            let change = region.change();
+            assert_eq!(change.allocations + change.reallocations, 0, "{count} vehicles, {change:?}");
+        }
+    }
+    let region = Region::new(ALLOCATOR);
+    std::hint::black_box(Graph::complete(40).laplacian());
+    assert!(region.change().allocations > 0, "the counter sees what is allocated");
+}
+
+pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
+    let (links, formation) = (Graph::ring(30), Formation::sphere(30, 6.0));
+    let crowd = Swarm::at_rest(Formation::sphere(30, 3.0).slots_m);
+    let mut control = Rows::zeros(30);
+    for spec in LawSpec::all() {
+        let setting = Setting::new(&links, &formation, 0.8, 0.1);
+        let mut law = spec.complete(0.1).build(&setting).expect("a law");
+        let mut near = NearPairs::default();
+        near.update(&crowd.positions_m, law.sensing_range_m().unwrap_or(0.0));
+        let at = Observation { near: near.pairs(), ..Observation::exact(&crowd, &links, &formation) };
+        law.command(&at, &mut control).expect("a state clear of delta");
+        let region = Region::new(ALLOCATOR);
+        law.command(&at, &mut control).expect("a state clear of delta");
+        let change = region.change();
+        assert_eq!(change.allocations + change.reallocations, 0, "{}: {change:?}", law.name());
+    }
+}

@@ -1,0 +1,135 @@
+//! The loop takes no memory per step: a flight of 300 steps allocates as often as one of 20.
+
+use std::ops::ControlFlow;
+
+use stats_alloc::Region;
+use tautline_core::swarm::{Rows, Swarm};
+use tautline_laws::law::{Law, LawError};
+use tautline_laws::observation::Observation;
+use tautline_sim::plant::{Path, Plant, PlantError};
+use tautline_sim::scenario::{Override, Scenario, Source};
+use tautline_sim::sim::{self, Motion, Parts};
+
+use crate::ALLOCATOR;
+
+const FEW: u32 = 20;
+const MANY: u32 = 300;
+const ATTEMPTS: u32 = 3;
+
+/// Semi-implicit Euler without an engine.
+#[derive(Clone)]
+struct Euler {
+    state: Swarm,
+    held: Rows,
+    a22_per_s: f64,
+}
+
+impl Plant for Euler {
+    fn count(&self) -> usize {
+        self.state.count()
+    }
+
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+        let Swarm { positions_m, velocities_m_s } = &mut self.state;
+        for (v, u) in velocities_m_s.iter_mut().zip(self.held.iter()) {
+            *v += (*u + self.a22_per_s * *v) * dt_s;
+        }
+        for (p, v) in positions_m.iter_mut().zip(velocities_m_s.iter()) {
+            *p += v * dt_s;
+        }
+        self.observe(predicted);
+        Ok(())
+    }
+
+    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+        self.held.copy_from(command);
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
+        swarm.positions_m.copy_from(&self.state.positions_m);
+        swarm.velocities_m_s.copy_from(&self.state.velocities_m_s);
+    }
+
+    fn restore(&mut self, swarm: &Swarm) {
+        self.state.positions_m.copy_from(&swarm.positions_m);
+        self.state.velocities_m_s.copy_from(&swarm.velocities_m_s);
+    }
+}
+
+/// A law that takes memory each time it is asked.
+#[derive(Clone)]
+struct Wasteful(Box<dyn Law>);
+
+impl Law for Wasteful {
+    fn name(&self) -> &'static str {
+        "wasteful"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.0.command(&Observation { own: &std::hint::black_box(at.own.clone()), ..*at }, command)
+    }
+}
+
+fn builtin(name: &str, sets: &[&str]) -> Scenario {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+    Scenario::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
+}
+
+/// How often a flight of so many steps takes memory.
+fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, motion: Motion) -> usize {
+    let mut scenario = scenario.clone();
+    scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
+    let parts = Parts { motion, ..Parts::under(&scenario, law) };
+    let region = Region::new(ALLOCATOR);
+    let flown = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()));
+    let change = region.change();
+    assert_eq!(flown.expect("a flight").steps, u64::from(steps));
+    change.allocations + change.reallocations
+}
+
+/// How much more often a long flight takes memory than a short one, once the threads have what they take at first.
+fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, motion: impl Fn() -> Motion) -> usize {
+    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), motion()));
+    many.saturating_sub(few)
+}
+
+pub(crate) fn the_loop_allocates_nothing_per_step() {
+    let pentagon = builtin("pentagon", &[]);
+    let crowd = builtin(
+        "circle",
+        &[
+            "swarm.count=520",
+            "start={shape=\"grid\", spacing_m=4, jitter_m=0.3, seed=1}",
+            "formation={shape=\"circle\", radius_m=200}",
+        ],
+    );
+    // Under a law whose energy of a state that it was not asked about takes no memory.
+    let imperfect = builtin(
+        "pentagon-laplacian",
+        &[
+            "sensing={position_noise_m=0.01, rate_hz=100, latency_s=0.01}",
+            "network={latency_s=0.01, jitter_s=0.01, loss=0.2, loss_burst=2, rate_hz=100, missing=\"extrapolate\"}",
+            "actuation={max_accel_m_s2=2, lag_s=0.05}",
+        ],
+    );
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
+    for (name, scenario) in
+        [("five vehicles", &pentagon), ("law and audit side by side", &crowd), ("every imperfection", &imperfect)]
+    {
+        let law = || scenario.law().expect("a law");
+        let euler = || {
+            let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
+            Motion::from(Euler { state, held, a22_per_s: scenario.a22_per_s })
+        };
+        // Idle threads take some memory now and then; what a step takes is in every attempt.
+        let takes_none = |_| threads.install(|| growth(scenario, law, euler)) == 0;
+        assert!((0..ATTEMPTS).any(takes_none), "{name}: a step takes memory: {}", growth(scenario, law, euler));
+
+        let wasteful = || -> Box<dyn Law> { Box::new(Wasteful(law())) };
+        let grown = threads.install(|| growth(scenario, wasteful, euler));
+        assert!(grown >= (MANY - FEW) as usize, "{name}: a law that allocates is seen: {grown}");
+
+        let engine = threads.install(|| growth(scenario, law, || Motion::of(scenario)));
+        println!("{name}: the engine takes memory {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
+    }
+}

@@ -1,0 +1,260 @@
+//! What the link of a scenario tells, and when.
+
+use tautline_core::swarm::{Rows, Swarm, row};
+use tautline_laws::formation::Formation;
+use tautline_laws::graph::Graph;
+use tautline_laws::observation::{Neighbour, Others, Picture};
+use tautline_sim::link::{Link, Sensed, of};
+use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy, Scenario};
+
+const DT_S: f64 = 0.01;
+const COUNT: usize = 4;
+
+/// Vehicle i is at x = 10 i + t^2, y = -t.
+fn truth(time_s: f64) -> Swarm {
+    Swarm {
+        positions_m: Rows::from_fn(COUNT, |i, axis| [10.0 * i as f64 + time_s * time_s, -time_s, 0.0][axis]),
+        velocities_m_s: Rows::from_fn(COUNT, |_, axis| [2.0 * time_s, -1.0, 0.0][axis]),
+    }
+}
+
+fn in_row(swarm: &Swarm, i: usize) -> Neighbour {
+    Neighbour { position_m: row(&swarm.positions_m, i), velocity_m_s: row(&swarm.velocities_m_s, i), age_s: 0.0 }
+}
+
+fn scenario() -> Scenario {
+    let mut scenario = Scenario::new("world", truth(0.0), Formation::line(COUNT, 10.0), 1.0, 60.0);
+    scenario.graph = Graph::star(COUNT);
+    scenario.noise_seed = 5;
+    scenario
+}
+
+/// The link after so many steps, and what it shows then.
+fn after(link: &mut dyn Link, steps: std::ops::RangeInclusive<u32>, mut show: impl FnMut(f64, Sensed<'_>)) {
+    for step in steps {
+        let time_s = f64::from(step) * DT_S;
+        let now = truth(time_s);
+        link.accept(time_s, &now);
+        link.settle(time_s);
+        show(time_s, link.sense(time_s, &now));
+    }
+}
+
+fn picture<'a>(sensed: &Sensed<'a>) -> &'a dyn Picture {
+    match sensed.others {
+        Others::Held(picture) => picture,
+        Others::Shared => panic!("all is shared"),
+    }
+}
+
+fn is_of(neighbour: Neighbour, vehicle: usize, time_s: f64) -> bool {
+    let then = truth(time_s.max(0.0));
+    (neighbour.position_m - row(&then.positions_m, vehicle)).norm() < 1e-9
+        && (neighbour.velocity_m_s - row(&then.velocities_m_s, vehicle)).norm() < 1e-9
+}
+
+#[test]
+fn what_is_known_late_is_as_old_as_was_asked_for_and_no_older() {
+    // Not a multiple of the step, and one that is.
+    for latency_s in [0.037, 0.05] {
+        let mut late = scenario();
+        late.sensing.latency_s = latency_s;
+        let mut link = of(&late, true);
+        after(link.as_mut(), 0..=100, |time_s, sensed| {
+            assert!(matches!(sensed.others, Others::Shared));
+            (0..COUNT).for_each(|i| assert!(is_of(in_row(sensed.own, i), i, time_s - latency_s), "{time_s}"));
+        });
+        assert!(!link.is_exact());
+    }
+}
+
+#[test]
+fn the_network_delays_what_is_heard_and_neither_the_own_state_nor_what_is_seen() {
+    for rate_hz in [None, Some(100.0)] {
+        let mut late = scenario();
+        (late.network.latency_s, late.network.rate_hz) = (0.05, rate_hz);
+        let mut link = of(&late, true);
+        after(link.as_mut(), 0..=100, |time_s, sensed| {
+            let picture = picture(&sensed);
+            assert_eq!(sensed.own, &truth(time_s));
+            let heard = picture.heard(1, 0);
+            assert!(is_of(heard, 0, time_s - 0.05), "{rate_hz:?} {time_s}");
+            assert!((heard.age_s - time_s.min(0.05)).abs() < 1e-9);
+            assert!(is_of(picture.seen(1, 2), 2, time_s));
+        });
+    }
+}
+
+#[test]
+fn near_ones_are_seen_late_or_at_once_or_heard_as_the_keys_say() {
+    let mut own_late = scenario();
+    (own_late.sensing.latency_s, own_late.sensing.near_latency_s) = (0.05, Some(0.0));
+    after(of(&own_late, true).as_mut(), 0..=50, |time_s, sensed| {
+        let (seen, own_m) = (picture(&sensed).seen(1, 2), row(&sensed.own.positions_m, 1));
+        assert!(is_of(in_row(sensed.own, 1), 1, time_s - 0.05));
+        let apart_m = row(&truth(time_s).positions_m, 2) - row(&truth(time_s).positions_m, 1);
+        assert!((seen.position_m - own_m - apart_m).norm() < 1e-12, "where the other is from there, now");
+    });
+    let mut heard = scenario();
+    (heard.network.latency_s, heard.network.near) = (0.05, NearBy::Heard);
+    after(of(&heard, true).as_mut(), 0..=50, |time_s, sensed| {
+        assert!(is_of(picture(&sensed).seen(1, 2), 2, time_s - 0.05), "without a link too");
+        let (positions_m, slack_m) = picture(&sensed).near_from().expect("a place to look from");
+        let held_m = (picture(&sensed).seen(1, 2).position_m - row(&sensed.own.positions_m, 1)).norm();
+        let found_m = (row(positions_m, 2) - row(positions_m, 1)).norm();
+        assert!(held_m + slack_m >= found_m && slack_m >= (found_m - held_m).abs());
+    });
+}
+
+#[test]
+fn old_messages_are_held_or_carried_along() {
+    let mut scenario = scenario();
+    (scenario.network.latency_s, scenario.network.rate_hz) = (0.05, Some(10.0));
+    for missing in [Missing::Hold, Missing::Extrapolate] {
+        scenario.network.missing = missing;
+        after(of(&scenario, true).as_mut(), 0..=100, |time_s, sensed| {
+            let heard = picture(&sensed).heard(2, 0);
+            let sent_s = ((time_s - 0.05 + 1e-9).max(0.0) * 10.0).floor() / 10.0;
+            let (then, ahead_s) = (truth(sent_s), time_s - sent_s);
+            let carried_m = if missing == Missing::Hold { 0.0 } else { ahead_s };
+            let expected = row(&then.positions_m, 0) + row(&then.velocities_m_s, 0) * carried_m;
+            assert!((heard.position_m - expected).norm() < 1e-9, "{missing:?} {time_s}");
+        });
+    }
+}
+
+#[test]
+fn a_link_that_is_down_and_a_vehicle_that_is_silent_leave_what_was_heard_before() {
+    let mut scenario = scenario();
+    scenario.network.rate_hz = Some(100.0);
+    scenario.network.failure = vec![LinkFailure { link: [1, 3], from_s: 0.2, to_s: Some(0.4) }];
+    scenario.failures = vec![Failure { vehicle: 2, at_s: 0.3, kind: FailureKind::Silent {} }];
+    let mut link = of(&scenario, true);
+    after(link.as_mut(), 0..=80, |time_s, sensed| {
+        let picture = picture(&sensed);
+        let is_down = (0.2 - 1e-9..0.4 - 1e-9).contains(&time_s);
+        let known_s = if is_down { 0.19 } else { time_s };
+        assert!(is_of(picture.heard(2, 0), 0, known_s) && is_of(picture.heard(0, 2), 2, known_s), "{time_s}");
+        assert!(is_of(picture.heard(3, 0), 0, time_s), "other links are up");
+        assert!(is_of(picture.heard(0, 1), 1, time_s.min(0.29)), "{time_s}");
+        assert!(is_of(picture.heard(1, 0), 0, time_s), "the silent one listens");
+    });
+    let traffic = link.traffic().expect("messages");
+    // 81 instants, six links one way; 20 of them are lost on two; one sender stops at 30.
+    assert_eq!((traffic.sent, traffic.lost), (81 * 6 - 51, 40));
+    assert!(traffic.age_p95_s.is_some_and(|age_s| (0.2..0.5).contains(&age_s)), "{traffic:?}");
+}
+
+#[test]
+fn errors_have_the_deviation_asked_for_and_are_drawn_with_each_measurement() {
+    let mut noisy = scenario();
+    (noisy.sensing.position_noise_m, noisy.sensing.velocity_noise_m_s) = (0.1, 0.02);
+    noisy.sensing.rate_hz = Some(50.0);
+    let (mut sums, mut number, mut last) = ([0.0; 4], 0.0, None);
+    after(of(&noisy, true).as_mut(), 0..=20_000, |time_s, sensed| {
+        let own = in_row(sensed.own, 1);
+        let seen = picture(&sensed).seen(1, 2);
+        let is_new = last.replace(own) != Some(own);
+        assert_eq!(is_new, (time_s / DT_S).round() % 2.0 == 0.0, "{time_s}");
+        let measured_s = (time_s * 50.0 + 1e-9).floor() / 50.0;
+        let then = in_row(&truth(measured_s), 1);
+        let apart_m = seen.position_m - own.position_m;
+        if is_new {
+            number += 1.0;
+            sums[0] += (own.position_m - then.position_m).x.powi(2);
+            sums[1] += (own.velocity_m_s - then.velocity_m_s).y.powi(2);
+            sums[2] += (apart_m.x - 10.0).powi(2);
+            sums[3] += (own.position_m - then.position_m).x * (apart_m.x - 10.0);
+        }
+        assert_eq!((own.position_m.z, seen.position_m.z), (0.0, 0.0), "nobody leaves the plane");
+    });
+    let [own, speed, seen, both] = sums.map(|sum| sum / number);
+    // 10,001 draws: the standard error of a variance is 1.4 %.
+    for (variance, expected) in [(own, 0.01), (speed, 0.0004), (seen, 0.01)] {
+        assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
+    }
+    assert!(both.abs() < 0.0004, "what is seen has errors of its own: {both}");
+}
+
+#[test]
+fn a_bias_stays_and_is_no_part_of_what_is_seen() {
+    let mut biased = scenario();
+    biased.sensing.position_bias_m = 0.5;
+    let mut first = None;
+    after(of(&biased, true).as_mut(), 0..=100, |time_s, sensed| {
+        let off_m = &sensed.own.positions_m - truth(time_s).positions_m;
+        let before = first.get_or_insert_with(|| off_m.clone());
+        assert!((&off_m - &*before).amax() < 1e-12 && off_m.amax() > 0.1);
+        let apart_m = picture(&sensed).seen(1, 2).position_m - row(&sensed.own.positions_m, 1);
+        assert!((apart_m - row(&truth(time_s).positions_m, 2) + row(&truth(time_s).positions_m, 1)).norm() < 1e-12);
+        assert!((picture(&sensed).heard(1, 0).position_m - row(&sensed.own.positions_m, 0)).norm() == 0.0);
+    });
+}
+
+#[test]
+fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
+    let mut scenario = scenario();
+    scenario.sensing.rate_hz = Some(30.0);
+    scenario.sensing.position_noise_m = 0.1;
+    (scenario.network.latency_s, scenario.network.jitter_s) = (0.03, 0.05);
+    (scenario.network.loss, scenario.network.loss_burst) = (0.3, Some(4.0));
+    let heard = |link: &mut dyn Link, disturb: bool| {
+        let mut all = Vec::new();
+        for step in 0..=200 {
+            let time_s = f64::from(step) * DT_S;
+            if disturb && step > 0 {
+                // A step twice as long that is refused, and one in halves.
+                link.accept(time_s + DT_S, &truth(7.0));
+                link.sense(time_s + DT_S, &truth(7.0));
+                link.forget_after(time_s - DT_S);
+                let half_s = time_s - 0.5 * DT_S;
+                link.accept(half_s, &truth(half_s));
+                link.settle(half_s);
+                link.sense(half_s, &truth(half_s));
+            }
+            after(link, step..=step, |_, sensed| {
+                let picture = picture(&sensed);
+                all.push((sensed.own.clone(), picture.heard(0, 2), picture.heard(3, 0), picture.seen(1, 3)));
+            });
+        }
+        (all, link.traffic())
+    };
+    let plain = heard(of(&scenario, true).as_mut(), false);
+    let disturbed = heard(of(&scenario, true).as_mut(), true);
+    assert_eq!(plain.1, disturbed.1);
+    let far = |a: &Neighbour, b: &Neighbour| (a.position_m - b.position_m).norm();
+    for (a, b) in plain.0.iter().zip(&disturbed.0) {
+        // What lies between two states is interpolated from other states.
+        assert!((&a.0.positions_m - &b.0.positions_m).amax() < 1e-12);
+        assert!(far(&a.1, &b.1) < 1e-12 && far(&a.2, &b.2) < 1e-12 && far(&a.3, &b.3) < 1e-12);
+    }
+    scenario.noise_seed = 6;
+    assert_ne!(heard(of(&scenario, true).as_mut(), false).1, plain.1, "another seed, another fate");
+}
+
+#[test]
+fn a_vehicle_that_is_dead_commands_nothing_and_a_frozen_one_what_it_did() {
+    let mut scenario = scenario();
+    scenario.failures = vec![
+        Failure { vehicle: 2, at_s: 0.5, kind: FailureKind::Dead {} },
+        Failure { vehicle: 3, at_s: 0.5, kind: FailureKind::Frozen {} },
+    ];
+    let mut link = of(&scenario, true);
+    for step in 0..=100 {
+        let time_s = f64::from(step) * DT_S;
+        let given = Rows::from_element(COUNT, 1.0 + time_s);
+        let mut command = given.clone();
+        link.actuate(time_s, &mut command);
+        assert_eq!((command[(0, 0)], command[(3, 1)]), (given[(0, 0)], given[(0, 0)]));
+        let (dead, frozen) = if step < 50 { (1.0 + time_s, 1.0 + time_s) } else { (0.0, 1.5) };
+        assert_eq!((command[(1, 0)], command[(2, 0)]), (dead, frozen), "{time_s}");
+    }
+}
+
+#[test]
+fn without_imperfections_the_link_is_the_direct_one() {
+    assert!(of(&scenario(), true).is_exact());
+    let mut scenario = scenario();
+    scenario.network.missing = Missing::Extrapolate;
+    assert!(of(&scenario, true).is_exact(), "nothing is missing");
+}

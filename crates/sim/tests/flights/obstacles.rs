@@ -1,0 +1,242 @@
+//! Flights among obstacles: what is certified holds, the judge sees what the law ignores, hulls do not pass.
+//!
+//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=500 cargo test --release --test flights obstacles --
+//! --nocapture` flies 500 and prints what docs/validation.md says of them.
+
+use nalgebra::Vector3;
+use tautline_audit::Status;
+use tautline_core::record::Event;
+use tautline_core::swarm::{Rows, Swarm, separation};
+use tautline_laws::formation::Formation;
+use tautline_laws::graph::{Graph, Pinning};
+use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
+use tautline_laws::space::{Obstacle, Shape, least_room};
+use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::sim::{Ending, Flight, Motion, Simulation};
+
+use crate::flight::{Log, builtin, fly, fly_with};
+use crate::numbers::Numbers;
+
+fn shape(numbers: &mut Numbers, delta_m: f64) -> Shape {
+    let mut length = |least: f64, most: f64| delta_m * numbers.between(least, most);
+    let (a, b, c, d) = (length(0.3, 2.0), length(0.3, 2.0), length(0.3, 2.0), length(-200.0, 200.0));
+    match 3.0 * numbers.unit() {
+        ..1.0 => Shape::Ball { radius_m: a },
+        ..2.0 => Shape::Box { half_m: Vector3::new(a, b, c), yaw_deg: d / delta_m },
+        _ => Shape::Capsule { from_m: Vector3::new(-a, b, -c), to_m: Vector3::new(a, -b, c), radius_m: 0.5 * b },
+    }
+}
+
+/// Two legs among three solids, around a reference at rest, from places and to slots that have room.
+fn among(seed: u64) -> Scenario {
+    let mut numbers = Numbers(seed.wrapping_mul(0xe703_7ed1_a0b4_28db) | 1);
+    let sixth = 6.0 * numbers.unit();
+    let count = 3 + (1..6).filter(|&n| f64::from(n) <= sixth).count();
+    let delta_m = numbers.over_decades(0.1, 10.0);
+    let extent_m = 5.0 * delta_m;
+    let point = |numbers: &mut Numbers| Vector3::from_fn(|_, _| numbers.between(-extent_m, extent_m));
+    let obstacles: Vec<_> = (0..3)
+        .map(|k| Obstacle {
+            name: format!("o{k}"),
+            place_m: point(&mut numbers),
+            shape: shape(&mut numbers, delta_m),
+            clearance_m: delta_m * numbers.between(0.5, 1.0),
+        })
+        .collect();
+    let mut places = |least: f64| {
+        let mut rows = Rows::zeros(count);
+        for i in 0..count {
+            loop {
+                let at = point(&mut numbers);
+                (0..3).for_each(|axis| rows[(i, axis)] = at[axis]);
+                let alone = Rows::from_row_slice(at.as_slice());
+                let has_room = least_room(&obstacles, &alone).is_some_and(|(room_m, ..)| room_m > 0.2 * delta_m);
+                if has_room && (0..i).all(|j| separation(&rows, i, j) > least * delta_m) {
+                    break;
+                }
+            }
+        }
+        rows
+    };
+    let start = Swarm::at_rest(places(1.1));
+    let legs = [0.0, 4.0].map(|from_s| Leg {
+        formation: Formation { slots_m: places(1.3) },
+        begins: Begins::At(from_s),
+        interchangeable: false,
+    });
+    let mut scenario = Scenario::new("among", start, legs[0].formation.clone(), delta_m, 8.0);
+    scenario.graph = match 3.0 * numbers.unit() {
+        ..1.0 => Graph::complete(count),
+        ..2.0 => Graph::star(count),
+        _ => Graph::ring(count),
+    };
+    scenario.law = LawSpec::Displacement(DisplacementKeys { alpha: delta_m * delta_m, ..DisplacementKeys::default() });
+    scenario.a22_per_s = numbers.between(-0.5, 0.2);
+    scenario.plant = PlantSpec::Ideal;
+    scenario.breathing.mode = BreathingMode::Off;
+    scenario.hull_radius_m.fill((0.4 * delta_m).min(0.5 * delta_m - 0.021).max(1e-3));
+    scenario.legs = legs.to_vec();
+    let known_by = if numbers.unit() < 0.5 { Pinning::All } else { Pinning::Listed(vec![0]) };
+    let motion = ReferenceMotion::Rest { position_m: Vector3::zeros() };
+    scenario.reference = Some(Guidance { motion, known_by, feed_forward: true });
+    scenario.obstacles = obstacles;
+    scenario
+}
+
+#[test]
+fn no_random_flight_among_obstacles_breaks_what_was_certified() {
+    let flights = std::env::var("TAUTLINE_RANDOM_OBSTACLES").map_or(12, |n| n.parse().expect("a number"));
+    let (mut tightest, mut near, mut worst_rise) = (f64::INFINITY, 0_u64, 0.0_f64);
+    for seed in 0..flights {
+        let scenario = among(seed);
+        scenario.validate().unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let (flight, _) = fly(&scenario);
+        assert_eq!(flight.ending, Ending::Completed, "seed {seed}");
+        let certificate = &flight.certificate;
+        let (certified_m, certified_room_m) =
+            (certificate.certified_m.expect("a promise"), certificate.certified_room_m.expect("a promise"));
+        let closest_m = flight.audit.closest.expect("a pair").separation_m;
+        let clearance = flight.clearance.expect("obstacles");
+        let room_m = clearance.closest.iter().map(|near| near.lower_m - near.limit_m).fold(f64::INFINITY, f64::min);
+        assert!(closest_m >= certified_m, "seed {seed}: {closest_m} {certified_m}");
+        assert!(room_m >= certified_room_m && certified_room_m > 0.0, "seed {seed}: {room_m} {certified_room_m}");
+        assert_eq!((flight.audit.status, clearance.status), (Status::Clear, Status::Clear), "seed {seed}");
+        assert_eq!(clearance.parry.disagreements, 0, "seed {seed}");
+        tightest = tightest.min((room_m - certified_room_m) / scenario.delta_m);
+        near += u64::from(room_m < 0.1 * scenario.delta_m);
+        let rise = flight.energy_rise.expect("an energy");
+        worst_rise = worst_rise.max((rise.to - rise.from) / rise.from);
+    }
+    println!(
+        "{flights} flights among obstacles, {near} of them nearer than 0.1 delta beyond a clearance: least room above the \
+         certificate {tightest:.3e} delta, largest rise of energy {worst_rise:.1e}"
+    );
+    assert!(worst_rise < 1e-6, "{worst_rise}");
+    assert!(4 * near > flights, "{near}: obstacles were hardly in the way");
+}
+
+/// The law of a scenario that was not told of the obstacles flies through them: the judge sees it, and nothing is certified.
+fn ignorant(scenario: &Scenario) -> (Flight, Log) {
+    let mut alone = scenario.clone();
+    alone.obstacles.clear();
+    let (flown, log) = fly_with(scenario, alone.law().expect("a law"), Motion::of(scenario));
+    (flown.expect("a flight"), log)
+}
+
+#[test]
+fn a_law_that_is_not_told_of_obstacles_flies_into_them_and_certifies_nothing() {
+    let too_near = (0..12).map(among).filter(|scenario| {
+        let (flight, log) = ignorant(scenario);
+        assert_eq!(flight.certificate.void, [Void::ObstaclesUnknown]);
+        let clearance = flight.clearance.expect("obstacles");
+        let began = log.events.iter().filter(|event| matches!(event, Event::ObstacleViolationBegan { .. })).count();
+        assert_eq!(began, clearance.violations.len());
+        clearance.status == Status::Violation
+    });
+    assert!(too_near.count() >= 6);
+}
+
+/// Straight at a wall that the law does not know: points go through, hulls do not.
+#[test]
+fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
+    let mut scenario = builtin("pentagon", &[]);
+    scenario.law = LawSpec::Displacement(DisplacementKeys::default());
+    let slots_m = &mut scenario.legs[0].formation.slots_m;
+    slots_m.copy_from(&scenario.start.positions_m);
+    slots_m.column_mut(1).add_scalar_mut(12.0);
+    let motion = ReferenceMotion::Rest { position_m: Vector3::zeros() };
+    scenario.reference = Some(Guidance { motion, known_by: Pinning::All, feed_forward: true });
+    scenario.time.duration_s = 20.0;
+    let wall = |shape, y: f64| Obstacle {
+        name: "wall".to_owned(),
+        place_m: Vector3::new(0.0, y, 0.0),
+        shape,
+        clearance_m: 1.0,
+    };
+    for shape in [
+        Shape::Box { half_m: Vector3::new(60.0, 1.0, 5.0), yaw_deg: 0.0 },
+        Shape::Capsule { from_m: -60.0 * Vector3::x(), to_m: 60.0 * Vector3::x(), radius_m: 1.0 },
+        Shape::Ball { radius_m: 40.0 },
+        Shape::HalfSpace { normal: -2.0 * Vector3::y() },
+    ] {
+        let y = match shape {
+            Shape::Ball { radius_m } => 6.0 + radius_m,
+            _ => 6.0,
+        };
+        scenario.obstacles = vec![wall(shape, y)];
+        for (plant, passes) in [(PlantSpec::Rapier, false), (PlantSpec::Ideal, true)] {
+            let flown = Scenario { plant, ..scenario.clone() };
+            let (flight, _) = ignorant(&flown);
+            let clearance = flight.clearance.expect("an obstacle");
+            assert_eq!(clearance.status, Status::Violation);
+            let deepest_m = clearance.closest[0].lower_m;
+            assert_eq!(deepest_m < 0.0, passes, "{shape:?} {plant:?}: {deepest_m}");
+            assert!(passes || deepest_m > 0.2, "a hull has a radius of 0.25 m: {deepest_m}");
+        }
+        // Who is told keeps the clearance, and comes to rest before it.
+        let (flight, _) = fly(&Scenario { reference: None, ..scenario.clone() });
+        assert_eq!(flight.clearance.expect("an obstacle").status, Status::Clear);
+    }
+}
+
+/// The same flight in the engine and in continuous time, through the gate of the built-in scenario.
+#[test]
+fn the_engine_flies_past_obstacles_as_the_law_does_in_continuous_time() {
+    const TOLERANCE_M: f64 = 1e-3;
+    let engine = builtin("obstacles", &["time.duration_s=8"]);
+    let ideal = Scenario { plant: PlantSpec::Ideal, ..engine.clone() };
+    let [engine, ideal] = [engine, ideal].map(|scenario| {
+        let (flight, _) = fly(&scenario);
+        let nearest = flight.clearance.expect("obstacles").closest[0];
+        (nearest.pair, nearest.lower_m, nearest.time_s, flight.audit.closest.expect("a pair").separation_m)
+    });
+    assert_eq!(engine.0, ideal.0);
+    assert!(
+        (engine.1 - ideal.1).abs() < TOLERANCE_M && (engine.3 - ideal.3).abs() < TOLERANCE_M,
+        "{engine:?} {ideal:?}"
+    );
+    assert!((engine.2 - ideal.2).abs() < 0.01, "{engine:?} {ideal:?}");
+}
+
+#[test]
+fn a_swarm_that_is_carried_past_obstacles_or_fed_is_promised_nothing_and_flown_all_the_same() {
+    let mut scenario = among(3);
+    let certified = |scenario: &Scenario| scenario.certificate(scenario.law().expect("a law").as_ref());
+    assert!(certified(&scenario).certified_room_m.is_some());
+    let guidance = scenario.reference.take();
+    scenario.a22_per_s = 0.1;
+    assert_eq!(certified(&scenario).void, [Void::VelocityUndamped]);
+    scenario.a22_per_s = -0.1;
+    assert!(certified(&scenario).certified_room_m.is_some(), "braked, it needs no reference");
+    let motion = ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::x() };
+    scenario.reference = guidance.map(|guidance| Guidance { motion, ..guidance });
+    assert_eq!(certified(&scenario).void, [Void::CarriedPastObstacles]);
+    assert!(certified(&scenario).certified_m.is_none());
+}
+
+#[test]
+fn a_saved_flight_among_obstacles_goes_on_with_the_same_bits() {
+    let scenario = builtin("obstacles", &["time.duration_s=4"]);
+    let mut simulation = Simulation::new(&scenario).expect("a flight");
+    (0..300).for_each(|_| simulation.step());
+    let saved = simulation.save();
+    (0..400).for_each(|_| simulation.step());
+    let once = simulation.finish();
+    let mut again = Simulation::new(&scenario).expect("a flight");
+    again.load(&saved, None);
+    (0..400).for_each(|_| again.step());
+    let again = again.finish();
+    assert_eq!((once.last, once.clearance), (again.last, again.clearance));
+}
+
+/// Steps far too long for the law's rate, at a wall: what would take more than half of the room is undone and flown in halves.
+#[test]
+fn a_step_that_takes_more_than_half_of_the_room_is_flown_in_halves() {
+    let mut scenario = builtin("obstacles", &["time.duration_s=6", "time.max_rate_dt=1e6", "time.dt_s=0.05"]);
+    scenario.start.velocities_m_s.column_mut(0).fill(20.0);
+    let (flight, log) = fly(&scenario);
+    assert_eq!(flight.ending, Ending::Completed);
+    assert_eq!(flight.clearance.expect("obstacles").status, Status::Clear);
+    assert!(log.events.iter().any(|event| matches!(event, Event::StepRefined { .. })));
+}

@@ -1,0 +1,258 @@
+//! Keys that have two names, keys that may be left out, and graphs from their keys.
+
+use tautline_laws::graph::Graph;
+use tautline_sim::preflight::{Code, Preflight};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+
+use crate::scenario_files::{RIGHT, read, read_builtin};
+
+const MISSION: &str = r#"name = "mission"
+[start]
+positions_m = [[0, 0], [4, 0.1], [8, 0]]
+[formation]
+shape = "circle"
+radius_m = 3.0
+move_m = [1, 2]
+[law]
+kind = "displacement"
+delta_m = 1.0
+[[leg]]
+shape = "line"
+spacing_m = 3.0
+start_s = 20
+move_m = [0, 5]
+[[leg]]
+yaw_deg = 90
+start_s = "reached"
+[reference]
+kind = "way-points"
+points_m = [[0, 0], [5, 0]]
+times_s = [0, 10]
+[breathing]
+mode = "start"
+hold_s = 3
+[time]
+duration_s = 60.0
+"#;
+
+fn refusal(text: &str) -> ScenarioError {
+    read(text).expect_err("it is wrong")
+}
+
+#[test]
+fn a_key_means_the_same_under_its_other_name() {
+    let resolved = |text: &str| read(text).expect("it is right").resolved_toml();
+    let plain = resolved(MISSION);
+    let others = [
+        ("move_m", "offset_m"),
+        ("start_s", "start"),
+        ("\"circle\"", "\"ring\""),
+        ("\"way-points\"", "\"waypoints\""),
+        ("mode", "when"),
+        ("\"start\"", "\"always\""),
+    ];
+    for (name, other) in others {
+        assert!(MISSION.contains(name));
+        assert_eq!(resolved(&MISSION.replace(name, other)), plain, "{other}");
+    }
+    let all = others.iter().fold(MISSION.to_owned(), |text, (name, other)| text.replace(name, other));
+    assert_eq!(resolved(&all), plain);
+    for (mode, other) in [("auto", "stalled"), ("off", "never")] {
+        let of = |word: &str| resolved(&MISSION.replace("\"start\"", &format!("\"{word}\"")));
+        assert_eq!(of(mode), of(other));
+        assert_ne!(of(mode), plain);
+    }
+    // Another place, another time and another hold are another mission.
+    for (part, other) in [("[0, 5]", "[0, 6]"), ("start_s = 20", "start_s = 21"), ("hold_s = 3", "hold_s = 4")] {
+        assert_ne!(resolved(&MISSION.replace(part, other)), plain, "{other}");
+    }
+}
+
+#[test]
+fn both_names_of_a_key_at_once_and_other_words_are_refused() {
+    let both = refusal(&MISSION.replace("move_m = [0, 5]", "move_m = [0, 5]\noffset_m = [0, 5]"));
+    assert!(both.to_string().contains("both `move_m` and `offset_m` are given"), "{both}");
+    assert_eq!(both.place().map(|place| (place.line, place.column)), Some((16, 1)));
+    let soon = refusal(&MISSION.replace("\"reached\"", "\"soon\""));
+    assert!(soon.to_string().contains("expected a time in s, or \"reached\""), "{soon}");
+    assert_eq!(soon.place().map(|place| (place.line, place.column)), Some((18, 11)));
+    let hold = refusal(&MISSION.replace("hold_s = 3", "hold_s = -3"));
+    assert!(hold.to_string().contains("spread slots are held is -3"), "{hold}");
+    assert_eq!(hold.place().map(|place| (place.line, place.column)), Some((25, 10)));
+}
+
+/// Whichever of the two names the file has, an override may use either, and an error stands at what was written.
+#[test]
+fn an_override_reaches_a_key_by_either_name() {
+    let others = MISSION.replace("move_m", "offset_m").replace("start_s", "start").replace("mode", "when");
+    let resolved = |text: &str, sets: &[&str]| {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        let source = Source::Text { name: "test.toml".to_owned(), text: text.to_owned() };
+        Scenario::read(&source, &overrides).map(|scenario| scenario.resolved_toml())
+    };
+    let pairs = [
+        ("leg.1.start_s=7", "leg.1.start=7"),
+        ("leg.1.start_s=reached", "leg.1.start=reached"),
+        ("leg.1.move_m=[0, 1]", "leg.1.offset_m=[0, 1]"),
+        ("formation.move_m.x=4", "formation.offset_m.x=4"),
+        ("breathing.mode=off", "breathing.when=never"),
+        ("breathing={mode=\"off\"}", "breathing={when=\"never\"}"),
+    ];
+    for (name, other) in pairs {
+        let expected = resolved(MISSION, &[name]).expect("right");
+        assert_ne!(expected, resolved(MISSION, &[]).expect("right"), "{name}");
+        for (text, set) in [(MISSION, other), (&*others, name), (&*others, other)] {
+            assert_eq!(resolved(text, &[set]).expect("right"), expected, "{set}");
+        }
+    }
+    for set in ["leg.1.start=nan", "leg.1.start_s=nan", "leg.1.offset_m=[nan, 0]", "breathing.when=sometimes"] {
+        for text in [MISSION, &*others] {
+            let error = resolved(text, &[set]).expect_err("it is wrong");
+            assert_eq!(error.place().map(|place| place.source.as_str()), Some("--set"), "{set}: {error}");
+        }
+    }
+}
+
+#[test]
+fn spread_slots_are_not_held_to_the_end_of_the_flight() {
+    let held = refusal(&MISSION.replace("hold_s = 3", "hold_s = 60"));
+    assert!(held.to_string().contains("held for 60 s of a flight of 60 s"), "{held}");
+    assert!(read(&MISSION.replace("hold_s = 3", "hold_s = 59.9")).is_ok());
+}
+
+#[test]
+fn a_reference_without_a_kind_is_at_rest() {
+    let resting = |keys: &str| read(&format!("{RIGHT}[reference]\n{keys}").replace("edge-tension", "displacement"));
+    let (named, bare) = (resting("kind = \"rest\"\nleader = 2\n"), resting("leader = 2\n"));
+    let resolved = named.expect("right").resolved_toml();
+    assert!(resolved.contains("leader = 2"));
+    assert_eq!(bare.expect("right").resolved_toml(), resolved);
+    let moving = resting("velocity_m_s = [1, 0]\n").expect_err("one at rest has no velocity");
+    assert!(moving.to_string().contains("unknown key `velocity_m_s`"), "{moving}");
+}
+
+#[test]
+fn a_star_has_the_hub_that_it_is_given() {
+    let graph = |sets: &[&str]| read_builtin("pentagon", sets).map(|scenario| scenario.graph);
+    assert_eq!(graph(&["graph.kind=star"]).expect("right"), Graph::star(5));
+    let third = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
+    assert_eq!(graph(&["graph={kind=\"star\", hub=3}"]).expect("right"), third);
+    assert_eq!(Graph::star_about(5, 4), Graph::from_edges(5, &[(4, 0), (4, 1), (4, 2), (4, 3)]).expect("a graph"));
+    for hub in [0, 6] {
+        let wrong = graph(&[&format!("graph={{kind=\"star\", hub={hub}}}")]).expect_err("no such vehicle");
+        assert!(wrong.to_string().contains(&format!("there is no vehicle {hub}")), "{wrong}");
+        assert_eq!(wrong.place().map(|place| place.column), Some(25));
+    }
+}
+
+#[test]
+fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for() {
+    let graph = |keys: &str| {
+        let set = format!("graph={{kind=\"random\"{keys}}}");
+        read_builtin("thousand", &["law.kind=displacement", &set]).map(|scenario| scenario.graph)
+    };
+    let plain = graph("").expect("right");
+    assert_eq!((plain.edge_count(), plain.is_connected()), (2000, true));
+    assert_eq!(graph(", degree=4, seed=0").expect("right"), plain);
+    assert_ne!(graph(", seed=1").expect("right"), plain);
+    assert_eq!(graph(", degree=2").expect("right").edge_count(), 1000);
+    assert!(graph(", degree=999").expect("right").is_complete());
+    let few = read(&format!("{RIGHT}[graph]\nkind = \"random\"\n")).expect("right").graph;
+    assert!(few.is_complete(), "two vehicles are each other's only link");
+    assert_eq!(graph(", degree=1").expect("right").edge_count(), 999, "a tree");
+    for degree in [0, 1000, u64::MAX / 2] {
+        let wrong = graph(&format!(", degree={degree}")).expect_err("no such graph");
+        assert!(wrong.to_string().contains(&format!("{degree} links of a vehicle in the mean, where each has 999")));
+    }
+}
+
+#[test]
+fn a_step_that_nobody_gives_is_as_short_as_the_links_ask_for_and_one_that_is_given_stays() {
+    let ring = |more: &str| {
+        read(&format!(
+            "[swarm]\ncount = 3000\n[start]\nshape = \"grid\"\nspacing_m = 2\n[formation]\nshape = \"grid\"\nspacing_m = 1.6\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\n[graph]\nkind = \"ring\"\n[time]\nduration_s = 1\n{more}"
+        ))
+        .expect("a scenario")
+    };
+    let chosen = ring("");
+    let needed_s = chosen.links_step_s(chosen.law().expect("a law").as_ref()).expect("links");
+    assert!(chosen.time.shortest_step_s() <= needed_s && 2.0 * chosen.time.shortest_step_s() > needed_s);
+    let halvings = (1.0 / 240.0 / chosen.time.dt_s).log2();
+    assert!(halvings >= 1.0 && halvings.fract() == 0.0, "{halvings}");
+    assert_eq!(ring("dt_s = 0.004").time.dt_s, 0.004);
+    assert!(ring("max_halvings = 20").time.dt_s == 1.0 / 240.0, "its parts are short enough");
+    assert!(ring("max_halvings = 0\n").time.dt_s <= needed_s);
+    assert_eq!(ring("control_hz = 25").time.dt_s, 1.0 / 240.0, "the law is not asked more often");
+}
+
+#[test]
+fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
+    let stiff = |more: &str, zeta_per_s: f64| {
+        read(&format!(
+            "[swarm]\ncount = 5\n[start]\nshape = \"circle\"\nradius_m = 5\n[formation]\nshape = \"circle\"\nradius_m = 3\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\nk_per_s2 = 1e3\nzeta_per_s = {zeta_per_s}\n[time]\n{more}"
+        ))
+        .expect("a scenario")
+    };
+    let refused = |scenario: &Scenario| {
+        Preflight::of(scenario).expect("a law").warnings.iter().any(|warning| warning.code == Code::StepTooLong)
+    };
+    let short = stiff("duration_s = 100", 1e6);
+    assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "parts that a flight can have");
+    let (many, crazyflie) =
+        (stiff("duration_s = 100", 1e9), stiff("duration_s = 100\n[vehicle]\nmodel = \"crazyflie\"", 1e6));
+    assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 parts of steps");
+    // A step of 5e-7 s would be enough; halving comes to 2.5e-7 s.
+    for (duration_s, is_chosen) in [(200, true), (400, false), (499, false), (600, false)] {
+        let whole = stiff(&format!("max_halvings = 0\nduration_s = {duration_s}"), 1e6);
+        assert_eq!((whole.time.dt_s < 5e-7, refused(&whole)), (is_chosen, !is_chosen), "{duration_s}");
+    }
+    assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "asked 100 times a second");
+}
+
+#[test]
+fn a_limit_that_is_none_is_refused_where_the_step_is_chosen_by_it() {
+    for none in ["-1", "0", "nan"] {
+        let error = read(&format!(
+            "[start]\npositions_m = [[0, 0], [4, 3]]\n[formation]\nshape = \"line\"\nspacing_m = 3\n\
+             [law]\nkind = \"displacement\"\ndelta_m = 1\n[time]\nduration_s = 100\nmax_rate_dt = {none}\n"
+        ))
+        .expect_err("no limit");
+        assert!(error.to_string().contains("max_rate_dt"), "{none}: {error}");
+    }
+}
+
+#[test]
+fn a_flight_that_is_shorter_than_the_hold_is_told_of_where_it_was_made_so() {
+    let sets = [Override::parse("time.duration_s=0.5").expect("an override")];
+    let error = Scenario::read(&Source::Builtin("thousand".to_owned()), &sets).expect_err("too short");
+    assert!(error.to_string().contains("to be held"), "{error}");
+    assert!(error.place().is_some_and(|place| place.source == "--set" && place.text.contains("0.5")), "{error}");
+}
+
+#[test]
+fn around_a_leader_who_keeps_its_slot_the_ways_of_the_others_are_least() {
+    let (starts, slots) = ([[-5.0, 4.0], [-2.0, -2.0], [-3.0, 0.0]], [[5.0, 2.0], [-6.0, -3.0], [2.0, 1.0]]);
+    let scenario = read(&format!(
+        "[start]\npositions_m = {starts:?}\n[formation]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = {slots:?}\n\
+         [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[reference]\nleader = 3\n[time]\nduration_s = 2\n\
+         [[leg]]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = [[9, 0], [0, 9], [0, 0]]\nstart_s = 1\n"
+    ))
+    .expect("a scenario");
+    let ways = |from: [[f64; 2]; 3], slots: [[f64; 2]; 3]| -> f64 {
+        let offset = [0, 1].map(|axis| from[2][axis] - slots[2][axis]);
+        let way = |i: usize| (0..2).map(|axis| (from[i][axis] - slots[i][axis] - offset[axis]).powi(2)).sum::<f64>();
+        (0..3).map(way).sum()
+    };
+    let of_leg = |leg: usize| {
+        let slots_m = &scenario.legs[leg].formation.slots_m;
+        [0, 1, 2].map(|i| [slots_m[(i, 0)], slots_m[(i, 1)]])
+    };
+    for (leg, from, given) in [(0, starts, slots), (1, of_leg(0), [[9.0, 0.0], [0.0, 9.0], [0.0, 0.0]])] {
+        let [kept, swapped] = [given, [given[1], given[0], given[2]]].map(|slots| ways(from, slots));
+        assert!((ways(from, of_leg(leg)) - kept.min(swapped)).abs() < 1e-9, "{leg}: {kept} {swapped}");
+        assert!(swapped < kept, "{leg}: {kept} {swapped}");
+        assert_eq!(of_leg(leg)[2], starts[2], "the leader is where it is on the reference, at the origin");
+    }
+}
