@@ -124,8 +124,8 @@ def unread_within(page: Page) -> list[str]:
 def missing_targets(command: Command) -> list[str]:
     found = []
     for option, name in re.findall(r"(--example|--bench|--test) ([\w-]+)", command.text):
-        folder = ROOT / CARGO_TARGETS[option]
-        if not (folder / f"{name}.rs").exists() and not (folder / name / "main.rs").exists():
+        folders = [root / CARGO_TARGETS[option] for root in (ROOT, *(ROOT / "crates").iterdir())]
+        if not any((folder / f"{name}.rs").exists() or (folder / name / "main.rs").exists() for folder in folders):
             found.append(f"{command.place}: there is no {CARGO_TARGETS[option]}/{name}.rs, nor {name}/main.rs")
     return found
 
