@@ -15,8 +15,10 @@ seed=${2:-1}
 from=${3:-1}
 to=${4:-$count}
 timeout=${TAUTLINE_MUTANT_TIMEOUT:-100}
-quick="--no-default-features --lib --test=audit --test=bits"
-slow="--test=flights --test=allocations --test=program"
+quick="--lib --test=audit --test=bits"
+quick_crates=tautline-audit,tautline-laws,tautline-sim
+slow="--test=flights --test=allocations --test=reported --test=program"
+slow_crates=tautline-sim,tautline-report,tautline
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -31,10 +33,11 @@ rm -rf "$out"
 mkdir -p "$out"
 cd "$scratch/tree"
 # What was built of a change before, where that was broken off, must not be taken for this tree's.
-touch src/lib.rs
+touch crates/*/src/lib.rs
 
 mutants() {
-    cargo mutants --no-shuffle -f 'src/audit/**' -f 'src/law/**' -f 'src/sim/**' -f 'src/plant/**' "$@"
+    cargo mutants --no-shuffle -f 'crates/audit/src/**' -f 'crates/laws/src/law/**' -f 'crates/sim/src/sim/**' \
+        -f 'crates/sim/src/plant/**' "$@"
 }
 
 # Random order by a hash that the seed keys. A field left out of a struct is no part of it: cargo-mutants 27.1 tries each of
@@ -47,7 +50,7 @@ grep -v ': delete field ' "$scratch/all.txt" |
 
 # Tries the mutants whose whole names are in a file on some tests; results go to a folder.
 try() {
-    file=$1 results=$2 tests=$3
+    file=$1 results=$2 tests=$3 crates=$4
     [ -s "$file" ] || { echo "no mutant of the sample is in this part" >&2; exit 2; }
     set --
     while IFS= read -r name; do
@@ -60,27 +63,27 @@ try() {
     mkdir -p "$results/mutants.out"
     cp "$scratch/fields.txt" "$results/mutants.out/caught.txt"
     status=0
-    mutants --in-place --timeout "$timeout" --output "$results" --iterate "$@" || status=$?
+    mutants --in-place --test-package "$crates" --timeout "$timeout" --output "$results" --iterate "$@" || status=$?
     # Exit codes of cargo-mutants: 2 for something missed, 3 for something that no longer ended.
     case $status in 0 | 2 | 3) ;; *) exit "$status" ;; esac
 }
 
 TAUTLINE_SCENES=${TAUTLINE_SCENES:-150}
 export TAUTLINE_SCENES
-try "$out/sample.txt" "$out/quick" "$quick"
+try "$out/sample.txt" "$out/quick" "$quick" "$quick_crates"
 found=$out/quick/mutants.out
 cat "$found/caught.txt" "$found/timeout.txt" > "$out/caught.txt"
 cp "$found/unviable.txt" "$out/unviable.txt"
 cp "$found/missed.txt" "$out/missed.txt"
 if [ -s "$out/missed.txt" ]; then
     cp "$out/missed.txt" "$scratch/again.txt"
-    try "$scratch/again.txt" "$out/slow" "$slow"
+    try "$scratch/again.txt" "$out/slow" "$slow" "$slow_crates"
     found=$out/slow/mutants.out
     cat "$found/caught.txt" "$found/timeout.txt" >> "$out/caught.txt"
     cp "$found/missed.txt" "$out/missed.txt"
 fi
 # The broken program must not be taken for this tree's.
-touch "$OLDPWD/src/lib.rs"
+touch "$OLDPWD"/crates/*/src/lib.rs
 
 lines() {
     wc -l < "$out/$1"

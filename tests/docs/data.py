@@ -62,10 +62,16 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
 
 
 def wrong_features(block: Block, keys: dict[str, Any]) -> list[str]:
-    """What is wrong with how a crate of the reader's asks for this one."""
-    ours = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
-    asked = keys["dependencies"][ours["package"]["name"]].get("features", [])
-    return [f"{block.place}: there is no feature {one}" for one in asked if one not in ours["features"]]
+    """What is wrong with how a crate of the reader's asks for those of this workspace, which it finds at `../tautline`."""
+    wrong = []
+    for name, asked in keys["dependencies"].items():
+        manifest = ROOT / Path(asked["path"]).relative_to("../tautline") / "Cargo.toml"
+        ours = tomllib.loads(manifest.read_text(encoding="utf-8")) if manifest.exists() else {}
+        if ours.get("package", {}).get("name") != name:
+            wrong.append(f"{block.place}: there is no crate {name} at {asked['path']}")
+        known = ours.get("features", {})
+        wrong += [f"{block.place}: {name} has no feature {one}" for one in asked.get("features", []) if one not in known]
+    return wrong
 
 
 def settings(table: dict[str, Any], path: str = "") -> list[str]:

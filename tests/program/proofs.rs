@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Recordings that are proved, and of `sh tests/run.sh --long`.
+/// Recordings that are proved, and with `TAUTLINE_LONG=1`.
 const CASES: u64 = 60;
 const LONG_CASES: u64 = 1000;
 

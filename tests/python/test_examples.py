@@ -1,5 +1,6 @@
 """Notebooks and recipes run."""
 
+import os
 import sys
 import unittest
 
@@ -17,6 +18,7 @@ import gym_pybullet_drones  # noqa: E402
 import pettingzoo_formation  # noqa: E402
 
 
+@unittest.skipUnless(os.environ.get("TAUTLINE_NOTEBOOKS"), "a minute: sh tests/run.sh --long runs them")
 class Notebooks(Case):
     def test_every_notebook_runs_and_is_kept_without_what_it_printed(self) -> None:
         books = sorted((ROOT / "python" / "notebooks").glob("*.ipynb"))

@@ -25,6 +25,7 @@ fn differences(page: &str, program: &str) -> String {
 }
 
 #[test]
+#[ignore = "minutes: sh tests/run.sh --long"]
 fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| {

@@ -68,6 +68,8 @@ pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };
+pub use recorded::TrackAuditor;
 pub use shortlist::{LISTED, Tally};
 pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;
+pub use tautline_core::{swarm, track};

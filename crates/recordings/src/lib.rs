@@ -14,3 +14,6 @@
 pub mod export;
 pub mod mcap;
 pub mod read;
+
+pub use read::{ReadError, ReadOptions, Recording, open};
+pub use tautline_core::track;

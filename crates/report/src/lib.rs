@@ -13,3 +13,5 @@ pub mod figures;
 pub mod replay;
 pub mod report;
 pub mod run;
+
+pub use tautline_sim::scenario;

@@ -34,6 +34,11 @@ pub mod scenario;
 pub mod sim;
 pub mod vehicle;
 
+pub use link::Link;
+pub use plant::Plant;
 pub use scenario::Scenario;
 pub use sim::Simulation;
+pub use tautline_audit as audit;
+pub use tautline_core::{record, swarm};
 pub use tautline_laws::law::Law;
+pub use tautline_laws::{formation, graph, law, observation, space, target, wind};

@@ -8,7 +8,7 @@ use tautline_audit::recorded::{Motion, Outcome, Settings, audit};
 use crate::recorded::{asked, seen};
 use crate::scenes::{Random, Tracks, exact, exact_place, exact_squared, instants, items, scene};
 
-/// Scenes by default, and of `sh tests/run.sh --long`.
+/// Scenes by default, and with `TAUTLINE_LONG=1`.
 const SCENES: u64 = 60;
 const LONG_SCENES: u64 = 5000;
 

@@ -12,7 +12,7 @@ use tautline_audit::recorded::{ObjectPair, Outcome, Settings, audit};
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Sample};
 
-/// Number of scenes, and of those of `sh tests/run.sh --long`; `TAUTLINE_SCENES` sets another.
+/// Number of scenes, and of those with `TAUTLINE_LONG=1`; `TAUTLINE_SCENES` sets another.
 const SCENES: u64 = 3000;
 const LONG_SCENES: u64 = 20_000;
 /// One of so many scenes is long enough for several windows.

@@ -2,7 +2,7 @@
 //! other's way, without a violation and with no more energy than was promised.
 //!
 //! 2 random starts of each case, 6 of the 60 orderings of the pentagon, and 16 or 27 vehicles where the case is of 100 or 500,
-//! which `sh tests/run.sh --long` flies; `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture`
+//! which `TAUTLINE_LONG=1` flies; `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture`
 //! flies 20 of every case in full, all orderings, and prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
 //! held for as long as it must be, or after 300 s.
 
