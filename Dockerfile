@@ -2,7 +2,7 @@
 FROM rust:1-bookworm AS build
 WORKDIR /tautline
 COPY . .
-RUN cargo build --release --locked --no-default-features --features program
+RUN cargo build --release --locked --package tautline --no-default-features
 
 FROM debian:bookworm-slim
 COPY --from=build /tautline/target/release/tautline /usr/local/bin/tautline

@@ -70,9 +70,9 @@ fn what_is_wrong_inside_a_recording_is_said_with_its_file() {
     assert!(ran.err.contains("flight.csv: vehicle a at 1.0 s"), "{}", ran.err);
 }
 
-/// A bag of `tests/recordings`: two robots 2 m apart, whose odometry drifts.
+/// A bag of `crates/recordings/tests/recordings`: two robots 2 m apart, whose odometry drifts.
 fn bag(name: &str) -> String {
-    format!("{}/tests/recordings/bags/{name}", env!("CARGO_MANIFEST_DIR"))
+    format!("{}/crates/recordings/tests/recordings/bags/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 #[test]

@@ -60,7 +60,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
         let found = number(pointer);
         assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
     };
-    // The reference values, and how far a step of 1/240 s may be from them, are those of tests/flights/reference_flights.rs.
+    // The reference values, and how far a step of 1/240 s may be from them, are those of crates/sim/tests/flights/reference_flights.rs.
     near("/separation/min_m", 2.460_353, 1e-4);
     near("/separation/min_at_s", 2.151, 0.02);
     near("/separation/certified_m", 2.055_307, 1e-5);

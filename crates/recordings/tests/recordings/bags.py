@@ -1,6 +1,6 @@
 """Makes the ROS 2 bags of this folder, with the writer of rosbags 0.11.9 (`pip install rosbags==0.11.9`).
 
-    python3 tests/recordings/bags.py tests/recordings/bags
+    python3 crates/recordings/tests/recordings/bags.py crates/recordings/tests/recordings/bags
 
 The motion is our own: two vehicles that pass each other, a robot that is known through `map -> odom -> base_link`.
 """
