@@ -1,8 +1,8 @@
 //! Scenarios, and the simulation of vehicles in a rigid-body engine under a control law.
 //!
 //! [`Scenario`] is a validated flight, read from TOML or made in code; [`Simulation`] is stepped, saved and loaded. A law of
-//! your own implements [`Law`], a vehicle [`Plant`](plant::Plant), an imperfection between the world and the law
-//! [`Link`](link::Link). Data flows one way:
+//! your own implements [`Law`], a vehicle [`Plant`], an imperfection between the world and the law
+//! [`Link`]. Data flows one way:
 //!
 //! ```text
 //! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples and events
