@@ -11,7 +11,7 @@
 //! | module | holds |
 //! | --- | --- |
 //! | [`scenario`] | the validated flight; `document` holds the keys of its file |
-//! | [`preflight`] | what is known before the first step: stability, certificate, step, traps, rigidity |
+//! | [`preflight`] | checks before a flight: stability, certificate, step, traps, rigidity |
 //! | [`sim`] | the loop |
 //! | [`plant`] | vehicles that hold a command over a step; `rapier` is the physics engine |
 //! | [`vehicle`] | bodies that are more than points: models, forces, rotors, the attitude loop |

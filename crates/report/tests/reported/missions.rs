@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use tautline_audit::Status;
 use tautline_core::record::Event;
-use tautline_core::swarm::{Rows, Swarm, row, separation, set_row};
+use tautline_core::swarm::{Swarm, row, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
@@ -17,6 +17,7 @@ use tautline_sim::sim::Simulation;
 
 use crate::flight::{builtin, fly, read};
 use crate::numbers::Numbers;
+use crate::random_scenarios::places;
 
 /// Three legs on some graph, behind some reference or none, from places at least 1.1 delta apart.
 fn mission(seed: u64) -> Scenario {
@@ -26,17 +27,7 @@ fn mission(seed: u64) -> Scenario {
     let in_space = numbers.unit() < 0.5;
     let delta_m = numbers.over_decades(0.1, 10.0);
     let extent_m = delta_m * numbers.between(2.0, 5.0);
-    let mut start = Rows::zeros(count);
-    for i in 0..count {
-        loop {
-            for axis in 0..if in_space { 3 } else { 2 } {
-                start[(i, axis)] = numbers.between(-extent_m, extent_m);
-            }
-            if (0..i).all(|j| separation(&start, i, j) > 1.1 * delta_m) {
-                break;
-            }
-        }
-    }
+    let start = places(&mut numbers, count, if in_space { 3 } else { 2 }, extent_m, 1.1 * delta_m);
     let mut legs = Vec::new();
     for number in 0..3 {
         let radius_m = delta_m * numbers.between(1.2, 2.0) / (std::f64::consts::PI / count as f64).sin();

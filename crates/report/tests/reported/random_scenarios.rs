@@ -21,6 +21,22 @@ use crate::numbers::Numbers;
 /// the rest length or more there, and what two flights differ by before it is many times larger after it.
 const HARD: f64 = 0.1;
 
+/// Places \[m\], `count` x 3, within `extent_m` of the origin along the first axes, each more than `apart_m` from the others.
+pub(crate) fn places(numbers: &mut Numbers, count: usize, axes: usize, extent_m: f64, apart_m: f64) -> Rows {
+    let mut places_m = Rows::zeros(count);
+    for i in 0..count {
+        loop {
+            for axis in 0..axes {
+                places_m[(i, axis)] = numbers.between(-extent_m, extent_m);
+            }
+            if (0..i).all(|j| separation(&places_m, i, j) > apart_m) {
+                break;
+            }
+        }
+    }
+    places_m
+}
+
 /// 3 to 8 vehicles in the plane or in space, delta and alpha over three decades, a22 from -2 to 0.1, from random places
 /// at least 1.1 delta apart to a circle or a sphere.
 fn scenario(seed: u64) -> Scenario {
@@ -31,17 +47,7 @@ fn scenario(seed: u64) -> Scenario {
     let delta_m = numbers.over_decades(0.03, 30.0);
     let spacing_m = delta_m * numbers.between(1.2, 2.5);
     let extent_m = delta_m * numbers.between(2.0, 5.0);
-    let mut start = Rows::zeros(count);
-    for i in 0..count {
-        loop {
-            for axis in 0..if in_space { 3 } else { 2 } {
-                start[(i, axis)] = numbers.between(-extent_m, extent_m);
-            }
-            if (0..i).all(|j| separation(&start, i, j) > 1.1 * delta_m) {
-                break;
-            }
-        }
-    }
+    let start = places(&mut numbers, count, if in_space { 3 } else { 2 }, extent_m, 1.1 * delta_m);
     let radius_m = 0.5 * spacing_m / (std::f64::consts::PI / count as f64).sin();
     let formation =
         if in_space { Formation::sphere(count, radius_m.max(spacing_m)) } else { Formation::circle(count, radius_m) };
