@@ -1,10 +1,11 @@
 //! tautline flies a swarm into formation inside a rigid-body engine and proves that nothing touched.
 //!
 //! A control law steers N vehicles into a formation; vehicles are rigid bodies in Rapier; an independent judge sweeps
-//! every step of every pair and says whether any two came closer than a safety distance delta. Data flows one way:
+//! every step of every pair and says whether any two came closer than a safety distance delta. This crate re-exports the
+//! crates of the workspace and holds the command line. Data flows one way:
 //!
 //! ```text
-//! scenario -> sim ( sense -> law -> actuate -> plant -> observe ) -> record -> audit / metrics / figures -> report
+//! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples -> report
 //! ```
 //!
 //! # Fly a scenario

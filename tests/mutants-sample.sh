@@ -3,7 +3,7 @@
 # at a time in a copy of the tree, and says which of them no test notices.
 # From anywhere: sh tests/mutants-sample.sh [COUNT [SEED [FROM TO]]], by default 150 and 1. The same sources, count and seed
 # give the same sample, of which FROM and TO choose a part: 61 150 leaves the first 60 out. Most changes are noticed by the
-# quick tests of the core; only what those miss is tried on the slow ones. TAUTLINE_MUTANT_TIMEOUT is how long the tests
+# unit tests of audit, laws and sim; only what those miss is tried on the slow ones. TAUTLINE_MUTANT_TIMEOUT is how long the tests
 # of a change may take [s], by default 100: more on a machine that does other work beside.
 # Leaves out/mutants/ (of a part, out/mutants-FROM-TO/) with sample.txt, caught.txt (by what no longer ends, too),
 # missed.txt and unviable.txt (does not compile), and as it goes quick/ and slow/ as cargo-mutants writes them. Of what is
@@ -17,8 +17,8 @@ to=${4:-$count}
 timeout=${TAUTLINE_MUTANT_TIMEOUT:-100}
 quick="--lib --test=audit --test=bits"
 quick_crates=tautline-audit,tautline-laws,tautline-sim
-slow="--test=flights --test=allocations --test=reported --test=program"
-slow_crates=tautline-sim,tautline-report,tautline
+slow="--test=flights --test=allocations --test=reported --test=claims --test=program"
+slow_crates=tautline-sim,tautline-report,tautline-validate,tautline
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$PWD/target}"
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -36,7 +36,7 @@ cd "$scratch/tree"
 touch crates/*/src/lib.rs
 
 mutants() {
-    cargo mutants --no-shuffle -f 'crates/audit/src/**' -f 'crates/laws/src/law/**' -f 'crates/sim/src/sim/**' \
+    cargo mutants --no-shuffle --package tautline-audit,tautline-laws,tautline-sim -f 'crates/audit/src/**' -f 'crates/laws/src/law/**' -f 'crates/sim/src/sim/**' \
         -f 'crates/sim/src/plant/**' "$@"
 }
 

@@ -1,7 +1,7 @@
 #!/bin/sh
 # All set-up that the tests need, and the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
-# --long adds what takes minutes: the tests that are marked as ignored, release bits, clusters, notebooks, and every command
-# of the docs. TAUTLINE_LONG=1 beside it tries more random cases where a test has many.
+# --long adds what takes minutes: the tests that are marked as ignored, release bits, clusters, notebooks, and the commands
+# of the docs. TAUTLINE_LONG=1 beside it tries more random cases, and the slowest of those commands.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -13,9 +13,13 @@ fi
 
 sh tests/setup.sh
 
-# Debug and release builds fly the same bits: both are compared with the same hashes.
-cargo test "$@" ${long:+-- --include-ignored}
-if [ $# != 0 ]; then exit; fi
+# Flies the golden scenarios in debug; with --long the release build is compared with the same hashes.
+asked=$#
+if [ "$long" ]; then
+    case " $* " in *" -- "*) set -- "$@" --include-ignored ;; *) set -- "$@" -- --include-ignored ;; esac
+fi
+cargo test "$@"
+if [ "$asked" != 0 ]; then exit; fi
 if [ "$long" ]; then cargo test --release -p tautline-sim --test bits; fi
 
 # What is offered to others' continuous integration; campaigns on clusters and every command of the docs, with the program that

@@ -1,4 +1,4 @@
-//! The program, a file a command. The only room that prints.
+//! The command line, one file per command. Only this module prints.
 //!
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.

@@ -1,4 +1,4 @@
-//! Same scenario, same bits: over runs, thread counts and ways to talk. Over builds: `tests/bits.rs`.
+//! Same scenario, same bits: over runs, thread counts and ways to talk. Over builds: `crates/sim/tests/bits.rs`.
 
 use std::fs;
 

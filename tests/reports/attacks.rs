@@ -1,4 +1,4 @@
-//! `docs/attack.md` says what is flown: a seed and a law of it always, the whole tables with `--long`.
+//! `docs/attack.md` says what is flown: a seed and a law of it always, the whole tables with `TAUTLINE_LONG=1`.
 
 #[path = "../support/attacks.rs"]
 mod tables;

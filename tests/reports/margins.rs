@@ -1,4 +1,4 @@
-//! `docs/margins.md` says what is flown: one row of it always, the whole table with `--long`.
+//! `docs/margins.md` says what is flown: one row of it always, the whole table with `TAUTLINE_LONG=1`.
 
 #[path = "../support/margins.rs"]
 mod table;

@@ -1,11 +1,11 @@
-//! What every crate of tautline speaks of, as plain data: the state of a swarm, recorded motion and samples.
+//! Plain data shared by all crates of tautline: the state of a swarm, recorded motion, samples.
 //!
 //! | module | holds |
 //! | --- | --- |
 //! | [`swarm`] | positions and velocities, a row per vehicle and a column per axis |
 //! | [`track`] | recorded motion of any origin: instants, pieces of curves, clocks |
 //! | [`record`] | a flight's samples as they are made, and the traits that receive them |
-//! | [`text`] | numbers as people read them |
+//! | [`text`] | formatting of numbers |
 //!
 //! SI units, named at the end of each name (`clearance_m`). One inertial frame, z up. Vehicles are counted from 0 in code
 //! and from 1 in everything a person reads.
@@ -17,7 +17,7 @@ pub mod swarm;
 pub mod text;
 pub mod track;
 
-/// The program's name, as its artefacts tell who made them.
+/// Name of the program in its artefacts.
 pub const PROGRAM: &str = "tautline";
 
 /// The version of every crate of the program.

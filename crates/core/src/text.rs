@@ -45,8 +45,8 @@ pub fn exact(limit: f64) -> String {
     (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
 }
 
-/// A length \[m\] below `limit_m` with at least three decimals, and as many as it takes to look smaller; by less than anybody
-/// reads it is just below.
+/// Formats `number` \[m\], which is below `limit_m` \[m\], with at least three decimals and as many as it takes to differ
+/// from the limit; `just below ...` within 1e-9 of it.
 #[must_use]
 pub fn metres_below(number: f64, limit_m: f64) -> String {
     const JUST: f64 = 1e-9;
@@ -66,7 +66,7 @@ pub fn metres(number: f64) -> String {
     if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { fixed(number, 3) } else { format!("{number:.1e}") }
 }
 
-/// Words without what turns the order of letters around, which foreign names may hold: it would turn what follows them.
+/// Replaces the control characters that reverse the direction of text by U+FFFD; names in foreign files may hold some.
 #[must_use]
 pub fn in_order(words: &str) -> String {
     const TURNS: [char; 12] = [
@@ -82,7 +82,7 @@ pub fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))
 }
 
-/// A number to so many significant digits, at most 8 of them behind the point.
+/// Formats a number with `digits` significant digits, at most 8 decimals.
 #[must_use]
 pub fn significant(number: f64, digits: u8) -> String {
     let magnitude = if number == 0.0 { 0.0 } else { number.abs().log10().floor() };
@@ -92,6 +92,9 @@ pub fn significant(number: f64, digits: u8) -> String {
 }
 
 /// Rows of cells as columns.
+///
+/// # Panics
+/// Where a row has fewer cells than the first.
 pub fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let widths: Vec<_> = (0..columns).map(|k| rows.iter().map(|row| row[k].len()).max().unwrap_or(0)).collect();
@@ -108,7 +111,7 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Decimals that the multiples of a step of 1, 2 or 5 times a power of ten need, at most so many.
+/// Number of decimals, at most `most`, that the multiples of `step` need; a step is 1, 2 or 5 times a power of ten.
 #[must_use]
 pub fn decimals_of(step: f64, most: u8) -> usize {
     /// Rounding must not take a step for the next smaller power.
@@ -145,7 +148,7 @@ pub fn as_toml(value: f64) -> String {
     if value.abs() < WHOLE { value.to_string() } else { format!("{value:?}") }
 }
 
-/// So many of a thing.
+/// Formats a count with its noun: `1 vehicle`, `2 vehicles`.
 #[must_use]
 pub fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })

@@ -1,9 +1,9 @@
-//! Formation control laws, and what they are about: graphs, obstacles, wind, formations, targets and what a vehicle knows.
+//! Formation control laws, with graphs, formations, targets, obstacles and wind.
 //!
 //! | module | holds |
 //! | --- | --- |
 //! | [`law`] | a file a law: its keys, bounds, energy and certificate; [`law::Law`] is the trait for one of your own |
-//! | [`observation`] | what a law is told: own state, what was heard and seen of others, target |
+//! | [`observation`] | input of a law: own state, received and sensed states of other vehicles, target |
 //! | [`graph`] | which vehicles exchange states: Laplacians, algebraic connectivity |
 //! | [`formation`] | target shapes, desired distances, the error of a shape up to a rigid motion |
 //! | [`target`] | legs of formations, what counts as reached, which vehicle flies to which slot |

@@ -111,7 +111,7 @@ impl Picture for Held {
 }
 
 impl Neighbour {
-    /// A row of a swarm.
+    /// State of vehicle `j` of a swarm, `age_s` old \[s\].
     #[must_use]
     pub fn of(swarm: &Swarm, j: usize, age_s: f64) -> Self {
         Self { position_m: row(&swarm.positions_m, j), velocity_m_s: row(&swarm.velocities_m_s, j), age_s }

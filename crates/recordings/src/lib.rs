@@ -1,4 +1,4 @@
-//! Recordings: those of any origin as tracks, those of this program, and exports to other formats.
+//! Reads recordings of any origin as tracks, writes and reads `run.mcap`, and exports to other formats.
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -6,8 +6,8 @@
 //! | [`mcap`] | `run.mcap`, written as a flight goes and read back |
 //! | [`export`] | recordings written in other formats, one file a format |
 //!
-//! Recordings are read, not trusted: a reader's memory grows with bytes that are really in the file, never with a length
-//! that the file claims. What a file leaves open is asked of the user and never guessed.
+//! Memory grows with the bytes read, not with lengths that a file claims. Ambiguous input is an error that names the option
+//! to set.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 

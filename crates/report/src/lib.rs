@@ -2,7 +2,7 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`run`] | a scenario, flown to its report |
+//! | [`run`] | flies a scenario and returns its report |
 //! | [`report`] | `report.json`, `report.html` and the verdict in words |
 //! | [`figures`] | a run as charts in SVG |
 //! | [`replay`] | a flight packed into a page: positions on a grid, links, slots, obstacles and what the judge found |

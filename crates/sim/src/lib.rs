@@ -17,9 +17,9 @@
 //! | [`vehicle`] | bodies that are more than points: models, forces, rotors, the attitude loop |
 //! | [`link`] | imperfections between truth and law: radio, sensing, actuation |
 //! | [`continuous`] | the equations of motion solved, for points with the law inside |
-//! | [`feedback`] | the closed loop as vehicles see it: what they are commanded in a state |
+//! | [`feedback`] | commands of the closed loop as a function of the state |
 //! | [`metrics`] | numbers folded from recorded samples |
-//! | [`plan`] | what a flight is after: its formations, how they lie over the swarm, how hard an edge pulls |
+//! | [`plan`] | formations of a flight, their placement over the swarm, and edge tensions |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 

@@ -1,4 +1,4 @@
-//! Every build flies the same bits: debug or release, the core alone or with everything.
+//! Debug and release builds fly the same bits.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;

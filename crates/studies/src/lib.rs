@@ -1,4 +1,4 @@
-//! Many flights with one answer.
+//! Studies of many flights: comparisons, margins, attacks, campaigns, rare events.
 //!
 //! | module | answers |
 //! | --- | --- |

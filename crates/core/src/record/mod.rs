@@ -1,4 +1,4 @@
-//! A run's samples as they are made, and the files that hold them.
+//! Samples of a run, and the traits that receive them.
 //!
 //! A recorder knows the state of a swarm and nothing of laws, plants or judges.
 //! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.

@@ -14,7 +14,7 @@ pub struct Normals {
 }
 
 impl Normals {
-    /// Those of a seed; each stream of it is independent of the others.
+    /// Generator of a seed and a stream; streams are independent.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -22,7 +22,7 @@ impl Normals {
         Self { random, second: None }
     }
 
-    /// The next number.
+    /// The next normal number (mean 0, variance 1).
     #[expect(clippy::should_implement_trait, reason = "it never ends, and is no Option")]
     pub fn next(&mut self) -> f64 {
         if let Some(second) = self.second.take() {

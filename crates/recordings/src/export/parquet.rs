@@ -21,9 +21,11 @@ const GROUP_ROWS: usize = 200_000;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
     let schema = schema(about).map_err(write_error)?;
-    let mut properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .set_created_by(concat!("tautline ", env!("CARGO_PKG_VERSION")).to_owned());
+    let mut properties = WriterProperties::builder().set_compression(Compression::SNAPPY).set_created_by(format!(
+        "{} {}",
+        tautline_core::PROGRAM,
+        tautline_core::VERSION
+    ));
     if about.clock.epoch_ns != 0 {
         let epoch = KeyValue::new(EPOCH_KEY.to_owned(), about.clock.epoch_ns.to_string());
         properties = properties.set_key_value_metadata(Some(vec![epoch]));

@@ -1,7 +1,7 @@
 //! Recordings of any origin as a stream of [`Item`](tautline_core::track::Item)s.
 //!
 //! [`open`] recognises the format by the content of the file and gives a [`Tracks`](tautline_core::track::Tracks): items in order of time, a clock, and
-//! what a person should know. A format is a file of this room that turns its content into rows or into pieces of curves;
+//! what a person should know. A format is a file of this module that turns its content into rows or into pieces of curves;
 //! order, clocks and limits are the same for all.
 //!
 //! Memory is bounded by what is read at a time, not by the file: a recording in order of time is streamed. One that is

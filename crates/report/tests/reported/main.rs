@@ -8,6 +8,7 @@ mod numbers;
 
 mod missions;
 mod random_scenarios;
+mod recorded;
 mod rivals;
 mod steps;
 mod verdicts;

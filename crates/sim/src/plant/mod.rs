@@ -1,7 +1,7 @@
 //! Bodies that carry out the commanded accelerations.
 //!
-//! A [`Plant`] holds the true state of the swarm and knows nothing of laws. [`rapier`] flies rigid bodies in a physics
-//! engine and is the only room that names it.
+//! A [`Plant`] holds the true state of the swarm; it depends on no law. [`rapier`] flies rigid bodies in a physics engine;
+//! only that module uses the engine.
 
 mod air;
 mod path;

@@ -36,8 +36,8 @@ fn name_of<'a>(table: Option<&str>, key: &'a str) -> &'a str {
 /// `plant.kind=ideal`. Entries of a list are counted from 1, as vehicles are, and `x`, `y`, `z` are other names
 /// for 1, 2, 3: `start.positions_m.4.x=-1` moves vehicle 4. The value is TOML, and a bare word is a string. A whole
 /// table is replaced by an inline table: `formation={shape="circle", radius_m=3}`. Another `kind` or `shape` leaves the
-/// keys behind that it does not have: `law.kind=laplacian` is enough where the file gives `law.alpha`. Which keys these are
-/// the schema knows: without the feature `schema` such a key is refused, and the whole table must be given.
+/// keys behind that it does not have: `law.kind=laplacian` is enough where the file gives `law.alpha`. The
+/// JSON Schema lists the keys of each `kind` and `shape`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Override {
     text: String,

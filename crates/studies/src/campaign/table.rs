@@ -143,7 +143,7 @@ impl<'a> Table<'a> {
         let about = KeyValue::new("tautline.campaign".to_owned(), campaign.manifest().campaign.clone());
         let properties = WriterProperties::builder()
             .set_compression(Compression::SNAPPY)
-            .set_created_by(concat!("tautline ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_created_by(format!("{} {}", tautline_core::PROGRAM, tautline_core::VERSION))
             .set_key_value_metadata(Some(vec![about]));
         let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))?;
         Ok(Self { writer, columns, rows: Vec::new() })

@@ -1,4 +1,4 @@
-//! Rigid bodies in Rapier, in double precision: the only room that names the engine.
+//! Rigid bodies in Rapier, in double precision. Only this module uses the engine.
 //!
 //! Each vehicle is a dynamic body with rotations locked, no gravity and two ball colliders: the **hull** (the vehicle's
 //! real radius; hulls collide and bounce) and the **keep-out** ball of radius delta/2 (reports contacts, never pushes); in an
