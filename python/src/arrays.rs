@@ -45,7 +45,7 @@ impl<'a> Arrays<'a> {
         let wrong = |place: String, problem: String, remedy: &str| ReadError {
             file: "arrays".to_owned(),
             place: Some(Place::Part(place)),
-            fault: Fault::Content { problem, remedy: remedy.to_owned() },
+            fault: Fault::Content { code: "recording/content", problem, remedy: remedy.to_owned() },
         };
         if !time_s.is_finite() {
             return Err(wrong(format!("t[{k}]"), format!("it is {time_s}"), "times are finite: take the instant out"));

@@ -1,19 +1,21 @@
 //! Audits of arrays and of files.
 
-use std::sync::Arc;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use numpy::ndarray::{Ix1, Ix3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use tautline::audit::recorded::{self, Settings};
-use tautline::cli::{self, Held, OwnRecording};
 use tautline::report::recorded::RecordedReport;
+use tautline::request::audit::Open;
+use tautline::request::{self, Failure, Monitor as _, OwnRecording, Silent, Subject};
 use tautline::track::Tracks as _;
 
 use crate::arrays::{Arrays, notes_of_absence};
-use crate::errors::{Raised, broken, wrong};
+use crate::errors::{Raised as _, broken, wrong};
 use crate::numbers::{borrowed, shown};
+use crate::request::{Question, ReadOptions};
 use crate::work::away;
 
 /// The verdict in words, the headline, the summary, and the report as JSON.
@@ -72,25 +74,37 @@ impl<'py> Given<'py> {
     }
 }
 
-/// Judges arrays of positions as the words of `tautline audit` ask.
+/// Judges a recording; several paths are one, with a vehicle in each. A page is written where `html` names one.
+#[pyfunction]
+pub(crate) fn audit_files(
+    py: Python<'_>,
+    question: &Question,
+    command: &str,
+    paths: Vec<PathBuf>,
+    options: &ReadOptions,
+    html: Option<PathBuf>,
+) -> PyResult<Judged> {
+    let subject = Subject::Files { paths, options: options.0.clone() };
+    let monitor = Silent::default();
+    let request = question.request(subject, command, html);
+    let audited = away(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
+    judged(&audited.map_err(Failure::raised)?.report)
+}
+
+/// Judges arrays of positions.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
-#[pyo3(signature = (words, command, times, positions, velocities, names, seen))]
-pub(crate) fn audit<'py>(
+pub(crate) fn audit_arrays<'py>(
     py: Python<'py>,
-    words: Vec<String>,
+    question: &Question,
     command: &str,
-    times: Option<&Bound<'py, PyAny>>,
-    positions: Option<&Bound<'py, PyAny>>,
+    times: &Bound<'py, PyAny>,
+    positions: &Bound<'py, PyAny>,
     velocities: Option<&Bound<'py, PyAny>>,
     names: Vec<String>,
     seen: Option<&Seen>,
+    html: Option<PathBuf>,
 ) -> PyResult<Judged> {
-    let interrupted = Arc::default();
-    let (Some(times), Some(positions)) = (times, positions) else {
-        let report = away(py, &interrupted, || cli::judge(&words, None, &interrupted))?;
-        return judged(&report.map_err(Raised::raised)?);
-    };
     let given = Given::new(times, positions, velocities)?;
     if names.len() != given.positions.shape()[1] {
         return Err(wrong(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));
@@ -103,12 +117,14 @@ pub(crate) fn audit<'py>(
     let notes: Vec<String> = plane.into_iter().chain(notes_of_absence(positions, &names)).collect();
     let arrays = Arrays::new(times, positions, velocities, &names, &notes);
     let own = seen.map(|seen| &seen.0);
+    let monitor = Silent::default();
     let work = || {
-        let held = Held { command, own, open: &|| Ok(Box::new(arrays.clone())) };
-        cli::judge(&words, Some(&held), &interrupted)
+        let open: &Open<'_> = &|| Ok(Box::new(arrays.clone()));
+        let subject = Subject::Held { name: "arrays", own, open };
+        request::audit_files(&question.request(subject, command, html), &monitor)
     };
-    let report = away(py, &interrupted, work)?;
-    judged(&report.map_err(Raised::raised)?)
+    let audited = away(py, monitor.interruption(), work)?;
+    judged(&audited.map_err(Failure::raised)?.report)
 }
 
 /// How long the library takes in Rust \[s\] to judge the same positions, at first as items that it made before, then with the

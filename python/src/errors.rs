@@ -3,8 +3,8 @@
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use tautline::cli::Refusal;
 use tautline::preflight::Preflight;
+use tautline::request::Failure;
 use tautline::scenario::ScenarioError;
 use tautline::sim::SimError;
 
@@ -36,15 +36,23 @@ pub(crate) trait Raised {
     fn raised(self) -> PyErr;
 }
 
-impl Raised for Refusal {
+impl Raised for Failure {
     fn raised(self) -> PyErr {
-        if self.is_machine { PyOSError::new_err(self.message) } else { wrong(self.message) }
+        let text = self.to_string();
+        if self.is_machine() { PyOSError::new_err(text) } else { coded(wrong(text), self.code()) }
     }
+}
+
+/// The exception with the stable name of the problem as its attribute `code`.
+fn coded(error: PyErr, code: &str) -> PyErr {
+    // Without the attribute the exception says the same in words.
+    Python::attach(|py| error.value(py).setattr("code", code).ok());
+    error
 }
 
 impl Raised for ScenarioError {
     fn raised(self) -> PyErr {
-        wrong(self.to_string())
+        coded(wrong(self.to_string()), self.code())
     }
 }
 

@@ -6,11 +6,13 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::cli::{Film, RunHistory, Witness, flight_page, run_verdict};
+use tautline::figures::RunHistory;
 use tautline::mcap::{Header, McapRecorder};
 use tautline::preflight::Preflight;
 use tautline::record::{Event, RecordError, Sample, Sink};
+use tautline::replay::Film;
 use tautline::report::Report;
+use tautline::request::{Witness, flight_page, run_verdict};
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Ending, Parts, SimError};
 

@@ -15,8 +15,10 @@ mod numbers;
 mod observation;
 mod program;
 mod read;
+mod request;
 mod scenario;
 mod simulation;
+mod studies;
 mod work;
 
 use pyo3::prelude::*;
@@ -25,7 +27,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::audit::{Seen, audit, audit_in_rust};
+    use super::audit::{Seen, audit_arrays, audit_files, audit_in_rust};
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
@@ -33,13 +35,17 @@ mod _native {
     #[pymodule_export]
     use super::observation::Observation;
     #[pymodule_export]
-    use super::program::{call, main};
+    use super::program::main;
     #[pymodule_export]
     use super::read::{Columns, read};
+    #[pymodule_export]
+    use super::request::{Question, ReadOptions};
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]
     use super::simulation::Simulation;
+    #[pymodule_export]
+    use super::studies::{attack, campaign, compare, export, margin, scenarios, validate};
 
     /// A campaign knows by this file what flew it, and not by the interpreter's.
     #[pymodule_init]

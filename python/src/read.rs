@@ -1,16 +1,18 @@
 //! Recordings as columns.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
-use tautline::cli::{self, Refusal};
 use tautline::read::ReadError;
+use tautline::request::{Failure, audit};
 use tautline::track::{Item, Piece, Sample};
 
 use crate::errors::{Raised as _, wrong};
 use crate::numbers::{cube, vectors};
+use crate::request::ReadOptions;
 use crate::work::away;
 
 /// A recording in memory: M samples and K pieces of curves, each in order of time.
@@ -52,18 +54,16 @@ struct Read {
     pieces: Vec<Piece>,
 }
 
-/// Reads a recording as the words of `tautline audit` say.
+/// Reads a recording; several paths are one, with a vehicle in each.
 #[pyfunction]
-pub(crate) fn read(py: Python<'_>, words: Vec<String>) -> PyResult<Columns> {
+pub(crate) fn read(py: Python<'_>, paths: Vec<PathBuf>, options: &ReadOptions) -> PyResult<Columns> {
     let interrupted = Arc::default();
-    away(py, &interrupted, || all(&words, &interrupted))??.columns(py)
+    away(py, &interrupted, || all(&paths, &options.0, &interrupted))??.columns(py)
 }
 
-fn all(words: &[String], interrupted: &AtomicBool) -> PyResult<Read> {
-    let failed = |error: ReadError| {
-        Refusal { is_machine: error.is_machine(), message: format!("{error} ({})", error.help()) }.raised()
-    };
-    let mut recording = cli::open(words).map_err(Refusal::raised)?;
+fn all(paths: &[PathBuf], options: &tautline::read::ReadOptions, interrupted: &AtomicBool) -> PyResult<Read> {
+    let failed = |error: ReadError| Failure::from(error).raised();
+    let mut recording = audit::open(paths, options).map_err(failed)?;
     let (mut read, mut items) = (Read::default(), Vec::new());
     while recording.read(&mut items).map_err(failed)? {
         if interrupted.load(Ordering::Relaxed) {

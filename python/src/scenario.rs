@@ -3,6 +3,7 @@
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautline::preflight::Preflight;
+use tautline::request::ScenarioRequest;
 use tautline::scenario::{self, Override, Source};
 
 use crate::errors::{Raised as _, json, wrong};
@@ -13,6 +14,8 @@ use crate::work::here;
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Scenario {
     pub(crate) scenario: scenario::Scenario,
+    /// Where it comes from, for studies that vary it.
+    pub(crate) request: ScenarioRequest,
 }
 
 #[pymethods]
@@ -21,12 +24,16 @@ impl Scenario {
     #[new]
     fn new(py: Python<'_>, source: String, is_text: bool, overrides: Vec<String>) -> PyResult<Self> {
         let read = || {
-            let overrides = overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-            let name = || "TOML".to_owned();
-            let source = if is_text { Source::Text { name: name(), text: source } } else { Source::resolve(&source)? };
-            scenario::Scenario::read(&source, &overrides)
+            let parsed = overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+            let (argument, source) = if is_text {
+                ("-".to_owned(), Source::Text { name: "TOML".to_owned(), text: source })
+            } else {
+                (source.clone(), Source::resolve(&source)?)
+            };
+            let scenario = scenario::Scenario::read(&source, &parsed)?;
+            Ok(Self { scenario, request: ScenarioRequest { argument, source, overrides } })
         };
-        Ok(Self { scenario: here(py, read)?.map_err(scenario::ScenarioError::raised)? })
+        here(py, read)?.map_err(scenario::ScenarioError::raised)
     }
 
     #[getter]

@@ -15,9 +15,31 @@ from numpy.typing import NDArray
 from . import _display, _native
 from ._native import Error
 from ._tables import Findings
-from ._words import PathLike, by_name, listed, number, numbers, of_each, options, path, paths, reading, with_files
+from ._words import (
+    PathLike,
+    by_vehicle,
+    flag,
+    listed,
+    maybe,
+    maybe_count,
+    maybe_path,
+    of_vehicles,
+    one_recording,
+    path,
+    paths,
+    reading,
+    text,
+    three,
+    with_files,
+)
 
 Judged = tuple[str, str, str, str]
+
+#: Arguments of a question, in the order in which a page repeats them.
+SHOWN = (
+    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "accel_window", "config", "from_s",
+    "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap", "require_presence", "independent",
+)  # fmt: skip
 
 
 class ViolationError(Error):
@@ -152,7 +174,7 @@ class Audit:
         # At first without a page: that of another verdict must not take the place of this one's.
         if self._again()[3] != self._json:
             raise Error(changed)
-        if self._again(f"--html={page}")[3] != self._json:
+        if self._again(page)[3] != self._json:
             raise Error(f"{changed}; {page} is of what it has become")
 
     def raise_for_violation(self, allow_undecided: bool = False) -> None:
@@ -240,37 +262,56 @@ def audit(
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
     wrong with the input. docs/audit.md says what each verdict means.
     """
-    asked = inspect.signature(reading).parameters
-    if unknown := [word for word in read_as if word not in asked]:
+    asked = shown(locals()) | read_as
+    if unknown := [word for word in read_as if word not in inspect.signature(reading).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
-    words = ["audit"]
-    words += [] if delta is None else [f"--delta={number(delta, 'delta')}"]
-    words += options(motion=motion, expect_vehicles=expect_vehicles)
-    words += of_each("--max-accel", max_accel, "max_accel") + of_each("--radius", radius, "radius")
-    words += [] if ellipsoid is None else [f"--ellipsoid={numbers(ellipsoid, 'ellipsoid')}"]
-    words += ["--no-config"] if config is False else []
-    words += ["--require-presence"] if require_presence else []
-    words += ["--independent"] if independent else []
-    files = {"obstacles": obstacles, "fence": fence, "config": None if config is False else config}
-    given = [path(file, what) for what, file in files.items() if file is not None]
-    words += [f"--{what}={path(file, what)}" for what, file in files.items() if file is not None]
-    words += [f"--limit={what}={number(most, 'limit')}" for what, most in by_name(limit, "limit").items()]
-    for option, value in (("from", from_s), ("to", to_s), ("above", above), ("max-gap", max_gap), ("accel-window", accel_window)):
-        words += [] if value is None else [f"--{option}={number(value, option)}"]
-    if ids is not None:
-        judged = listed(ids, "ids")
-        if not judged:
-            raise Error("ids: nobody is named; leave it out to judge everybody")
-        words += [f"--ids={quoted(name)}" for name in judged]
-    words += [f"--offset={name}={number(seconds, 'offset')}" for name, seconds in by_name(offset, "offset").items()]
+    if ids is not None and not listed(ids, "ids"):
+        raise Error("ids: nobody is named; leave it out to judge everybody")
+    # Beside arrays there is no folder to find a file of settings in.
+    looks_for_config = config is None and positions is None
+    question = _native.Question(
+        delta=maybe(delta, "delta"),
+        motion=text(motion, "motion"),
+        max_accel=of_vehicles(max_accel, "max_accel"),
+        radius=of_vehicles(radius, "radius"),
+        ellipsoid=three(ellipsoid, "ellipsoid"),
+        obstacles=maybe_path(obstacles, "obstacles"),
+        limit=by_vehicle(limit, "limit"),
+        fence=maybe_path(fence, "fence"),
+        accel_window=maybe(accel_window, "accel_window"),
+        config=None if config is False else maybe_path(config, "config"),
+        has_config=looks_for_config,
+        from_s=maybe(from_s, "from_s"),
+        to_s=maybe(to_s, "to_s"),
+        above=maybe(above, "above"),
+        ids=None if ids is None else listed(ids, "ids"),
+        offset=by_vehicle(offset, "offset"),
+        expect_vehicles=maybe_count(expect_vehicles, "expect_vehicles"),
+        max_gap=maybe(max_gap, "max_gap"),
+        require_presence=flag(require_presence, "require_presence"),
+        independent=flag(independent, "independent"),
+    )
+    given = [os.fspath(file) for file in (obstacles, fence, None if config is False else config) if file is not None]
     if positions is None:
-        return of_files(words + reading(**read_as), t, given, velocities is not None or names is not None)
+        return of_files(question, call(repr(t), asked), t, read_as, given, velocities is not None or names is not None)
     layout = read_as.pop("layout", None)
     if layout is not None:
         positions, velocities = (of if of is None else laid_out(of, layout) for of in (positions, velocities))
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
-    return with_files(given, lambda: of_arrays(words, t, positions, velocities, names, _seen))
+    command = call("t, positions", asked)
+    return with_files(given, lambda: of_arrays(question, command, t, positions, velocities, names, _seen))
+
+
+def shown(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of a question that are given."""
+    given = {name: arguments[name] for name in SHOWN if arguments[name] is not None}
+    return {name: value for name, value in given.items() if value is not False or name == "config"}
+
+
+def call(first: str, asked: Mapping[str, Any]) -> str:
+    """The call that judges again, for a page."""
+    return f"tautline.audit({first}{''.join(f', {name}={value!r}' for name, value in asked.items())})"
 
 
 def laid_out(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
@@ -284,23 +325,29 @@ def laid_out(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
     return array.transpose([axes.index(axis) for axis in usual])
 
 
-def of_files(words: list[str], t: object, beside: list[str], has_more: bool) -> Audit:
+def of_files(
+    question: _native.Question, command: str, t: object, read_as: Mapping[str, Any], beside: list[str], has_more: bool
+) -> Audit:
     if isinstance(t, np.ndarray):
         raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
     if has_more:
         raise TypeError("velocities and names belong to arrays, and a recording is given")
-    files = paths(t, "t")
-    inputs = files + beside
+    files, options = one_recording(paths(t, "t"), read_as), reading(**read_as)
 
-    def judged(*more: str) -> Judged:
-        ask = [*words, *more, "--", *files]
-        return with_files(inputs, lambda: _native.audit(ask, "", None, None, None, [], None))
+    def judged(html: str | None = None) -> Judged:
+        return with_files(files + beside, lambda: _native.audit_files(question, command, files, options, html))
 
     return Audit(judged(), judged)
 
 
 def of_arrays(
-    words: list[str], t: Any, positions: Any, velocities: Any, names: Sequence[str] | None, seen: _native.Seen | None = None
+    question: _native.Question,
+    command: str,
+    t: Any,
+    positions: Any,
+    velocities: Any,
+    names: Sequence[str] | None,
+    seen: _native.Seen | None = None,
 ) -> Audit:
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
@@ -308,10 +355,9 @@ def of_arrays(
     called = [str(number) for number in range(1, count + 1)] if names is None else listed(names, "names")
     if len(set(called)) < len(called):
         raise Error("names: two vehicles have the same name")
-    command = " ".join(["tautline.audit(t, positions)", "#", *words[1:]]) if words[1:] else "tautline.audit(t, positions)"
 
-    def judged(*more: str) -> Judged:
-        return _native.audit([*words, *more, "arrays"], command, t, positions, velocities, called, seen)
+    def judged(html: str | None = None) -> Judged:
+        return _native.audit_arrays(question, command, t, positions, velocities, called, seen, html)
 
     return Audit(judged(), judged)
 
@@ -319,12 +365,7 @@ def of_arrays(
 def elsewhere(judged: Judged) -> Audit:
     """A judgement that was made in another process, or before."""
 
-    def again(*more: str) -> Judged:
+    def again(html: str | None = None) -> Judged:
         raise Error("what was judged is not at hand here: write the page where it was judged")
 
     return Audit(judged, again)
-
-
-def quoted(name: str) -> str:
-    """A name as the command line takes it in a list between commas."""
-    return '"' + str(name).replace('"', '""') + '"'

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import _native
 from ._program import Answer
-from ._words import PathLike, number, options, path, with_files
+from ._words import PathLike, count, maybe, maybe_count, maybe_path, path, with_files
 
 if TYPE_CHECKING:
     import pandas
@@ -51,9 +50,8 @@ def campaign(
     Raises ``FileNotFoundError`` for a missing specification, :class:`Error` for what is wrong in it.
     """
     file = path(spec, "spec")
-    folder = Path("out") / Path(file).stem if out is None else Path(os.fspath(out))
-    words = ["campaign", "run", "--json", f"--out={folder}", *options(shards=shards, threads=threads, worst=worst)]
-    words += [] if until_width is None else [f"--until-width={number(until_width, 'until_width')}"]
-    words += [] if until_decided is None else [f"--until-decided={number(until_decided, 'until_decided')}"]
-    is_good, text = with_files([file], lambda: _native.call([*words, "--", file]))
-    return Campaign(is_good, text, folder.absolute())
+    folder, many = maybe_path(out, "out"), (maybe_count(shards, "shards"), maybe_count(threads, "threads"))
+    until = maybe(until_width, "until_width"), maybe(until_decided, "until_decided")
+    flown = with_files([file], lambda: _native.campaign(file, folder, *many, *until, count(worst, "worst")))
+    is_good, text, at = flown
+    return Campaign(is_good, text, Path(at).absolute())

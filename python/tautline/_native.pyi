@@ -9,19 +9,31 @@ __all__ = [
     "Error",
     "Flown",
     "Observation",
+    "Question",
+    "ReadOptions",
     "Scenario",
     "Seen",
     "Simulation",
-    "audit",
+    "attack",
+    "audit_arrays",
+    "audit_files",
     "audit_in_rust",
-    "call",
+    "campaign",
+    "compare",
+    "export",
     "fly",
     "main",
+    "margin",
     "read",
+    "scenarios",
+    "validate",
 ]
 
 class Error(ValueError):
     """The input is wrong: the message names the place, the value and the remedy, as the command line does."""
+
+    #: The stable name of the problem, such as ``audit/no-limit``, where the library found it.
+    code: str
 
 @final
 class Observation:
@@ -182,19 +194,139 @@ class Columns:
     @property
     def piece_coefficients(self) -> NDArray[np.float64]: ...
 
-def audit(
-    words: Sequence[str],
+_Judged = tuple[str, str, str, str]
+_Answered = tuple[bool, str]
+_OfVehicles = tuple[float | None, Sequence[tuple[str, float]]]
+
+@final
+class ReadOptions:
+    def __new__(
+        cls,
+        *,
+        format: str | None,
+        time_unit: str | None,
+        fps: float | None,
+        time_scale: float | None,
+        sort: bool,
+        duplicates: str | None,
+        one_vehicle: bool,
+        scale: Sequence[float] | None,
+        axes: str | None,
+        dimensions: str | None,
+        column: Sequence[tuple[str, str]],
+        start: Sequence[tuple[str, Sequence[float]]],
+        layout: str | None,
+        frame: str | None,
+        topic: Sequence[str],
+        origin: Sequence[float] | None,
+        allow_unfinished: bool,
+    ) -> ReadOptions: ...
+
+@final
+class Question:
+    def __new__(
+        cls,
+        *,
+        delta: float | None,
+        motion: str | None,
+        max_accel: _OfVehicles,
+        radius: _OfVehicles,
+        ellipsoid: Sequence[float] | None,
+        obstacles: str | None,
+        limit: Sequence[tuple[str, float]],
+        fence: str | None,
+        accel_window: float | None,
+        config: str | None,
+        has_config: bool,
+        from_s: float | None,
+        to_s: float | None,
+        above: float | None,
+        ids: Sequence[str] | None,
+        offset: Sequence[tuple[str, float]],
+        expect_vehicles: int | None,
+        max_gap: float | None,
+        require_presence: bool,
+        independent: bool,
+    ) -> Question: ...
+
+def attack(
+    scenario: Scenario,
+    start: float | None,
+    velocity: float | None,
+    apart: float | None,
+    vary: Sequence[tuple[str, float, float]],
+    flights: int,
+    seeds: int,
+    method: str,
+    seed: int,
+    out: str | None,
+    csv: str | None,
+    html: str | None,
+    force: bool,
+    threads: int | None,
+) -> _Answered: ...
+def audit_arrays(
+    question: Question,
     command: str,
-    times: Any | None,
-    positions: Any | None,
+    times: Any,
+    positions: Any,
     velocities: Any | None,
     names: Sequence[str],
     seen: Seen | None,
-) -> tuple[str, str, str, str]: ...
+    html: str | None,
+) -> _Judged: ...
+def audit_files(
+    question: Question, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
+) -> _Judged: ...
 def audit_in_rust(times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float) -> tuple[float, float]: ...
-def call(words: Sequence[str], text: str | None = None) -> tuple[bool, str]: ...
+def campaign(
+    spec: str,
+    out: str | None,
+    shards: int | None,
+    threads: int | None,
+    until_width: float | None,
+    until_decided: float | None,
+    worst: int,
+) -> tuple[bool, str, str]: ...
+def compare(
+    scenario: Scenario,
+    laws: Sequence[str] | None,
+    runs: int,
+    seed: int,
+    csv: str | None,
+    latex: str | None,
+    html: str | None,
+    force: bool,
+    threads: int | None,
+) -> _Answered: ...
+def export(
+    paths: Sequence[str],
+    options: ReadOptions,
+    output: str,
+    to: str | None,
+    sample_hz: float | None,
+    force: bool,
+) -> None: ...
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
 ) -> Flown: ...
 def main(arguments: Sequence[str]) -> int: ...
-def read(words: Sequence[str]) -> Columns: ...
+def margin(
+    scenario: Scenario,
+    key: str,
+    start: float,
+    stop: float,
+    runs: int,
+    seed: int,
+    verdict: str,
+    scan: int,
+    halvings: int,
+    logarithmic: bool,
+    csv: str | None,
+    html: str | None,
+    force: bool,
+    threads: int | None,
+) -> _Answered: ...
+def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
+def scenarios() -> list[str]: ...
+def validate(out: str, force: bool, threads: int | None) -> _Answered: ...

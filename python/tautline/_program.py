@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -13,7 +12,23 @@ from typing import Any
 from . import _display, _native
 from ._scenario import Scenario, scenario_of
 from ._tables import Finding, Findings, cell
-from ._words import PathLike, by_name, files, flags, listed, number, options, path, paths, reading, with_files
+from ._words import (
+    PathLike,
+    by_name,
+    count,
+    flag,
+    listed,
+    maybe,
+    maybe_count,
+    maybe_path,
+    number,
+    one_recording,
+    path,
+    paths,
+    reading,
+    text,
+    with_files,
+)
 
 
 class Answer(Finding):
@@ -66,17 +81,17 @@ def export(
     that exists is overwritten with ``force``. ``read_as`` is as in :func:`tautline.audit`. Raises as :func:`tautline.read`, and ``OSError`` where the file
     cannot be written.
     """
-    recordings = paths(recording, "recording")
-    format = read_as.pop("format", None)
-    words = ["export", f"--output={path(output, 'output')}", *options(format=to, input_format=format), *flags(force=force)]
-    words += [] if sample_hz is None else [f"--sample-hz={number(sample_hz, 'sample_hz')}"]
-    words += [*reading(**read_as), "--", *recordings]
-    with_files(recordings, lambda: _native.call(words))
+    recordings = one_recording(paths(recording, "recording"), read_as)
+    options, target = reading(**read_as), path(output, "output")
+    how = text(to, "to"), maybe(sample_hz, "sample_hz"), flag(force, "force")
+    with_files(recordings, lambda: _native.export(recordings, options, target, *how))
 
 
-def asked(command: str, scenario: Scenario | PathLike, set: Mapping[str, Any] | None, words: list[str]) -> Answer:
-    """Asks a command about a scenario."""
-    return Answer(*scenario_of(scenario, set)._ask([command, "--json=-", *words]))
+def asked(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _native.Scenario:
+    """The scenario of a study, as its file says it now."""
+    found = scenario_of(scenario, set)
+    found._check_unchanged()
+    return found._native
 
 
 def compare(
@@ -97,9 +112,19 @@ def compare(
     Laws are kinds or names of tables ``[laws.NAME]``; all that the scenario has unless given. Files that exist are overwritten
     with ``force``.
     """
-    words = options(runs=runs, seed=seed, threads=threads) + files(csv=csv, latex=latex, html=html) + flags(force=force)
-    words += [] if laws is None else [f"--laws={','.join(listed(laws, 'laws'))}"]
-    return asked("compare", scenario, set, words)
+    return Answer(
+        *_native.compare(
+            asked(scenario, set),
+            laws=None if laws is None else listed(laws, "laws"),
+            runs=count(runs, "runs"),
+            seed=count(seed, "seed"),
+            csv=maybe_path(csv, "csv"),
+            latex=maybe_path(latex, "latex"),
+            html=maybe_path(html, "html"),
+            force=flag(force, "force"),
+            threads=maybe_count(threads, "threads"),
+        )
+    )
 
 
 def margin(
@@ -122,10 +147,24 @@ def margin(
 ) -> Answer:
     """How much of one key a verdict (``pass``, ``clear``, ``reached``) survives: the two values between ``start`` and ``stop`` between which it
     turns. docs/margins.md says more."""
-    words = [f"--key={key}", f"--from={number(start, 'start')}", f"--to={number(stop, 'stop')}"]
-    words += options(runs=runs, seed=seed, verdict=verdict, scan=scan, halvings=halvings, threads=threads)
-    words += files(csv=csv, html=html) + flags(log=log, force=force)
-    return asked("margin", scenario, set, words)
+    return Answer(
+        *_native.margin(
+            asked(scenario, set),
+            key=str(key),
+            start=number(start, "start"),
+            stop=number(stop, "stop"),
+            runs=count(runs, "runs"),
+            seed=count(seed, "seed"),
+            verdict=str(verdict),
+            scan=count(scan, "scan"),
+            halvings=count(halvings, "halvings"),
+            logarithmic=flag(log, "log"),
+            csv=maybe_path(csv, "csv"),
+            html=maybe_path(html, "html"),
+            force=flag(force, "force"),
+            threads=maybe_count(threads, "threads"),
+        )
+    )
 
 
 def attack(
@@ -148,17 +187,33 @@ def attack(
 ) -> Answer:
     """Searches for the worst start (up to ``start`` [m] from the scenario's), velocity (``velocity`` [m/s]) or keys (``vary``, with bounds). What
     it does not find is no proof. docs/attack.md says more."""
-    words = options(start=start, velocity=velocity, apart=apart, flights=flights, seeds=seeds, method=method, seed=seed)
+    varied = []
     for key, bounds in by_name(vary, "vary").items():
         if not isinstance(bounds, (list, tuple)) or len(bounds) != 2:
             raise TypeError(f"vary: {key} needs a lower and an upper bound, not {bounds!r}")
-        words.append(f"--vary={key}={number(bounds[0], key)}..{number(bounds[1], key)}")
-    words += options(threads=threads) + files(out=out, csv=csv, html=html) + flags(force=force)
-    return asked("attack", scenario, set, words)
+        varied.append((str(key), number(bounds[0], key), number(bounds[1], key)))
+    return Answer(
+        *_native.attack(
+            asked(scenario, set),
+            start=maybe(start, "start"),
+            velocity=maybe(velocity, "velocity"),
+            apart=maybe(apart, "apart"),
+            vary=varied,
+            flights=count(flights, "flights"),
+            seeds=count(seeds, "seeds"),
+            method=str(method),
+            seed=count(seed, "seed"),
+            out=maybe_path(out, "out"),
+            csv=maybe_path(csv, "csv"),
+            html=maybe_path(html, "html"),
+            force=flag(force, "force"),
+            threads=maybe_count(threads, "threads"),
+        )
+    )
 
 
 def validate(out: PathLike | None = None, *, force: bool = False, threads: int | None = None) -> Answer:
     """Reproduces the paper and judges its claims and ours; figures and a page are left in the folder ``out`` where one is given."""
     with tempfile.TemporaryDirectory() as folder:
-        at = Path(folder) / "validate" if out is None else Path(os.fspath(out))
-        return Answer(*_native.call(["validate", "--json", f"--out={at}", *options(threads=threads), *flags(force=force)]))
+        at = str(Path(folder) / "validate") if out is None else path(out, "out")
+        return Answer(*_native.validate(at, flag(force, "force"), maybe_count(threads, "threads")))

@@ -12,7 +12,7 @@ from . import _display, _native
 from ._audit import Audit, audit
 from ._native import Error
 from ._tables import frame
-from ._words import PathLike, paths, reading, with_files
+from ._words import PathLike, one_recording, paths, reading, with_files
 
 if TYPE_CHECKING:
     import pandas
@@ -27,9 +27,9 @@ class Recording:
     """A recording in memory: who was seen where and when."""
 
     def __init__(self, files: list[str], read_as: dict[str, Any]) -> None:
-        self._files, self._read_as = files, read_as
-        words = ["audit", *reading(**read_as), "--", *files]
-        self._columns = with_files(files, lambda: _native.read(words))
+        self._files, self._read_as = one_recording(files, read_as), read_as
+        options = reading(**read_as)
+        self._columns = with_files(files, lambda: _native.read(files, options))
 
     @property
     def vehicles(self) -> list[str]:

@@ -132,13 +132,6 @@ class Scenario:
         ways = np.stack([self.positions_m, self.slots_m])
         return _display.card("open", self.name, rows, _display.paths(ways, "From the start to the slots, seen from above"))
 
-    def _ask(self, words: list[str]) -> tuple[bool, str]:
-        """Asks a command about it: whether the exit code is 0, and what was written for programs."""
-        self._check_unchanged()
-        sets = [f"--set={text}" for text in self._sets]
-        which = "-" if self._is_text else self._source
-        return _native.call([*words, *sets, "--", which], self._source if self._is_text else None)
-
 
 def scenario_of(given: Scenario | PathLike, set: Mapping[str, Any] | None = None) -> Scenario:
     """A scenario, or what names one."""
@@ -180,7 +173,7 @@ def value_as_toml(value: Any) -> str:
 
 def scenarios() -> list[str]:
     """Names of the built-in scenarios."""
-    return [line.split()[0] for line in _native.call(["list"])[1].splitlines() if line.strip()]
+    return _native.scenarios()
 
 
 class Check:

@@ -1,4 +1,4 @@
-"""Options of functions as the words of the command line, which says what they mean and what is wrong with them."""
+"""Arguments of functions, checked and as the native half takes them."""
 
 from __future__ import annotations
 
@@ -9,70 +9,83 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from . import _native
 from ._native import Error
 
 T = TypeVar("T")
 PathLike = str | os.PathLike[str]
 
 
-def number(value: object, what: str) -> str:
-    """A number in digits that read back to the same bits."""
+def number(value: object, what: str) -> float:
+    """A number."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise TypeError(f"{what}: a number is needed, not {type(value).__name__}")
     try:
-        return repr(float(value))
+        return float(value)
     except OverflowError:
         raise Error(f"{what}: the number is too large") from None
 
 
-def numbers(value: Iterable[object], what: str) -> str:
-    """Numbers between commas."""
-    return ",".join(number(x, what) for x in value)
+def maybe(value: object, what: str) -> float | None:
+    """A number, or None."""
+    return None if value is None else number(value, what)
 
 
-def of_each(option: str, value: object, what: str) -> list[str]:
+def numbers(value: object, what: str) -> list[float]:
+    """A list of numbers."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        raise TypeError(f"{what}: a list of numbers is needed, not {type(value).__name__}")
+    return [number(x, what) for x in value]
+
+
+def three(value: object, what: str) -> list[float] | None:
+    """Three numbers, or None."""
+    if value is None:
+        return None
+    found = numbers(value, what)
+    if len(found) != 3:
+        raise Error(f"{what}: three numbers are needed, not {len(found)}")
+    return found
+
+
+def count(value: object, what: str) -> int:
+    """A whole number from 0."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise TypeError(f"{what}: a whole number is needed, not {type(value).__name__}")
+    if not 0 <= value < 2**63:
+        raise Error(f"{what}: {value} is not a whole number from 0")
+    return int(value)
+
+
+def maybe_count(value: object, what: str) -> int | None:
+    """A whole number from 0, or None."""
+    return None if value is None else count(value, what)
+
+
+def of_vehicles(value: object, what: str) -> tuple[float | None, list[tuple[str, float]]]:
     """A number of every vehicle, or a dictionary of numbers by vehicle."""
-    if value is None:
-        return []
     if isinstance(value, Mapping):
-        return [f"{option}={name}={number(x, what)}" for name, x in value.items()]
-    return [f"{option}={number(value, what)}"]
+        return None, by_vehicle(value, what)
+    return maybe(value, what), []
 
 
-def word(name: str) -> str:
-    """An option as the command line spells it."""
-    return "--" + name.replace("_", "-")
+def by_vehicle(value: object, what: str) -> list[tuple[str, float]]:
+    """Numbers by name."""
+    return [(str(name), number(x, what)) for name, x in by_name(value, what).items()]
 
 
-def option(name: str, value: Any) -> list[str]:
-    """``--name=value``, or nothing of None; once for each of a list."""
-    if value is None:
-        return []
-    if isinstance(value, (list, tuple)):
-        return [part for each in value for part in option(name, each)]
-    if isinstance(value, str):
-        return [f"{word(name)}={value}"]
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
-        return [f"{word(name)}={int(value)}"]
-    return [f"{word(name)}={number(value, name)}"]
+def flag(value: object, what: str) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{what}: True or False is needed, not {type(value).__name__}")
+    return bool(value)
 
 
-def options(**given: Any) -> list[str]:
-    """Each as :func:`option`."""
-    return [part for name, value in given.items() for part in option(name, value)]
-
-
-def flags(**given: Any) -> list[str]:
-    """``--name`` of each that is true."""
-    for name, value in given.items():
-        if not isinstance(value, (bool, np.bool_)):
-            raise TypeError(f"{name}: True or False is needed, not {type(value).__name__}")
-    return [word(name) for name, value in given.items() if value]
-
-
-def files(**given: PathLike | None) -> list[str]:
-    """``--name=path`` of each that is given."""
-    return [f"{word(name)}={path(value, name)}" for name, value in given.items() if value is not None]
+def text(value: object, what: str) -> str | None:
+    """A word, or None."""
+    if value is not None and not isinstance(value, str):
+        raise TypeError(f"{what}: a string is needed, not {type(value).__name__}")
+    return value
 
 
 def by_name(value: object, what: str) -> Mapping[Any, Any]:
@@ -92,11 +105,16 @@ def listed(value: object, what: str) -> list[str]:
 
 
 def path(value: object, what: str) -> str:
-    """A path as text that is never taken for an option."""
-    if not isinstance(value, (str, os.PathLike)):
+    """A path as text. A name such as `-` is a file, and not standard output."""
+    if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise TypeError(f"{what}: a path is needed, not {type(value).__name__}")
-    text = os.fspath(value)
-    return f".{os.sep}{text}" if text.startswith("-") else text
+    found = os.fspath(value)
+    return f".{os.sep}{found}" if found.startswith("-") else found
+
+
+def maybe_path(value: object, what: str) -> str | None:
+    """A path, or None."""
+    return None if value is None else path(value, what)
 
 
 def paths(given: object, what: str) -> list[str]:
@@ -137,23 +155,35 @@ def reading(
     origin: Iterable[float] | None = None,
     join: bool = False,
     allow_unfinished: bool = False,
-) -> list[str]:
-    """How a recording is read: the words of ``tautline audit --help`` under *Reading*."""
-    words = options(
-        format=format,
-        time_unit=time_unit,
-        fps=fps,
-        time_scale=time_scale,
-        duplicates=duplicates,
-        axes=axes,
-        dimensions=dimensions,
-        layout=layout,
-        frame=frame,
-        topic=topic,
-    )
-    words += flags(sort=sort, one_vehicle=one_vehicle, join=join, allow_unfinished=allow_unfinished)
+) -> _native.ReadOptions:
+    """How a recording is read: the options of ``tautline audit --help`` under *Reading*."""
+    metres = None
     if scale is not None:
-        words += [f"--scale={numbers(scale, 'scale') if isinstance(scale, Iterable) else number(scale, 'scale')}"]
-    words += [] if origin is None else [f"--origin={numbers(origin, 'origin')}"]
-    words += [f"--column={role}={name}" for role, name in by_name(column, "column").items()]
-    return words + [f"--start={name}={numbers(place, 'start')}" for name, place in by_name(start, "start").items()]
+        metres = numbers(scale, "scale") if isinstance(scale, Iterable) else [number(scale, "scale")]
+    places = [(str(name), three(place, "start") or [0.0] * 3) for name, place in by_name(start, "start").items()]
+    return _native.ReadOptions(
+        format=text(format, "format"),
+        time_unit=text(time_unit, "time_unit"),
+        fps=maybe(fps, "fps"),
+        time_scale=maybe(time_scale, "time_scale"),
+        sort=flag(sort, "sort"),
+        duplicates=text(duplicates, "duplicates"),
+        one_vehicle=flag(one_vehicle, "one_vehicle"),
+        scale=metres,
+        axes=text(axes, "axes"),
+        dimensions=None if dimensions is None else str(dimensions),
+        column=[(str(role), str(name)) for role, name in by_name(column, "column").items()],
+        start=places,
+        layout=text(layout, "layout"),
+        frame=text(frame, "frame"),
+        topic=[topic] if isinstance(topic, str) else listed(topic or [], "topic"),
+        origin=three(origin, "origin"),
+        allow_unfinished=flag(allow_unfinished, "allow_unfinished"),
+    )
+
+
+def one_recording(files: list[str], read_as: Mapping[str, Any]) -> list[str]:
+    """The files of one recording: several belong together with ``join=True`` alone."""
+    if len(files) > 1 and not flag(read_as.get("join", False), "join"):
+        raise Error("several recordings are given, and one is needed; give each by itself, or join=True for files of one recording")
+    return files

@@ -7,18 +7,12 @@ use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 use nalgebra::Vector3;
 
-use super::Failure;
-use super::envelope;
-use super::obstacles;
-use super::outputs;
-use super::own::OwnRecording;
 use super::reading::{self, ReadArguments, one_of};
-use tautline_audit::envelope::Limit;
-use tautline_audit::recorded::{Motion, Outcome, Settings, VehicleSettings};
-use tautline_core::text::counted;
-use tautline_core::track::Item;
-use tautline_recordings::read::{Format, Recording};
-use tautline_report::report::recorded::{Basis, Between};
+use tautline_audit::envelope::{Envelope, Limit, Quantity};
+use tautline_audit::recorded::{Motion, Settings, VehicleSettings};
+use tautline_recordings::read::Format;
+use tautline_report::request::outputs::Called;
+use tautline_report::request::{AuditRequest, ConfigFile, Failure, Subject};
 
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
@@ -54,7 +48,7 @@ pub(super) struct AuditArguments {
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) obstacles: Option<PathBuf>,
     /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
-    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = envelope::limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
+    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
     pub(super) limit: Vec<Limit>,
     /// Hold mean accelerations over this time [s] against --limit accel: the change of velocity over its length, corners of
     /// curves too.
@@ -98,9 +92,6 @@ pub(super) struct AuditArguments {
     /// Ask what the command line says alone, and look for no tautline.toml.
     #[arg(long, conflicts_with = "config", help_heading = "Question")]
     pub(super) no_config: bool,
-    /// What a tautline.toml asked.
-    #[arg(skip)]
-    pub(super) asked_by: Option<String>,
 
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long, help_heading = "Answer")]
@@ -189,27 +180,42 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
     Ok(Vector3::new(x, y, z))
 }
 
-/// The largest speed from sample to sample of a vehicle \[m/s\]; 0 of curves.
-fn fastest_m_s(items: &[Item]) -> f64 {
-    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
-    let samples = items.iter().filter_map(|item| match item {
-        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
-        Item::Piece(_) => None,
-    });
-    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
-        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
-        Some((position_m - before_m).norm() / (time_s - before_s))
-    });
-    speeds.fold(0.0, f64::max)
+/// A limit as it is written: `speed=5`.
+fn limit(text: &str) -> Result<Limit, String> {
+    let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE, of {}", names()))?;
+    let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.name() == name.trim());
+    let quantity = quantity.ok_or_else(|| format!("`{name}` is no limit: the limits are {}", names()))?;
+    match value.trim().parse::<f64>() {
+        Ok(allowed) if allowed.is_finite() => Ok(Limit { quantity, allowed }),
+        _ => Err(format!("`{value}` is not a number")),
+    }
 }
 
 impl AuditArguments {
-    /// Opens the recording.
-    pub(super) fn open(&self) -> Result<Recording, Failure> {
-        Ok(self.reading.open(&self.reading.options(self.format)?)?)
+    /// The request about the recording in these files, which `command` makes again.
+    pub(super) fn request(&self, paths: Vec<PathBuf>, command: &str) -> Result<AuditRequest<'static>, Failure> {
+        let config = match (&self.config, self.no_config) {
+            (Some(path), _) => ConfigFile::File(path.clone()),
+            (None, true) => ConfigFile::None,
+            (None, false) => ConfigFile::Nearest,
+        };
+        Ok(AuditRequest {
+            subject: Subject::Files { paths, options: self.reading.options(self.format) },
+            settings: self.settings()?,
+            obstacles: self.obstacles.clone(),
+            fence: self.fence.clone(),
+            expect_vehicles: self.expect_vehicles,
+            independent: self.independent,
+            allow_undecided: self.allow_undecided,
+            config,
+            command: command.to_owned(),
+            html: self.html.clone(),
+            proof: self.proof.clone(),
+        })
     }
 
-    pub(super) fn settings(&self) -> Result<Settings, Failure> {
+    fn settings(&self) -> Result<Settings, Failure> {
         refuse_repeated("--radius", self.radius.iter().map(|(name, _)| name.as_deref()))?;
         refuse_repeated("--max-accel", self.max_accel.iter().map(|(name, _)| name.as_deref()))?;
         refuse_repeated("--offset", self.offset.iter().map(|(name, _)| Some(name.as_str())))?;
@@ -230,10 +236,6 @@ impl AuditArguments {
         for (name, value) in &self.offset {
             vehicles.entry(name.clone()).or_default().offset_s = *value;
         }
-        if !self.max_accel.is_empty() && self.motion != Some(Motion::Bounded) {
-            let help = "add --motion bounded, or leave --max-accel out";
-            return Err(Failure::input("--max-accel says nothing of a motion that is known exactly", help));
-        }
         let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
         Ok(Settings {
             delta_m: self.delta,
@@ -241,7 +243,6 @@ impl AuditArguments {
             max_accel_m_s2,
             radius_m,
             ellipsoid_m: self.ellipsoid,
-            is_told_scaled: false,
             from_s: self.from,
             to_s: self.to,
             above_m: self.above,
@@ -250,116 +251,15 @@ impl AuditArguments {
             accel_window_s: self.accel_window,
             vehicles,
             only: (!only.is_empty()).then_some(only),
-            obstacles: self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacles::read)?,
-            is_own_limit: false,
-            envelope: envelope::envelope(&self.limit, self.fence.as_deref())?,
+            envelope: Envelope { limits: self.limit.clone(), fence: None },
+            ..Settings::default()
         })
     }
 
-    pub(super) fn check_outputs(&self) -> Result<(), Failure> {
-        let mut inputs: Vec<_> = self.reading.paths().map(|path| ("the recording", path)).collect();
-        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
-        inputs.extend(self.config.as_deref().map(|path| ("the file of settings", path)));
-        inputs.extend(self.fence.as_deref().map(|path| ("the file of the fence", path)));
-        let outputs = [
-            ("--events", &self.events),
-            ("--junit", &self.junit),
-            ("--html", &self.html),
-            ("--proof", &self.proof),
-            ("--summary", &self.summary),
-        ];
-        let outputs: Vec<_> =
-            outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
-        outputs::check(&inputs, &outputs)
-    }
-
-    /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
-    pub(super) fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
-        let path = self.reading.called();
-        let judged = outcome.presence.iter().flatten().count();
-        if let Some(expected) = self.expect_vehicles
-            && judged != expected
-        {
-            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
-            return Err(Failure::input(
-                message,
-                "look for who is missing or too many, or give another --expect-vehicles",
-            ));
-        }
-        let asked =
-            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
-        let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
-            let message =
-                format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
-            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles, --limit, --fence";
-            return Err(Failure::input(message, help));
-        }
-        if judged == 0 && (self.from.is_some() || self.to.is_some()) {
-            let message = format!("{path}: no vehicle is there between --from and --to");
-            return Err(Failure::input(message, "give a window in which the recording has vehicles"));
-        }
-        Ok(())
-    }
-
-    /// Refuses a question in seconds if the unit of time is a guess. Seconds are accepted if milliseconds would make the vehicles of
-    /// these first items faster than sound.
-    pub(super) fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
-        /// Speed that no vehicle of a swarm has \[m/s\]: that of sound.
-        const FASTEST_M_S: f64 = 340.0;
-        let asked = [
-            (matches!(self.motion, Some(Motion::Bounded)), "--motion bounded"),
-            (self.from.is_some(), "--from"),
-            (self.to.is_some(), "--to"),
-            (self.max_gap.is_some(), "--max-gap"),
-            (!self.offset.is_empty(), "--offset"),
-            (self.limit.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
-        ];
-        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
-        let path = self.reading.called();
-        if unit != "s" {
-            let message = format!(
-                "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
-            );
-            return Err(Failure::input(message, format!("say --time-unit {unit}, or --time-unit s")));
-        }
-        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
-            return Ok(());
-        }
-        let message = format!(
-            "{path}: its times may be seconds or milliseconds, going by their steps, and {option} depends on it"
-        );
-        Err(Failure::input(message, "say --time-unit s, or --time-unit ms"))
-    }
-
-    /// What is taken to happen between samples of a recording of curves alone, or that may be ours, whose run may have answered
-    /// the question itself; nothing is proved where the samples themselves are assumed.
-    pub(super) fn between(
-        &self,
-        curves: bool,
-        own: Option<&OwnRecording>,
-        is_judged: bool,
-        assumed: Option<&str>,
-    ) -> Between {
-        let most = |accel: &[Named]| {
-            let listed = accel.iter().map(|(name, a)| match name {
-                Some(name) => format!("{a:?} m/s^2 for {name}"),
-                None => format!("{a:?} m/s^2"),
-            });
-            listed.collect::<Vec<_>>().join(", ")
-        };
-        let (motion, basis) = match self.motion {
-            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
-            Some(Motion::Bounded) => (format!("accelerations of at most {}", most(&self.max_accel)), Basis::Bounded),
-            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
-            _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
-            None if is_judged => ("as the run judged every step".to_owned(), Basis::Run),
-            _ => ("straight between samples".to_owned(), Basis::Assumed),
-        };
-        match assumed {
-            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
-            None => Between { motion, basis },
-        }
+    /// The files that are written about all recordings together, with their options.
+    pub(super) fn outputs(&self) -> Vec<Called<'_>> {
+        let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
+        outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect()
     }
 }
 
@@ -369,8 +269,25 @@ fn refuse_repeated<'a>(option: &str, names: impl Iterator<Item = Option<&'a str>
     for name in names {
         if !known.insert(name) {
             let of = name.map_or("all vehicles".to_owned(), |name| format!("vehicle {name}"));
-            return Err(Failure::input(format!("{option}: two values for {of}"), "give one value"));
+            return Err(Failure::input("usage/twice", format!("{option}: two values for {of}"), "give one value"));
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_read_by_their_names() {
+        let read = limit(" climb = 2.5").expect("a limit");
+        assert_eq!((read.quantity, read.allowed), (Quantity::Climb, 2.5));
+        assert_eq!(
+            limit("speed").unwrap_err(),
+            "write LIMIT=VALUE, of speed, horizontal, climb, descent, accel, height, floor"
+        );
+        assert!(limit("spee=3").unwrap_err().starts_with("`spee` is no limit"));
+        assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");
+    }
 }

@@ -2,81 +2,71 @@
 
 use serde::Serialize;
 
-use super::audit::judge;
+use super::Exit;
 use super::audit_arguments::{Annotations, AuditArguments};
-use super::audit_config;
-use super::console::{self, Console};
-use super::judgement::Judgement;
-use super::{Exit, Failure, events, summary};
+use super::console::{self, Console, Terminal};
+use super::{events, summary};
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::report::write_atomically;
+use tautline_report::request::{Audited, Failure, Monitor as _};
 
 /// Recordings that could not be judged, and why.
 type Failures = [(String, Failure)];
 
-/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it.
-pub(super) fn audits(arguments: &AuditArguments) -> Result<Exit, Failure> {
+/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it. `command` is
+/// the whole command line.
+pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, Failure> {
     let recordings = arguments.reading.recordings();
     let is_one = recordings.len() == 1;
+    let refuse = |message: &str, help: &str| Err(Failure::input("usage/several-recordings", message, help));
     if !is_one && arguments.html.is_some() {
         let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
-        return Err(Failure::input("--html is a page on one recording, and several are given", help));
+        return refuse("--html is a page on one recording, and several are given", help);
     }
     if !is_one && arguments.proof.is_some() {
-        return Err(Failure::input("--proof is about one recording, and several are given", "audit one at a time"));
+        return refuse("--proof is about one recording, and several are given", "audit one at a time");
     }
-    arguments.check_outputs()?;
-    let asked: Vec<_> = recordings
-        .into_iter()
-        .map(|reading| (reading.called(), audit_config::configured(AuditArguments { reading, ..arguments.clone() })))
-        .collect();
+    let mut asked = Vec::new();
+    for paths in recordings {
+        let request = arguments.request(paths, command)?;
+        asked.push((request.subject.called(), request.configured()));
+    }
     // Nothing is written where something would be written over what is read, of whichever recording.
-    asked.iter().filter_map(|(_, asked)| asked.as_ref().ok()).try_for_each(AuditArguments::check_outputs)?;
+    let complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
+    complete.clone().try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
     // A log in which a system looks for its own lines has none of ours, which hold foreign names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
-    let console = Console { data_on_stdout: arguments.json, quiet };
+    let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });
     let (mut judged, mut failures) = (Vec::new(), Vec::new());
     for (name, asked) in asked {
         if !is_one {
-            console.say(&format!("{name}:"));
+            monitor.say(&format!("{name}:"));
         }
-        match asked.and_then(|asked| judgement(&asked, console)) {
-            Ok(judgement) => judged.push(judgement),
+        match asked.and_then(|asked| asked.judge(&monitor)) {
+            Ok(audited) => judged.push(audited),
             Err(failure) => {
                 if !is_one {
-                    console.say(&format!("not judged: {}", failure.said));
+                    monitor.say(&format!("not judged: {}", failure.message()));
                 }
                 failures.push((name, failure));
             }
         }
     }
     if !is_one {
-        console.say(&summary::counts(&judged, failures.len()));
+        monitor.say(&summary::counts(&judged, failures.len()));
     }
     answer(arguments, &judged, &failures, is_one)?;
-    let worst = judged.iter().map(Judgement::exit).max_by_key(|exit| *exit as u8).unwrap_or(Exit::Good);
-    match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| failure.exit() as u8) {
+    let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
+    match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| Exit::of(failure) as u8) {
         // It was said in a line that means nothing else to the system.
-        Some(failure) if arguments.annotations.is_some() => Ok(failure.exit()),
+        Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
         Some(failure) => Err(failure),
-        None => Ok(worst),
+        None => Ok(worst.unwrap_or(Exit::Good)),
     }
-}
-
-/// Judges one recording as it and the file of settings beside it ask.
-pub(super) fn one(arguments: AuditArguments, console: Console) -> Result<Judgement, Failure> {
-    let arguments = audit_config::configured(arguments)?;
-    arguments.check_outputs()?;
-    judgement(&arguments, console)
-}
-
-fn judgement(arguments: &AuditArguments, console: Console) -> Result<Judgement, Failure> {
-    let (allows_undecided, asked_by) = (arguments.allow_undecided, arguments.asked_by.clone());
-    Ok(Judgement { report: judge(arguments, console)?, allows_undecided, asked_by })
 }
 
 /// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
-fn answer(arguments: &AuditArguments, judged: &[Judgement], failures: &Failures, is_one: bool) -> Result<(), Failure> {
+fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, is_one: bool) -> Result<(), Failure> {
     if arguments.json {
         match judged {
             [] if is_one => {}
@@ -115,10 +105,10 @@ enum Answer<'a> {
 }
 
 impl<'a> Answers<'a> {
-    fn of(judged: &'a [Judgement], failures: &'a Failures) -> Self {
+    fn of(judged: &'a [Audited], failures: &'a Failures) -> Self {
         let not_judged = failures
             .iter()
-            .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.said.to_string() });
+            .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.message().to_owned() });
         Self(judged.iter().map(|of| Answer::Judged(&of.report)).chain(not_judged).collect())
     }
 }

@@ -1,23 +1,15 @@
 //! `tautline campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::campaign_worst::{self, Looks};
-use super::console::{self, Console};
-use super::run::{RECORDING, RunArguments, interruption};
-use super::{Exit, Failure};
-use tautline_report::report::write_atomically;
+use super::Exit;
+use super::console::{self, Console, Terminal};
+use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::campaign::{
-    ANSWER, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, listed, parse,
+    self as study, CampaignAnswer, CampaignRequest, Folder, Program, ReplayRequest, listed, parse,
 };
-use tautline_studies::compare::Watch;
-
-/// The page for people.
-const PAGE: &str = "campaign.html";
 
 /// Arguments of `tautline campaign`.
 #[derive(Debug, Args)]
@@ -121,6 +113,18 @@ struct Answered {
     says: Says,
 }
 
+/// Which flights are flown again for the page.
+#[derive(Debug, Args)]
+struct Looks {
+    /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
+    worst: u8,
+    /// Take no pictures of them.
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    no_snapshots: bool,
+}
+
 /// How an answer is said.
 #[derive(Debug, Args)]
 struct Says {
@@ -158,275 +162,112 @@ struct Replay {
 
 pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
     match &arguments.what {
-        What::Run(run) => run_whole(run),
+        What::Run(run) => {
+            let request = CampaignRequest {
+                out: run.out.clone(),
+                shards: run.shards,
+                threads: run.threads.map(usize::from),
+                worst: run.says.looks.worst.into(),
+                ..run.asked.request()
+            };
+            run.says.answer(|monitor| study::campaign(&request, &*run.says.looks.pictures(), monitor))
+        }
         What::Plan(plan) => {
-            let folder = planned(&plan.asked, &plan.out, plan.shards)?;
+            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.asked.request() };
+            let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
             let console = Console { data_on_stdout: false, quiet: false };
+            let shards = format!("0-{}", manifest.shards - 1);
+            let words = ["campaign", "shard", &plan.out.display().to_string(), "--shard", &shards];
             console.say(&format!(
                 "{} runs in {} shards, campaign {}\nfly them with: {}",
                 manifest.runs,
                 manifest.shards,
                 manifest.campaign,
-                console::command_line(
-                    ["campaign", "shard", &shown(&plan.out), "--shard", &format!("0-{}", manifest.shards - 1)]
-                        .into_iter()
-                )
+                command_line(words.into_iter())
             ));
             Ok(Exit::Good)
         }
-        What::Shard(shard) => fly_shards(shard),
+        What::Shard(shard) => {
+            let folder = shard.folder.open()?;
+            let shards = parse(&shard.shard, folder.campaign().manifest().shards)?;
+            let monitor = Terminal::new(Console { data_on_stdout: false, quiet: shard.quiet })?;
+            Ok(Exit::good_if(study::fly_shards(&folder, &shards, shard.threads.into(), &monitor)?))
+        }
         What::Missing(at) => {
-            let folder = opened(at)?;
-            let missing = folder.missing()?;
-            let console = Console { data_on_stdout: true, quiet: false };
-            for &shard in &missing {
-                warn_of_damage(&folder, shard, console)?;
-            }
+            let monitor = Terminal::without_signals(Console { data_on_stdout: true, quiet: false });
+            let missing = study::missing_shards(&at.open()?, &monitor)?;
             console::data(&if missing.is_empty() { String::new() } else { listed(&missing) + "\n" })?;
-            Ok(if missing.is_empty() { Exit::Good } else { Exit::Bad })
+            Ok(Exit::good_if(missing.is_empty()))
         }
-        What::Merge(merge) => {
-            let folder = opened(&merge.folder)?;
-            let interrupted = interruption()?;
-            merged(&folder, &merge.says, &interrupted)
+        What::Merge(Answered { folder, says }) => {
+            let folder = folder.open()?;
+            says.answer(|monitor| study::merge(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
         }
-        What::Report(report) => {
-            let folder = opened(&report.folder)?;
-            let interrupted = interruption()?;
-            let summary = folder.summary().map_err(|error| Failure::from(error).naming(&shown(folder.path())))?;
-            answer(&folder, &summary, &report.says, None, &interrupted)
+        What::Report(Answered { folder, says }) => {
+            let folder = folder.open()?;
+            says.answer(|monitor| study::report(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
         }
-        What::Replay(replay) => fly_again(replay),
+        What::Replay(replay) => {
+            let request =
+                ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
+            let folder = replay.folder.open()?;
+            let monitor = Terminal::new(Console { data_on_stdout: false, quiet: false })?;
+            Ok(Exit::good_if(study::replay(&folder, &request, &*replay.pictures(), &monitor)?))
+        }
     }
 }
 
 impl Asked {
-    /// Text and keys of the specification.
-    fn spec(&self) -> Result<(String, Spec), Failure> {
-        let shown = self.spec.display().to_string();
-        let text = std::fs::read_to_string(&self.spec).map_err(|error| {
-            Failure::input(
-                format!("cannot read {shown}: {error}"),
-                "give the path of a specification, as docs/campaigns.md shows one",
-            )
-        })?;
-        let mut spec = Spec::read(&shown, &text)?;
-        if self.until_width.is_some() || self.until_decided.is_some() {
-            let stop =
-                spec.stop.unwrap_or(Stop { of: tautline_studies::campaign::Asked::Clear, width: None, decided: None });
-            spec.stop = Some(Stop {
-                width: self.until_width.or(stop.width),
-                decided: self.until_decided.or(stop.decided),
-                ..stop
-            });
-        }
-        Ok((text, spec))
-    }
-
-    fn name(&self) -> String {
-        self.spec.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
-    }
-}
-
-fn shown(path: &Path) -> String {
-    path.display().to_string()
-}
-
-fn opened(at: &InFolder) -> Result<Folder, Failure> {
-    Ok(Folder::open(&at.folder, &Program::running()?)?)
-}
-
-fn planned(asked: &Asked, out: &Path, shards: Option<u64>) -> Result<Folder, Failure> {
-    let folder = asked.spec.parent().unwrap_or(Path::new(""));
-    let (text, spec) = asked.spec()?;
-    let campaign = Campaign::plan(&spec, &asked.name(), folder, shards, Program::running()?).map_err(|error| {
-        let place = error.place(&shown(&asked.spec), &text);
-        place.into_iter().fold(Failure::from(error), |failure, place| failure.at(&place))
-    })?;
-    Ok(Folder::plan(out, campaign, shards.is_some())?)
-}
-
-fn run_whole(arguments: &RunCampaign) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.says.json, quiet: arguments.says.quiet };
-    let out = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(arguments.asked.name()));
-    let folder = planned(&arguments.asked, &out, arguments.shards)?;
-    let threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
-    let interrupted = interruption()?;
-    let campaign = folder.campaign();
-    let manifest = campaign.manifest();
-    let bar = console.progress(campaign.steps(manifest.runs), manifest.name.clone());
-    let began = Instant::now();
-    let mut flights = 0;
-    let mut tally = Tally::new(campaign.laws().len(), campaign.stop());
-    for shard in 0..manifest.shards {
-        if tally.is_enough() {
-            break;
-        }
-        bar.suspend(|| warn_of_damage(&folder, shard, console))?;
-        let rows =
-            match folder.fly(shard, threads, Watch { flown: &|steps| bar.inc(steps), interrupted: &interrupted })? {
-                Shard::Kept(rows) => {
-                    bar.inc(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
-                    rows
-                }
-                Shard::Flown { rows, flown } => {
-                    flights += flown;
-                    rows
-                }
-                Shard::Interrupted => {
-                    bar.finish_and_clear();
-                    console.warn("interrupted: what was flown is kept, and the same command goes on from there");
-                    return Ok(Exit::Bad);
-                }
-            };
-        for row in &rows {
-            tally.take(row);
+    fn request(&self) -> CampaignRequest {
+        CampaignRequest {
+            until_width: self.until_width,
+            until_decided: self.until_decided,
+            ..CampaignRequest::new(self.spec.clone())
         }
     }
-    bar.finish_and_clear();
-    if flights > 0 {
-        let seconds = began.elapsed().as_secs_f64();
-        let an_hour = 3600.0 * flights as f64 / seconds;
-        let what = if campaign.splitting().is_some() { "estimates" } else { "flights" };
-        let on = if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
-        console.say(&format!("{flights} {what} in {seconds:.1} s on {on}: {an_hour:.0} an hour"));
-    }
-    merged(&folder, &arguments.says, &interrupted)
 }
 
-fn fly_shards(arguments: &ShardCampaign) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: false, quiet: arguments.quiet };
-    let folder = opened(&arguments.folder)?;
-    let manifest = folder.campaign().manifest();
-    let shards = parse(&arguments.shard, manifest.shards)?;
-    let interrupted = interruption()?;
-    let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
-    let bar = console.progress(folder.campaign().steps(runs), manifest.name.clone());
-    for shard in shards {
-        bar.suspend(|| warn_of_damage(&folder, shard, console))?;
-        let watch = Watch { flown: &|steps| bar.inc(steps), interrupted: &interrupted };
-        let done = match folder.fly(shard, arguments.threads.into(), watch)? {
-            Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
-            Shard::Flown { flown, .. } => format!("shard {shard}: {flown} flights flown"),
-            Shard::Interrupted => {
-                bar.finish_and_clear();
-                console.warn(&format!(
-                    "interrupted in shard {shard}: what was flown is kept, and the same command goes on"
-                ));
-                return Ok(Exit::Bad);
-            }
-        };
-        bar.suspend(|| console.say(&done));
+impl InFolder {
+    fn open(&self) -> Result<Folder, Failure> {
+        Ok(Folder::open(&self.folder, &Program::running()?)?)
     }
-    bar.finish_and_clear();
-    Ok(Exit::Good)
 }
 
-/// Says that the part of a shard is damaged: the shard is flown again.
-fn warn_of_damage(folder: &Folder, shard: u64, console: Console) -> Result<(), Failure> {
-    if let Some(part) = folder.damaged(shard)? {
-        console.warn(&format!("{part}; shard {shard} is to be flown again, which replaces it"));
-    }
-    Ok(())
-}
-
-fn merged(folder: &Folder, says: &Says, interrupted: &AtomicBool) -> Result<Exit, Failure> {
-    let merged = folder.merge().map_err(|error| {
-        let failure = Failure::from(error);
-        failure.naming(&shown(folder.path()))
-    })?;
-    answer(folder, &merged.summary, says, Some(&merged.sha256), interrupted)
-}
-
-/// Says the answer and writes its page.
-fn answer(
-    folder: &Folder,
-    summary: &Summary,
-    says: &Says,
-    sha256: Option<&str>,
-    interrupted: &AtomicBool,
-) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: says.json, quiet: says.quiet };
-    for note in summary.notes() {
-        console.warn(&format!("note: {note}"));
-    }
-    console.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
-    let worst = campaign_worst::flown_again(folder, summary, &says.looks, console, interrupted)?;
-    let path = folder.file(PAGE);
-    if interrupted.load(Ordering::Relaxed) {
-        console.warn("interrupted: no page was written");
-        return Ok(Exit::Bad);
-    }
-    let command = console::command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
-    write_atomically(&path, summary.to_html(&worst.page(&command, &folder.campaign().manifest().spec)).as_bytes())?;
-    if let Some(sha256) = sha256 {
-        console.say(&format!("{sha256}  {}", folder.file(RESULTS).display()));
-        console.say(&format!("wrote {} and {}", folder.file(ANSWER).display(), path.display()));
-    } else {
-        console.say(&format!("wrote {}", path.display()));
-    }
-    if says.json {
-        console::json(summary)?;
-    }
-    Ok(if summary.is_clear() { Exit::Good } else { Exit::Bad })
-}
-
-fn fly_again(arguments: &Replay) -> Result<Exit, Failure> {
-    let folder = opened(&arguments.folder)?;
-    let campaign = folder.campaign();
-    let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
-    let law = match &arguments.law {
-        None => campaign.laws().first(),
-        Some(name) => campaign.laws().iter().find(|law| law.name == *name),
-    };
-    let Some(law) = law else {
-        let said = arguments.law.as_deref().unwrap_or_default();
-        return Err(Failure::input(
-            format!("no law of this campaign is named {said}"),
-            format!("its laws are {}", names.join(", ")),
-        ));
-    };
-    let runs = campaign.manifest().runs;
-    if arguments.run >= runs {
-        let help = format!("its runs are 0 to {}", runs - 1);
-        return Err(Failure::input(format!("the campaign has no run {}", arguments.run), help));
-    }
-    if campaign.splitting().is_some() {
-        let bad = arguments.bad.unwrap_or_default();
-        let default = || campaign_worst::place_of_bad(&folder, &law.name, arguments.run, bad);
-        let place = arguments.out.clone().unwrap_or_else(default);
-        let hash = campaign_worst::fly_bad(&folder, law, [arguments.run, bad as u64], &place)?;
-        console::data(&format!("state hash {hash}, as in the campaign\nwrote {}\n", place.join(RECORDING).display()))?;
-        return Ok(Exit::Bad);
-    }
-    if let Some(out) = arguments.out.as_ref().filter(|out| out.join("report.json").exists()) {
-        let message = format!("{} holds a finished run", out.display());
-        return Err(Failure::input(message, "give another folder with --out"));
-    }
-    let mut options = RunArguments::for_folder(
-        arguments.out.clone().unwrap_or_else(|| campaign_worst::place(&folder, &law.name, arguments.run)),
-    );
-    #[cfg(feature = "viewer")]
-    {
-        options = options.without_pictures(arguments.no_snapshots);
-    }
-    options = options.aloud();
-    let interrupted = interruption()?;
-    campaign_worst::replay(&folder, arguments.run, law, &options, &interrupted)
-}
-
-impl From<CampaignError> for Failure {
-    fn from(error: CampaignError) -> Self {
-        match error {
-            CampaignError::Scenario { under, error, .. } => {
-                let failure = Self::from(*error);
-                if under.is_empty() { failure } else { failure.under(under.trim_end_matches(": ")) }
-            }
-            CampaignError::Flight { run, law, error } => {
-                Self::from(*error).under(&format!("run {run} under the law {law}"))
-            }
-            other => Self::told(other.is_machine(), &other, other.help()),
+impl Says {
+    /// Answers a request, and prints the answer as JSON where that is asked for.
+    fn answer(
+        &self,
+        request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>,
+    ) -> Result<Exit, Failure> {
+        let monitor = Terminal::new(Console { data_on_stdout: self.json, quiet: self.quiet })?;
+        let Some(CampaignAnswer { summary, .. }) = request(&monitor)? else { return Ok(Exit::Bad) };
+        if self.json {
+            console::json(&summary)?;
         }
+        Ok(Exit::good_if(summary.is_clear()))
     }
+}
+
+impl Looks {
+    fn pictures(&self) -> Box<dyn Pictures> {
+        #[cfg(feature = "viewer")]
+        return drawn(!self.no_snapshots);
+        #[cfg(not(feature = "viewer"))]
+        Box::new(())
+    }
+}
+
+impl Replay {
+    fn pictures(&self) -> Box<dyn Pictures> {
+        #[cfg(feature = "viewer")]
+        return drawn(!self.no_snapshots);
+        #[cfg(not(feature = "viewer"))]
+        Box::new(())
+    }
+}
+
+#[cfg(feature = "viewer")]
+fn drawn(takes_snapshots: bool) -> Box<dyn Pictures> {
+    Box::new(tautline_render::RunPictures::new("best").with_snapshots(takes_snapshots))
 }

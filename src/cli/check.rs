@@ -2,9 +2,10 @@
 
 use clap::Args;
 
+use super::Exit;
 use super::console::{self, Console};
-use super::scenario::{self, ScenarioArguments};
-use super::{Exit, Failure};
+use super::scenario::ScenarioArguments;
+use tautline_report::request::Failure;
 use tautline_sim::preflight::Preflight;
 
 /// Arguments of `tautline check`.
@@ -25,7 +26,7 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let scenario = scenario::read(&arguments.what.scenario, &arguments.what.overrides)?;
+    let scenario = arguments.what.request()?.read()?;
     let found = Preflight::of(&scenario)?;
     console.say(&format!("{}\n{}", found.headline(), found.text()));
     for warning in &found.warnings {
@@ -34,5 +35,5 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     if arguments.json {
         console::json(&found)?;
     }
-    Ok(if found.refuses() { Exit::Bad } else { Exit::Good })
+    Ok(Exit::good_if(!found.refuses()))
 }

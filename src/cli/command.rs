@@ -4,13 +4,14 @@ use std::sync::Once;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use super::{Exit, Failure};
+use super::Exit;
 use super::{
     attack, audit_arguments, audits, campaign, check, compare, completions, export, list, margin, run, schema, validate,
 };
 #[cfg(feature = "viewer")]
 use super::{render, view};
 use tautline_recordings::read;
+use tautline_report::request::Failure;
 
 /// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
 ///
@@ -77,11 +78,11 @@ pub(super) fn quiet_guarded_panics() {
     });
 }
 
-/// Does what a command asks for.
-pub(super) fn obey(command: Command) -> Result<Exit, Failure> {
+/// Does what a command asks for. `line` is the whole command line.
+pub(super) fn obey(command: Command, line: &str) -> Result<Exit, Failure> {
     match command {
         Command::Run(arguments) => run::run(&arguments),
-        Command::Audit(arguments) => audits::audits(&arguments),
+        Command::Audit(arguments) => audits::audits(&arguments, line),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),

@@ -3,8 +3,8 @@
 use clap::Args;
 use clap_complete::Shell;
 
-use super::console;
-use super::{Exit, Failure};
+use super::{Exit, console};
+use tautline_report::request::Failure;
 
 /// Arguments of `tautline completions`.
 #[derive(Debug, Args)]

@@ -1,17 +1,19 @@
 //! Where text goes: data to standard output, talk beside it, nothing into a closed pipe.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
-use super::Failure;
-use super::caller;
-use super::diagnostic::harmless;
+use tautline_report::request::{Failure, Monitor, blanked};
 
 /// Refresh rate of a progress bar \[Hz\].
 const PROGRESS_HZ: u8 = 10;
+/// Exit code of a second Ctrl-C, as shells give it.
+const INTERRUPTED_TWICE: i32 = 130;
 
 /// What the user wants to see.
 #[derive(Clone, Copy, Debug)]
@@ -25,10 +27,10 @@ pub(super) struct Console {
 impl Console {
     /// Says something to a person, and nothing to the terminal. What nobody reads any more is dropped.
     pub(super) fn say(self, text: &str) {
-        if self.quiet || caller::is_program() {
+        if self.quiet {
             return;
         }
-        let text = harmless(text.trim_end());
+        let text = blanked(text.trim_end());
         let _ = if self.data_on_stdout {
             writeln!(io::stderr().lock(), "{text}")
         } else {
@@ -41,22 +43,18 @@ impl Console {
         Self { data_on_stdout: true, ..self }.say(text);
     }
 
-    /// A count of what was read, on a terminal, for work whose end is not known.
-    pub(super) fn counter(self, message: String) -> ProgressBar {
-        let bar = self.progress(u64::MAX, message);
-        if let Ok(style) = ProgressStyle::with_template("{msg} {spinner} {human_pos} samples, {elapsed}") {
-            bar.set_style(style);
-        }
-        bar
-    }
-
-    /// A progress bar on a terminal, nothing in a pipe.
-    pub(super) fn progress(self, total: u64, message: String) -> ProgressBar {
-        if self.quiet || caller::is_program() || !io::stderr().is_terminal() {
+    /// A progress bar on a terminal, nothing in a pipe; a count where the end of the work is not known.
+    pub(super) fn progress(self, total: Option<u64>, message: String) -> ProgressBar {
+        if self.quiet || !io::stderr().is_terminal() {
             return ProgressBar::hidden();
         }
-        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(PROGRESS_HZ));
-        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %, {eta} left") {
+        let target = ProgressDrawTarget::stderr_with_hz(PROGRESS_HZ);
+        let bar = ProgressBar::with_draw_target(total.or(Some(u64::MAX)), target);
+        let template = match total {
+            Some(_) => "{msg} {wide_bar} {percent:>3} %, {eta} left",
+            None => "{msg} {spinner} {human_pos} samples, {elapsed}",
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar.set_message(message);
@@ -65,15 +63,79 @@ impl Console {
     }
 }
 
-/// Writes data to standard output, or gives it to the program that called.
-pub(super) fn data(text: &str) -> Result<(), Failure> {
-    if caller::takes(text) {
-        return Ok(());
+/// The terminal as the monitor of a request. Ctrl-C (and a request to terminate) ends the work; the second one does not wait.
+pub(super) struct Terminal {
+    console: Console,
+    bar: Mutex<ProgressBar>,
+    interruption: Arc<AtomicBool>,
+}
+
+impl Terminal {
+    /// Listens to Ctrl-C from here on.
+    pub(super) fn new(console: Console) -> Result<Self, Failure> {
+        let interruption = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&interruption);
+        let again = move || {
+            if flag.swap(true, Ordering::Relaxed) {
+                std::process::exit(INTERRUPTED_TWICE);
+            }
+        };
+        ctrlc::set_handler(again)
+            .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))?;
+        Ok(Self::with(console, interruption))
     }
+
+    /// Leaves Ctrl-C as it is: it ends the program.
+    pub(super) fn without_signals(console: Console) -> Self {
+        Self::with(console, Arc::default())
+    }
+
+    fn with(console: Console, interruption: Arc<AtomicBool>) -> Self {
+        Self { console, bar: Mutex::new(ProgressBar::hidden()), interruption }
+    }
+
+    fn bar(&self) -> ProgressBar {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Monitor for Terminal {
+    fn interruption(&self) -> &Arc<AtomicBool> {
+        &self.interruption
+    }
+
+    fn say(&self, text: &str) {
+        self.bar().suspend(|| self.console.say(text));
+    }
+
+    fn warn(&self, text: &str) {
+        self.bar().suspend(|| self.console.warn(text));
+    }
+
+    fn data(&self, text: &str) -> Result<(), Failure> {
+        data(text)
+    }
+
+    fn begin(&self, task: &str, total: Option<u64>) {
+        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = self.console.progress(total, task.to_owned());
+    }
+
+    fn advance(&self, units: u64) {
+        self.bar().inc(units);
+    }
+
+    fn finish(&self) {
+        self.bar().finish_and_clear();
+    }
+}
+
+/// Writes data to standard output.
+pub(super) fn data(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Failure::machine(format!("cannot write to standard output: {error}")))
+            let message = format!("cannot write to standard output: {error}");
+            Err(Failure::machine("files/cannot-write", message))
         }
         _ => Ok(()),
     }
@@ -88,13 +150,6 @@ pub(super) fn beside(text: &str) {
 pub(super) fn json(answer: &impl Serialize) -> Result<(), Failure> {
     match serde_json::to_string_pretty(answer) {
         Ok(json) => data(&(json + "\n")),
-        Err(error) => Err(Failure::machine(format!("cannot write the answer: {error}"))),
+        Err(error) => Err(Failure::machine("files/cannot-write", format!("cannot write the answer: {error}"))),
     }
-}
-
-/// The program with these words behind it, for a shell.
-pub(super) fn command_line<'a>(words: impl Iterator<Item = &'a str> + Clone) -> String {
-    let words = std::iter::once("tautline").chain(words);
-    // Only a zero byte cannot be quoted, and no argument has one.
-    shlex::try_join(words.clone()).unwrap_or_else(|_| words.collect::<Vec<_>>().join(" "))
 }

@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use super::Failure;
 use super::console::Console;
 use tautline_recordings::mcap::McapRecording;
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
 use tautline_render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
+use tautline_report::request::Failure;
 
 /// Bytes of an MCAP file that hold the name of what wrote it.
 const FIRST_BYTES: u64 = 64;
@@ -45,7 +45,7 @@ pub(super) fn timeline(
 ) -> Result<Timeline, Failure> {
     if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
         let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
-        return Err(Failure::input(format!("--delta is {delta_m:?}"), help));
+        return Err(Failure::input("render/out-of-range", format!("--delta is {delta_m:?}"), help));
     }
     // Our own recordings know formation, graph and law too.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
@@ -81,7 +81,11 @@ fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> R
     let mut tracks = match read::open(recording, reading) {
         Err(_) if has_nothing_yet(recording, reading) => {
             let message = format!("{}: the run was cut off before anything was written", recording.display());
-            return Err(Failure::input(message, "fly it again, or give the recording of another run"));
+            return Err(Failure::input(
+                "recording/empty",
+                message,
+                "fly it again, or give the recording of another run",
+            ));
         }
         opened => opened.map_err(unreadable)?,
     };
@@ -107,23 +111,19 @@ fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Optio
     if delta_m.is_some() {
         let message =
             format!("the recording is of tautline and was judged by its own delta, {} m", ours.header().delta_m);
-        return Err(Failure::input(message, "leave --delta out; `tautline audit` judges it by another"));
+        return Err(Failure::input(
+            "render/own-recording",
+            message,
+            "leave --delta out; `tautline audit` judges it by another",
+        ));
     }
     let said = ReadOptions { format: None, allow_unfinished: false, ..reading.clone() };
     if said != ReadOptions::default() {
         return Err(Failure::input(
+            "render/own-recording",
             "the recording is of tautline and says itself how it is read",
             "leave --time-unit, --scale, --column, --axis-order and --frame out",
         ));
     }
     Ok(())
-}
-
-impl From<RenderError> for Failure {
-    fn from(error: RenderError) -> Self {
-        match error {
-            RenderError::Record(error) => error.into(),
-            error => Self::told(error.is_machine(), &error, error.help().map(str::to_owned)),
-        }
-    }
 }

@@ -2,11 +2,10 @@
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-use super::Failure;
-use super::judgement::Judgement;
 use tautline_core::text::counted;
 use tautline_report::report::Status;
 use tautline_report::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
+use tautline_report::request::{Audited, Failure};
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
@@ -14,17 +13,20 @@ const COLUMNS: [&str; 10] =
 /// Violations, undecided times and gaps of pairs and of single vehicles, and the rest of a flight that ended early, a row each, in
 /// order of time; where several recordings are asked about `named` puts
 /// the recording in front.
-pub(super) fn csv(judged: &[Judgement], named: bool) -> Result<Vec<u8>, Failure> {
-    let failed = |error: csv::Error| Failure::machine(format!("cannot write the events: {error}"));
+pub(super) fn csv(judged: &[Audited], named: bool) -> Result<Vec<u8>, Failure> {
+    let failed =
+        |error: csv::Error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
-    for Judgement { report, .. } in judged {
+    for Audited { report, .. } in judged {
         let recording = named.then(|| report.source.recording.clone());
         for row in rows(report) {
             writer.write_record(recording.iter().cloned().chain(row)).map_err(failed)?;
         }
     }
-    writer.into_inner().map_err(|error| Failure::machine(format!("cannot write the events: {error}")))
+    writer
+        .into_inner()
+        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}")))
 }
 
 /// The rows of one recording.
@@ -76,23 +78,25 @@ fn number(x: f64) -> String {
 
 /// A suite for each recording, and an error for each that could not be judged. What is undecided fails, or is skipped where it
 /// is allowed.
-pub(super) fn junit(judged: &[Judgement], failures: &[(String, Failure)]) -> Result<String, Failure> {
+pub(super) fn junit(judged: &[Audited], failures: &[(String, Failure)]) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
     junit.add_test_suites(judged.iter().map(suite));
     junit.add_test_suites(failures.iter().map(|(recording, failure)| {
         let mut error = TestCaseStatus::non_success(NonSuccessKind::Error);
-        error.set_message(failure.said.to_string());
+        error.set_message(failure.message());
         let mut case = TestCase::new("separation", error);
         case.set_classname("tautline.audit");
         let mut suite = TestSuite::new(recording.as_str());
         suite.add_test_case(case);
         suite
     }));
-    junit.to_string().map_err(|error| Failure::machine(format!("cannot write the JUnit report: {error}")))
+    junit
+        .to_string()
+        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the JUnit report: {error}")))
 }
 
 /// A case for the verdict and one for each thing found.
-fn suite(Judgement { report, allows_undecided, .. }: &Judgement) -> TestSuite {
+fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
         status.set_message(message);

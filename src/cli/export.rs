@@ -1,20 +1,15 @@
 //! `tautline export`: a recording in another format.
 
-use std::io::ErrorKind;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
-use super::console::Console;
+use super::Exit;
+use super::console::{Console, Terminal};
 use super::reading::{self, ReadArguments, one_of};
-use super::run::interruption;
-use super::{Exit, Failure, outputs};
-use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
-use tautline_recordings::export::{self, ExportOptions, WRITTEN};
-use tautline_recordings::read::{self, Fault, Format, ReadError, Recording};
-use tautline_report::report::write_atomically_with;
+use tautline_recordings::export::WRITTEN;
+use tautline_recordings::read::Format;
+use tautline_report::request::{ExportRequest, Failure, export_file};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -42,102 +37,20 @@ pub(super) struct ExportArguments {
     input_format: Option<Format>,
 }
 
-/// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
-struct Interruptible {
-    tracks: Recording,
-    path: PathBuf,
-    interrupted: Arc<AtomicBool>,
-}
-
-impl Tracks for Interruptible {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.tracks.vehicles()
-    }
-
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        if self.interrupted.load(Ordering::Relaxed) {
-            return Err(ReadError::new(&self.path, Fault::System(ErrorKind::Interrupted.into())));
-        }
-        self.tracks.read(items)
-    }
-
-    fn clock(&self) -> &Clock {
-        self.tracks.clock()
-    }
-
-    fn notes(&self) -> &[String] {
-        self.tracks.notes()
-    }
-
-    fn assumed(&self) -> Option<&str> {
-        self.tracks.assumed()
-    }
-
-    fn is_planar(&self) -> bool {
-        self.tracks.is_planar()
-    }
-
-    fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.tracks.earth_origin()
-    }
-}
-
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
-    if arguments.reading.recordings().len() > 1 {
+    let [paths] = &arguments.reading.recordings()[..] else {
         let help = "give --join if each file holds a vehicle of one recording";
-        return Err(Failure::input("several recordings are given, and one is exported", help));
-    }
-    let reading = arguments.reading.options(arguments.input_format)?;
-    let path = &arguments.output;
-    let by_extension = || {
-        let extension = path.extension()?.to_str()?;
-        WRITTEN.iter().copied().find(|format| format.name().eq_ignore_ascii_case(extension))
+        let message = "several recordings are given, and one is exported";
+        return Err(Failure::input("usage/several-recordings", message, help));
     };
-    let format = arguments.format.or_else(by_extension).ok_or_else(|| {
-        let message = format!("the name `{}` does not tell a format", path.display());
-        Failure::input(message, "name the format with --format csv, parquet, npz or mcap")
-    })?;
-    if path.exists() && !arguments.force {
-        let message = format!("`{}` exists", path.display());
-        return Err(Failure::input(message, "overwrite it with --force, or write another file"));
-    }
-    let inputs: Vec<_> = arguments.reading.paths().map(|path| ("the recording", path)).collect();
-    outputs::check(&inputs, &[("--output", path)])?;
-    let options = ExportOptions { sample_hz: arguments.sample_hz };
-    let interrupted = interruption()?;
-    let recording = &arguments.reading.recording;
-    let open = || -> Result<Recording, ReadError> {
-        let (tracks, path, interrupted) = (arguments.reading.open(&reading)?, recording.clone(), interrupted.clone());
-        Ok(Box::new(Interruptible { tracks, path, interrupted }))
+    let request = ExportRequest {
+        paths: paths.clone(),
+        options: arguments.reading.options(arguments.input_format),
+        output: arguments.output.clone(),
+        format: arguments.format,
+        sample_hz: arguments.sample_hz,
+        force: arguments.force,
     };
-    let may_have_channels =
-        arguments.reading.paths().count() == 1 && arguments.input_format.is_none_or(|format| format == Format::Mcap);
-    let channels = || if may_have_channels { read::open_channels(recording) } else { Ok(None) };
-    let exported = write_atomically_with(path, |file| {
-        export::export_with(&open, &channels, format, &options, file).map_err(Failure::from)
-    });
-    if exported.is_err() && interrupted.load(Ordering::Relaxed) {
-        return Err(Failure::machine(format!("interrupted: `{}` was not written", path.display())));
-    }
-    let exported = exported?;
-    let console = Console { data_on_stdout: false, quiet: arguments.quiet };
-    let file = path.display();
-    let lost = match arguments.reading.own(arguments.input_format, reading.scale) {
-        Ok(own) => own.filter(|own| !own.has_every_step).map(|own| {
-            let steps = own.most_steps;
-            format!(
-                "up to {steps} steps were flown between two samples: what the run saw between them is not in {file}"
-            )
-        }),
-        Err(unread) => Some(format!("{}; what the run saw between two samples is not in {file}", unread.said.message)),
-    };
-    for note in exported.notes.iter().chain(&lost) {
-        console.warn(&format!("note: {note}"));
-    }
-    let vehicles =
-        if exported.vehicles == 1 { "1 vehicle".to_owned() } else { format!("{} vehicles", exported.vehicles) };
-    console.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
+    export_file(&request, &Terminal::new(Console { data_on_stdout: false, quiet: arguments.quiet })?)?;
     Ok(Exit::Good)
 }

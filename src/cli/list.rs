@@ -4,9 +4,9 @@ use std::path::Path;
 
 use clap::Args;
 
-use super::console;
-use super::{Exit, Failure};
+use super::{Exit, console};
 use tautline_recordings::mcap::McapRecording;
+use tautline_report::request::Failure;
 use tautline_sim::scenario::builtin;
 
 /// Arguments of `tautline list`.
@@ -35,7 +35,11 @@ fn of_recording(name: &str) -> Result<String, Failure> {
     let path = Path::new(name);
     if !path.exists() {
         let help = "`tautline list` shows their names; a recording is given by its path, such as out/pentagon/run.mcap";
-        return Err(Failure::input(format!("there is no built-in scenario and no recording `{name}`"), help));
+        return Err(Failure::input(
+            "scenario/not-found",
+            format!("there is no built-in scenario and no recording `{name}`"),
+            help,
+        ));
     }
     let recording = McapRecording::open(path).map_err(|error| {
         Failure::from(error)

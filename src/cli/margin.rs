@@ -1,22 +1,18 @@
 //! `tautline margin`: where between two values of a key the verdict turns.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
 
-use super::console::{self, Console};
-use super::outputs::{self, is_standard_output, write};
-use super::run::interruption;
+use super::Exit;
+use super::console::{Console, Terminal};
+use super::reading::one_of;
 use super::scenario::ScenarioArguments;
-use super::{Exit, Failure};
-use tautline_sim::scenario::Override;
-use tautline_studies::compare::Watch;
-use tautline_studies::margin::{Asked, Margin, MarginError, MarginPage, Plan, Question, Range};
-
-/// Most runs of a value.
-const MOST_RUNS: u64 = 1_000_000;
-/// Largest seed that a scenario file can say, less the most runs.
-const LAST_SEED: u64 = i64::MAX as u64 - MOST_RUNS;
+use tautline_report::request::Failure;
+use tautline_report::request::outputs::is_standard_output;
+use tautline_studies::margin::{Asked, MarginRequest, Question, Range, margin as answer};
+use tautline_studies::{MOST_RUNS, SEEDS};
 
 /// Arguments of `tautline margin`.
 #[derive(Debug, Args)]
@@ -40,11 +36,11 @@ pub(super) struct MarginArguments {
     #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=MOST_RUNS))]
     runs: u64,
     /// Seed of the first run.
-    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=LAST_SEED))]
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(SEEDS))]
     seed: u64,
     /// What every run has to show.
-    #[arg(long, value_enum, value_name = "WHAT", default_value_t = Verdict::Pass)]
-    verdict: Verdict,
+    #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
+    verdict: Question,
     /// Values, evenly spaced with both ends, that are looked at first.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
     scan: u16,
@@ -74,132 +70,39 @@ pub(super) struct MarginArguments {
     threads: Option<u16>,
 }
 
-/// What every run of a value has to show.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Verdict {
-    /// It passes: clear, and its formation reached as far as asked.
-    Pass,
-    /// No two vehicles come closer than delta, to the end of the flight.
-    Clear,
-    /// The formation is reached and kept to the end.
-    Reached,
-}
-
-impl From<Verdict> for Question {
-    fn from(verdict: Verdict) -> Self {
-        match verdict {
-            Verdict::Pass => Self::Pass,
-            Verdict::Clear => Self::Clear,
-            Verdict::Reached => Self::Reached,
-        }
-    }
+fn verdict() -> impl TypedValueParser<Value = Question> {
+    let help = |question| match question {
+        Question::Pass => "It passes: clear, and its formation reached as far as asked",
+        Question::Clear => "No two vehicles come closer than delta, to the end of the flight",
+        Question::Reached => "The formation is reached and kept to the end",
+    };
+    one_of(Question::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
 }
 
 impl MarginArguments {
-    fn outputs(&self) -> impl Iterator<Item = (&'static str, &Path)> {
-        let all = [("--json", &self.json), ("--csv", &self.csv), ("--html", &self.html)];
-        all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
-    }
-
-    fn plan(&self) -> Result<Plan, Failure> {
-        let overrides = &self.what.overrides;
-        let overrides = overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-        let range = Range {
-            from: self.from,
-            to: self.to,
-            scan: self.scan.into(),
-            halvings: self.halvings,
-            logarithmic: self.log,
-        };
-        let asked = Asked { question: self.verdict.into(), runs: self.runs, seed: self.seed };
-        Ok(Plan::new(self.what.source()?, &overrides, &self.key, range, asked)?)
-    }
-
-    /// The command that makes the same search again, for a shell.
-    fn command(&self) -> String {
-        let numbers = [self.from, self.to].map(|number| format!("{number:?}"));
-        let counts = [self.runs.to_string(), self.seed.to_string(), self.scan.to_string(), self.halvings.to_string()];
-        let verdict = self.verdict.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-        let [runs, seed, scan, halvings] = counts.each_ref().map(String::as_str);
-        let what = ["margin", &self.what.scenario, "--key", &self.key, "--from", &numbers[0], "--to", &numbers[1]];
-        let asked = ["--runs", runs, "--seed", seed, "--verdict", &verdict, "--scan", scan, "--halvings", halvings];
-        let sets = self.what.overrides.iter().flat_map(|text| ["--set", text]);
-        let words: Vec<_> = what.into_iter().chain(asked).chain(self.log.then_some("--log")).chain(sets).collect();
-        console::command_line(words.into_iter())
-    }
-
-    /// The commands that fly the two sides of the bracket: a run that holds, and the first that does not.
-    fn sides(&self, plan: &Plan, margin: &Margin) -> Vec<(String, String)> {
-        let question = margin.question;
-        let side = |(probe, what): (&tautline_studies::margin::Probe, &str)| {
-            let sets = plan.sets(probe.value, probe.worst_run(question));
-            let sets = self.what.overrides.iter().chain(&sets).flat_map(|set| ["--set", set.as_str()]);
-            let words = ["run", &self.what.scenario].into_iter().chain(sets).collect::<Vec<_>>();
-            (format!("A flight that {what}:"), console::command_line(words.into_iter()))
-        };
-        margin.sides().into_iter().flat_map(|sides| sides.into_iter().zip(question.words())).map(side).collect()
+    fn request(&self) -> Result<MarginRequest, Failure> {
+        Ok(MarginRequest {
+            range: Range {
+                from: self.from,
+                to: self.to,
+                scan: self.scan.into(),
+                halvings: self.halvings,
+                logarithmic: self.log,
+            },
+            asked: Asked { question: self.verdict, runs: self.runs, seed: self.seed },
+            json: self.json.clone(),
+            csv: self.csv.clone(),
+            html: self.html.clone(),
+            force: self.force,
+            threads: self.threads.map(usize::from),
+            ..MarginRequest::new(self.what.request()?, &self.key, self.from, self.to)
+        })
     }
 }
 
 pub(super) fn margin(arguments: &MarginArguments) -> Result<Exit, Failure> {
-    let data_on_stdout = arguments.outputs().any(|(_, file)| is_standard_output(file));
-    let console = Console { data_on_stdout, quiet: arguments.quiet };
-    outputs::check_new(&arguments.what.scenario, arguments.outputs(), arguments.force)?;
-    let plan = arguments.plan()?;
-    let threads = arguments.threads.map_or_else(rayon::current_num_threads, usize::from);
-    let interrupted = interruption()?;
-
-    let bar = console.progress(plan.steps(), "margin".to_owned());
-    let found = plan.search(threads, Watch { flown: &|steps| bar.inc(steps), interrupted: &interrupted });
-    bar.finish_and_clear();
-    let Some(margin) = found? else {
-        console.warn("interrupted before the verdict was known at both ends of an interval: there is nothing to say");
-        return Ok(Exit::Bad);
-    };
-    for note in margin.notes() {
-        console.warn(&format!("note: {note}"));
-    }
-    let sides = arguments.sides(&plan, &margin);
-    let repeated: Vec<_> = sides.iter().map(|(what, command)| format!("{what}\n  {command}")).collect();
-    let said = [vec![margin.headline()], margin.predictions()].concat().join("\n");
-    console.say(&format!("{said}\n\n{}\n{}", margin.text(), repeated.join("\n")));
-    leave(arguments, &margin, &sides, console)?;
-    let known = !margin.interrupted && (margin.turn.is_some() || margin.holds_everywhere());
-    Ok(if known { Exit::Good } else { Exit::Bad })
-}
-
-/// Writes what was asked for.
-fn leave(
-    arguments: &MarginArguments,
-    margin: &Margin,
-    sides: &[(String, String)],
-    console: Console,
-) -> Result<(), Failure> {
-    let unwritten = |error: &dyn std::error::Error| Failure::machine(format!("cannot write the result: {error}"));
-    if let Some(file) = &arguments.json {
-        write(file, margin.to_json().map_err(|error| unwritten(&error))?.as_bytes())?;
-    }
-    if let Some(file) = &arguments.csv {
-        write(file, &margin.to_csv().map_err(|error| unwritten(&error))?)?;
-    }
-    if let Some(file) = &arguments.html {
-        write(file, margin.to_html(&MarginPage { command: &arguments.command(), sides }).as_bytes())?;
-    }
-    for (_, file) in arguments.outputs().filter(|(_, file)| !is_standard_output(file)) {
-        console.say(&format!("wrote {}", file.display()));
-    }
-    Ok(())
-}
-
-impl From<MarginError> for Failure {
-    fn from(error: MarginError) -> Self {
-        match error {
-            MarginError::Range(why) => Self::input(
-                why,
-                "give --from and --to two different finite numbers, both more than 0 where --log is given",
-            ),
-            MarginError::Scenario { set, error } => Self::from(error).under(&format!("with {set}")),
-            MarginError::Flight { set, error } => Self::from(error).under(&format!("with {set}")),
-        }
-    }
+    let request = arguments.request()?;
+    let data_on_stdout = request.outputs().any(|(_, file)| is_standard_output(file));
+    let monitor = Terminal::new(Console { data_on_stdout, quiet: arguments.quiet })?;
+    Ok(Exit::good_if(answer(&request, &monitor)?.is_some_and(|margin| margin.is_known())))
 }

@@ -4,15 +4,9 @@
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
 mod attack;
-mod audit;
 mod audit_arguments;
-mod audit_config;
-mod audit_proof;
 mod audits;
-mod call;
-mod caller;
 mod campaign;
-mod campaign_worst;
 mod check;
 mod command;
 mod compare;
@@ -23,54 +17,29 @@ mod diagnostic;
 mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
-mod encounters;
-mod envelope;
 mod events;
 mod export;
-mod folder;
-mod judgement;
 mod list;
 mod margin;
-mod obstacles;
-mod open;
-mod outputs;
-mod own;
-mod own_obstacles;
-mod own_told;
-mod pictures;
-mod places;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
-mod replays;
 mod run;
 mod scenario;
 mod schema;
-#[cfg(feature = "viewer")]
-mod snapshots;
 mod summary;
-mod text_file;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;
-#[cfg(feature = "viewer")]
-mod worst;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser as _;
 
-pub use call::{Answer, Held, Refusal, call, judge, open};
-pub use own::{OwnRecording, Witness};
-pub use pictures::flight_page;
-pub use run::run_verdict;
-
-pub use tautline_report::figures::RunHistory;
-pub use tautline_report::replay::Film;
-
 use command::{Arguments, Command, obey, quiet_guarded_panics};
-use diagnostic::{Exit, Failure};
+use diagnostic::Exit;
+use tautline_report::request::command_line;
 
 /// Runs the program with the arguments of the process.
 #[must_use]
@@ -82,7 +51,8 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
-    caller::by_person(arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect());
+    let words: Vec<_> = arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    let line = command_line(words.iter().map(String::as_str));
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
@@ -101,5 +71,5 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     } {
         driver::silence();
     }
-    obey(command).unwrap_or_else(Failure::show) as u8
+    obey(command, &line).unwrap_or_else(|failure| diagnostic::show(&failure)) as u8
 }

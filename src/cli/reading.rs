@@ -1,17 +1,18 @@
 //! Arguments that say how a recording is read, the same for all commands that read one.
 
-use std::path::{Path, PathBuf};
+#[cfg(feature = "viewer")]
+use std::path::Path;
+use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::Failure;
-use super::own::OwnRecording;
-use super::run::RECORDING;
 use tautline_recordings::read::{
-    self, ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadError, ReadOptions, Recording,
-    TimeUnit,
+    ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadOptions, Scale, TimeUnit,
 };
+#[cfg(feature = "viewer")]
+use tautline_report::request::Failure;
+use tautline_report::request::RECORDING;
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
@@ -20,10 +21,10 @@ use tautline_recordings::read::{
 pub(super) struct ReadArguments {
     /// The recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
     #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]
-    pub(super) recording: PathBuf,
+    recording: PathBuf,
     /// More recordings, or with --join more files of the same one.
     #[arg(index = 2, value_name = "MORE", value_parser = recording())]
-    pub(super) more: Vec<PathBuf>,
+    more: Vec<PathBuf>,
     /// Several files are one recording, a vehicle in each.
     #[arg(long)]
     join: bool,
@@ -49,10 +50,10 @@ pub(super) struct ReadArguments {
     #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
     dimensions: Option<Dimensions>,
     /// Metres per unit of length of the recording; three numbers, with signs, are of its x, y and z [default: 1].
-    #[arg(long, value_name = "METRES", value_parser = scale, allow_hyphen_values = true)]
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     scale: Option<Scale>,
     /// Directions of the axes of the recording: enu, ned, nwu and the like, or what becomes x, y and z, such as y,x,-z.
-    #[arg(long, value_name = "AXES", value_parser = axes, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AXES", allow_hyphen_values = true)]
     axes: Option<Axes>,
     /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
@@ -64,9 +65,6 @@ pub(super) struct ReadArguments {
     /// the words time, vehicle and axis (of x, y, z), such as time,vehicle,axis.
     #[arg(long, value_name = "AXES", value_parser = ArrayAxis::layout_of)]
     layout: Option<ArrayLayout>,
-    /// What a tautline.toml says of that.
-    #[arg(skip)]
-    pub(super) usual_layout: Option<ArrayLayout>,
     /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
@@ -82,135 +80,49 @@ pub(super) struct ReadArguments {
 }
 
 impl ReadArguments {
-    /// Whether one file is read as it is, in metres.
-    pub(super) fn is_read_plainly(&self) -> bool {
-        let is_moved =
-            self.scale.is_some() || self.axes.is_some() || self.frames_per_s.is_some() || self.time_scale.is_some();
-        let is_chosen = self.sort || self.one_vehicle || self.duplicates.is_some();
-        self.more.is_empty() && self.columns.is_empty() && !is_moved && !is_chosen
-    }
-
-    /// Opens the recording.
-    pub(super) fn open(&self, options: &ReadOptions) -> Result<Recording, ReadError> {
-        if self.more.is_empty() {
-            return read::open(&self.recording, options);
-        }
-        read::open_joined(&self.paths().collect::<Vec<_>>(), options)
-    }
-
     /// The only file or folder, of what is `done` with one.
     #[cfg(feature = "viewer")]
     pub(super) fn only(&self, done: &str) -> Result<&Path, Failure> {
         if self.more.is_empty() {
             return Ok(&self.recording);
         }
+        let message = format!("several recordings are given, and one is {done}");
         let help = "put the files into a folder if each holds a vehicle of one recording, and give that";
-        Err(Failure::input(format!("several recordings are given, and one is {done}"), help))
+        Err(Failure::input("usage/several-recordings", message, help))
     }
 
-    /// Each recording: all files are one with --join.
-    pub(super) fn recordings(&self) -> Vec<Self> {
-        if self.join {
-            return vec![self.clone()];
-        }
-        let alone = |path: &Path| Self { recording: path.to_owned(), more: Vec::new(), ..self.clone() };
-        self.paths().map(alone).collect()
+    /// The files of each recording: all files are one with --join.
+    pub(super) fn recordings(&self) -> Vec<Vec<PathBuf>> {
+        let paths = std::iter::once(&self.recording).chain(&self.more).cloned();
+        if self.join { vec![paths.collect()] } else { paths.map(|path| vec![path]).collect() }
     }
 
-    /// What the recording is called.
-    pub(super) fn called(&self) -> String {
-        read::called(&self.paths().collect::<Vec<_>>())
-    }
-
-    /// What the recording says of itself, where it is ours.
-    ///
-    /// # Errors
-    /// As [`OwnRecording::read`].
-    pub(super) fn own(&self, format: Option<Format>, scale: f64) -> Result<Option<OwnRecording>, Failure> {
-        let may_be_ours = self.more.is_empty() && format.is_none_or(|format| format == Format::Mcap);
-        if may_be_ours { OwnRecording::read(&self.recording, scale) } else { Ok(None) }
-    }
-
-    /// All files.
-    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
-        std::iter::once(&self.recording).chain(&self.more).map(PathBuf::as_path)
-    }
-
-    /// Fills what is not given of the axes and of their scale, as a file of settings says it.
-    ///
-    /// # Errors
-    /// What is wrong with the text of either.
-    pub(super) fn fill(&mut self, axes_as: Option<&str>, scale_as: Option<&str>) -> Result<(), String> {
-        self.axes = self.axes.or(axes_as.map(axes).transpose()?);
-        self.scale = self.scale.or(scale_as.map(scale).transpose()?);
-        Ok(())
-    }
-
-    /// The options of the library, with the format if it is given.
-    pub(super) fn options(&self, format: Option<Format>) -> Result<ReadOptions, Failure> {
-        let scale = self.scale.unwrap_or(Scale { metres: 1.0, each: [1.0; 3] });
-        if !(scale.metres > 0.0 && scale.metres.is_finite()) {
-            let message = format!("--scale is {}", scale.metres);
-            return Err(Failure::input(message, "give a positive number of metres, such as 0.001 for millimetres"));
-        }
-        for (option, value) in [("--fps", self.frames_per_s), ("--time-scale", self.time_scale)] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Failure::input(format!("{option} is {value}"), "give a positive number"));
-            }
-        }
+    /// How each recording is read, with the format if it is given.
+    pub(super) fn options(&self, format: Option<Format>) -> ReadOptions {
         let mut columns = ColumnNames::default();
         for (role, name) in &self.columns {
             columns.set(role, name);
         }
-        Ok(ReadOptions {
+        ReadOptions {
             format,
             time_unit: self.time_unit,
             times_per_second: self.frames_per_s.or(self.time_scale.map(f64::recip)),
             sort: self.sort,
             duplicates: self.duplicates,
-            scale: scale.metres,
-            axes: self.axes.unwrap_or_default().scaled(scale.each),
+            scale: self.scale,
+            axes: self.axes,
             dimensions: self.dimensions,
             one_vehicle: self.one_vehicle,
             starts: self.starts.iter().cloned().collect(),
             columns,
             layout: self.layout,
-            usual_layout: self.usual_layout,
             frame: self.frame.clone(),
             topics: self.topics.clone(),
             origin: self.origin,
             allow_unfinished: self.allow_unfinished,
             ..ReadOptions::default()
-        })
+        }
     }
-}
-
-/// Metres per unit of length: the same for all axes, and what is different among them.
-#[derive(Clone, Copy, Debug)]
-struct Scale {
-    metres: f64,
-    each: [f64; 3],
-}
-
-fn scale(text: &str) -> Result<Scale, String> {
-    if let Ok(metres) = text.trim().parse() {
-        return Ok(Scale { metres, each: [1.0; 3] });
-    }
-    let each = three(text).map_err(|_| format!("`{text}` is neither a number nor three, such as 1,1,-1"))?;
-    if each.contains(&0.0) {
-        return Err("a scale of 0 makes all places the same".to_owned());
-    }
-    // Axes of one length differ by their signs alone.
-    let metres = each[0].abs();
-    if each.iter().all(|x| x.abs() == metres) {
-        return Ok(Scale { metres, each: each.map(f64::signum) });
-    }
-    Ok(Scale { metres: 1.0, each })
-}
-
-fn axes(text: &str) -> Result<Axes, String> {
-    let help = "three directions such as enu, ned or nwu, or what becomes x, y and z, such as y,x,-z";
-    Axes::from_name(text).ok_or_else(|| format!("`{text}` is not {help}"))
 }
 
 fn duplicates() -> impl TypedValueParser<Value = Duplicates> {

@@ -8,16 +8,16 @@ use clap::Args;
 use indicatif::ProgressBar;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
+use super::Exit;
 use super::console::Console;
 use super::drawing;
-use super::folder::try_to_write_in;
-use super::outputs::{self, Called};
 use super::reading::{self, ReadArguments};
-use super::{Exit, Failure};
 use tautline_render::{
     CameraSpec, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, contact_sheet,
 };
 use tautline_report::report::{write_atomically, write_atomically_with};
+use tautline_report::request::outputs::{self, Called};
+use tautline_report::request::{Failure, try_to_write_in};
 
 /// Most pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
@@ -105,7 +105,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let camera: CameraSpec = arguments.camera.parse()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
     let fps = arguments.fps.unwrap_or(FPS);
-    let reading = arguments.reading.options(arguments.input_format)?;
+    let reading = arguments.reading.options(arguments.input_format);
     let recording = arguments.reading.only("drawn")?;
     let timeline = drawing::timeline(recording, &reading, arguments.delta, console)?;
     let beside = || recording.parent().unwrap_or(Path::new("")).join("snapshots");
@@ -136,12 +136,12 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     if let Some((path, _)) = film {
         if path.is_dir() {
             let message = format!("{} is a folder, not a film", path.display());
-            return Err(Failure::input(message, "name a file with --film"));
+            return Err(Failure::input("usage/no-effect", message, "name a file with --film"));
         }
         writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
     }
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
-    let progress = console.progress((stills.len() + frames.len() + tiles) as u64, timeline.name.clone());
+    let progress = console.progress(Some((stills.len() + frames.len() + tiles) as u64), timeline.name.clone());
     let mut batch = Batch { extent, timeline: &timeline, renderer, view, progress };
 
     let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
@@ -225,7 +225,7 @@ fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
 /// Whether a folder can be written to, before the work.
 fn writable(folder: &Path) -> Result<(), Failure> {
     try_to_write_in(folder).map_err(|error| {
-        Failure::machine(format!("cannot write to {}: {error}", folder.display()))
+        Failure::machine("files/cannot-write", format!("cannot write to {}: {error}", folder.display()))
             .with_help("give a folder that can be written to with --out, or another --film")
     })
 }
@@ -246,18 +246,22 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             "end" => (end_s, "end".to_owned()),
             "closest" => {
                 let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
-                let closest = timeline.closest().ok_or_else(|| Failure::input(none, "leave `closest` out of --at"))?;
+                let closest = timeline
+                    .closest()
+                    .ok_or_else(|| Failure::input("render/no-closest", none, "leave `closest` out of --at"))?;
                 (closest.time_s, "closest".to_owned())
             }
             seconds => {
                 let help = "give start, closest, end or seconds, such as --at start,12.5,end";
                 let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
-                let time_s = time_s.ok_or_else(|| Failure::input(format!("`{text}` is not a time"), help))?;
+                let time_s =
+                    time_s.ok_or_else(|| Failure::input("render/time", format!("`{text}` is not a time"), help))?;
                 (time_s, format!("at-{time_s:.3}s"))
             }
         };
         if !(start_s..=end_s).contains(&time_s) {
             return Err(Failure::input(
+                "render/out-of-range",
                 format!("{time_s} s is outside the recording, which goes from {start_s} s to {end_s} s"),
                 "give a time within the recording with --at",
             ));
@@ -283,6 +287,7 @@ fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64
     let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
     if count > MOST_PICTURES {
         return Err(Failure::input(
+            "render/out-of-range",
             format!("these would be {count:.0} pictures, more than {MOST_PICTURES:.0}"),
             format!("give a larger number with {option}"),
         ));
@@ -297,7 +302,7 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
         return Ok(number);
     }
     let message = format!("{option}: {number} is not a positive number");
-    Err(Failure::input(message, format!("give a positive number with {option}")))
+    Err(Failure::input("render/out-of-range", message, format!("give a positive number with {option}")))
 }
 
 fn film_times(fps: u32, speed: Option<f64>, timeline: &Timeline) -> Result<Vec<f64>, Failure> {
@@ -320,6 +325,7 @@ fn sheet_plan(
     let size_px = [width / columns, height / rows];
     if size_px.contains(&0) {
         return Err(Failure::input(
+            "render/out-of-range",
             format!("a sheet of {columns} x {rows} pictures does not fit into {width} x {height} pixels"),
             "give fewer pictures with --sheet, or a larger --size",
         ));
@@ -328,6 +334,7 @@ fn sheet_plan(
     let last = (u64::from(columns) * u64::from(rows) - 1).max(1) as f64;
     if last > MOST_PICTURES {
         return Err(Failure::input(
+            "render/out-of-range",
             format!("{columns} x {rows} pictures are more than {MOST_PICTURES:.0}"),
             "give fewer pictures with --sheet",
         ));

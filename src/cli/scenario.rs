@@ -2,9 +2,7 @@
 
 use clap::Args;
 
-use super::Failure;
-use super::caller::source;
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+use tautline_report::request::{Failure, ScenarioRequest};
 
 /// Which scenario, and what is changed of it.
 #[derive(Debug, Args)]
@@ -18,14 +16,8 @@ pub(super) struct ScenarioArguments {
 }
 
 impl ScenarioArguments {
-    /// Where the text of the scenario comes from.
-    pub(super) fn source(&self) -> Result<Source, ScenarioError> {
-        source(&self.scenario)
+    /// The scenario as a part of a request.
+    pub(super) fn request(&self) -> Result<ScenarioRequest, Failure> {
+        ScenarioRequest::named(&self.scenario, &self.overrides)
     }
-}
-
-/// The scenario of this name or in this file, with these keys set.
-pub(super) fn read<'a>(scenario: &str, overrides: impl IntoIterator<Item = &'a String>) -> Result<Scenario, Failure> {
-    let overrides = overrides.into_iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-    Ok(Scenario::read(&source(scenario)?, &overrides)?)
 }

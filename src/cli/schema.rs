@@ -1,7 +1,7 @@
 //! `tautline schema`: the JSON Schema of the scenario file.
 
-use super::console;
-use super::{Exit, Failure};
+use super::{Exit, console};
+use tautline_report::request::Failure;
 use tautline_sim::scenario;
 
 pub(super) fn schema() -> Result<Exit, Failure> {

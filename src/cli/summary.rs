@@ -2,17 +2,16 @@
 
 use std::fmt::Write as _;
 
-use super::Failure;
-use super::judgement::Judgement;
 use tautline_core::text::{at_least, counted, fixed};
 use tautline_report::report::Status;
+use tautline_report::request::{Audited, Failure};
 
 /// A summary in Markdown: a row for each recording, and behind it what was found of each that is not clear.
-pub(super) fn markdown(judged: &[Judgement], failures: &[(String, Failure)]) -> String {
+pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> String {
     let mut text =
         "## tautline audit\n\n| recording | verdict | closest | who | at |\n| --- | --- | --- | --- | --- |\n"
             .to_owned();
-    for Judgement { report, .. } in judged {
+    for Audited { report, .. } in judged {
         let closest = report.closest.first();
         let unit = if report.measure == "metres" { "m" } else { "ellipsoids" };
         let cells = [
@@ -28,7 +27,7 @@ pub(super) fn markdown(judged: &[Judgement], failures: &[(String, Failure)]) -> 
     for (recording, failure) in failures {
         let _ = writeln!(text, "| {} | \u{274c} not judged: {} | | | |", plain(recording), plain(&failure.in_words()));
     }
-    for Judgement { report, .. } in judged {
+    for Audited { report, .. } in judged {
         let notes = report.source.notes.iter().map(|note| format!("note: {note}\n"));
         let (headline, found) = (report.headline(), report.text() + &notes.collect::<String>());
         let fence = "`".repeat(longest_run(&headline).max(longest_run(&found)).max(2) + 1);
@@ -43,13 +42,13 @@ pub(super) fn markdown(judged: &[Judgement], failures: &[(String, Failure)]) -> 
 }
 
 /// A line for each recording, in the words of GitHub Actions.
-pub(super) fn github(judged: &[Judgement], failures: &[(String, Failure)]) -> String {
+pub(super) fn github(judged: &[Audited], failures: &[(String, Failure)]) -> String {
     let mut text = String::new();
     let mut line = |level: &str, recording: &str, title: &str, message: &str| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "::{level} file={},title={}::{}", property(recording), property(title), data(message));
     };
-    for Judgement { report, allows_undecided, asked_by } in judged {
+    for Audited { report, allows_undecided, asked_by } in judged {
         let level = match report.status {
             Status::Clear => "notice",
             Status::Undecided if *allows_undecided => "warning",
@@ -65,7 +64,7 @@ pub(super) fn github(judged: &[Judgement], failures: &[(String, Failure)]) -> St
 }
 
 /// How many recordings got which verdict, in one line.
-pub(super) fn counts(judged: &[Judgement], failures: usize) -> String {
+pub(super) fn counts(judged: &[Audited], failures: usize) -> String {
     let of = |status: Status| judged.iter().filter(|of| of.report.status == status).count() as u64;
     let mut parts = vec![
         counted(of(Status::Clear), "recording clear", "recordings clear"),
@@ -127,7 +126,8 @@ mod tests {
         assert_eq!(property("a,b:c%\n::error::"), "a%2Cb%3Ac%25%0A%3A%3Aerror%3A%3A");
         assert_eq!(data("\u{1b}[31m##[error]x"), "\u{fffd}[31m# #[error]x");
         assert_eq!((longest_run("a```b``"), longest_run("")), (3, 0));
-        let failures = [("x\n::error::y.csv".to_owned(), Failure::input("no\nsuch file", "look"))];
+        let failures =
+            [("x\n::error::y.csv".to_owned(), Failure::input("recording/not-found", "no\nsuch file", "look"))];
         assert_eq!(github(&[], &failures).lines().count(), 1);
         assert!(markdown(&[], &failures).contains("not judged: no such file (look)"));
     }

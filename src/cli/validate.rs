@@ -4,16 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::console::{self, Console};
-use super::folder::OutFolder;
-use super::pictures::{svg_files, write_files};
-use super::run::threads;
-use super::{Exit, Failure};
-use tautline_report::report::write_atomically;
-use tautline_validate::{self as validate, Validation};
-
-/// The page for people.
-const PAGE: &str = "validate.html";
+use super::Exit;
+use super::console::{self, Console, Terminal};
+use tautline_report::request::Failure;
+use tautline_validate::{ValidateRequest, validate_into};
 
 /// Arguments of `tautline validate`.
 #[derive(Debug, Args)]
@@ -41,30 +35,19 @@ pub(super) struct ValidateArguments {
 
 pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json || arguments.markdown, quiet: arguments.quiet };
-    let folder = OutFolder::at(&arguments.out, "validation", "validate.json");
-    let _lock = folder.open(arguments.force)?;
-    let threads = threads(arguments.threads.map_or(0, usize::from))?;
-    let bar = console.progress(validate::work(), "validate".to_owned());
-    let validation = threads.install(|| validate::validate(&|units| bar.inc(units)));
-    bar.finish_and_clear();
-
-    let json = validation.to_json().map_err(|error| Failure::machine(format!("cannot write the result: {error}")))?;
-    leave(&folder, &validation, &json)?;
-    console.say(&format!("{}{}", validation.text(), validation.headline()));
-    console.say(&format!("wrote {} and {}", folder.report().display(), folder.file(PAGE).display()));
+    let request = ValidateRequest {
+        out: arguments.out.clone(),
+        force: arguments.force,
+        threads: arguments.threads.map(usize::from),
+    };
+    let validation = validate_into(&request, &Terminal::without_signals(console))?;
     if arguments.json {
-        console::data(&json)?;
+        let json = validation.to_json();
+        let failed = |error| Failure::machine("files/cannot-write", format!("cannot write the answer: {error}"));
+        console::data(&json.map_err(failed)?)?;
     }
     if arguments.markdown {
         console::data(&validation.markdown())?;
     }
-    Ok(if validation.pass { Exit::Good } else { Exit::Bad })
-}
-
-/// Leaves figures, page and result in the folder; `validate.json`, which marks it as finished, comes last.
-fn leave(folder: &OutFolder, validation: &Validation, json: &str) -> Result<(), Failure> {
-    write_files(&folder.file("figures"), &[], &svg_files(&validation.figures))?;
-    write_atomically(&folder.file(PAGE), validation.to_html().as_bytes())?;
-    write_atomically(&folder.report(), json.as_bytes())?;
-    Ok(())
+    Ok(Exit::good_if(validation.pass))
 }

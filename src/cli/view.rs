@@ -9,11 +9,11 @@ use clap::Args;
 use super::console::Console;
 use super::drawing;
 use super::reading::{self, ReadArguments};
-use super::scenario;
-use super::{Exit, Failure};
+use super::{Exit, diagnostic};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_recordings::read::{Format, ReadOptions};
 use tautline_render::{LiveUpdate, Theme, Timeline, show};
+use tautline_report::request::{Failure, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Parts};
 
@@ -49,28 +49,37 @@ pub(super) struct ViewArguments {
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = arguments.reading.only("shown")?;
-    let reading = arguments.reading.options(arguments.input_format)?;
+    let reading = arguments.reading.options(arguments.input_format);
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
     let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
             let help = "leave --set out, or give a scenario";
-            return Err(Failure::input("a recording has been flown: --set has no effect on it", help));
+            return Err(Failure::input(
+                "usage/no-effect",
+                "a recording has been flown: --set has no effect on it",
+                help,
+            ));
         }
         (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
             let help = "leave --delta out, or give --set with the scenario's own key";
             return Err(Failure::input(
+                "usage/no-effect",
                 "a scenario says itself what it is judged by: --delta has no effect on it",
                 help,
             ));
         }
         if reading != ReadOptions::default() {
             let help = "leave the options of reading out, or give a recording";
-            return Err(Failure::input("a scenario is flown: how a recording is read has no effect on it", help));
+            return Err(Failure::input(
+                "usage/no-effect",
+                "a scenario is flown: how a recording is read has no effect on it",
+                help,
+            ));
         }
-        let scenario = scenario::read(&path.to_string_lossy(), &arguments.overrides)?;
+        let scenario = ScenarioRequest::named(&path.to_string_lossy(), &arguments.overrides)?.read()?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
     show(timeline, live, arguments.theme, arguments.adapter.as_str().into())?;
@@ -124,7 +133,7 @@ impl Sink for LiveSink {
 
 /// Says that the display is gone. Nothing that belongs to it can be put away any more: the program is to end at once.
 pub(super) fn lose_display() -> Exit {
-    Failure::machine("the display is gone, and the window with it")
-        .with_help("open it again on a display that stays, or draw without one: tautline render RECORDING")
-        .show()
+    let help = "open it again on a display that stays, or draw without one: tautline render RECORDING";
+    let message = "the display is gone, and the window with it";
+    diagnostic::show(&Failure::machine("render/no-display", message).with_help(help))
 }

@@ -6,7 +6,6 @@ mod program;
 mod archives;
 mod attack;
 mod audit;
-mod calls;
 mod campaign;
 mod campaign_files;
 mod check;

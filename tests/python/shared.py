@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 import tempfile
 import unittest
 from collections.abc import Callable
@@ -27,6 +30,12 @@ def passing(instants: int = 100) -> tuple[NDArray[np.float64], NDArray[np.float6
 def short(name: str = "pentagon", **sets: object) -> tl.Scenario:
     """A built-in scenario of two seconds."""
     return tl.Scenario(name, set={"time.duration_s": 2.0, **sets})
+
+
+def printed_json(words: list[str]) -> dict:
+    """Returns what the command line prints as JSON."""
+    ran = subprocess.run([sys.executable, "-m", "tautline", *words], capture_output=True, check=False)
+    return json.loads(ran.stdout)
 
 
 class Case(unittest.TestCase):

@@ -1,16 +1,9 @@
 """Audits of arrays and of files: the same verdicts as the command line's, whatever the order in memory."""
 
-import json
 
 import numpy as np
 import tautline as tl
-from shared import Case, passing
-from tautline import _native
-
-
-def told(words: list[str]) -> dict:
-    """What the command line prints as JSON."""
-    return json.loads(_native.call(words)[1])
+from shared import Case, passing, printed_json
 
 
 class Arrays(Case):
@@ -40,7 +33,7 @@ class Arrays(Case):
                 a = tl.audit(t, p, **options)
                 self.assertEqual(a.verdict, verdict)
                 self.assertEqual(tl.audit(tl_path, **options).verdict, verdict)
-                printed = told(["audit", "--json", *words, str(tl_path)])
+                printed = printed_json(["audit", "--json", *words, str(tl_path)])
                 ours = a.to_dict()
                 for key in ("status", "separation", "audit", "closest", "violations", "undecided", "gaps", "vehicles", "span_s"):
                     self.assertEqual(ours[key], printed[key], key)
@@ -156,7 +149,7 @@ class Files(Case):
         file = self.folder / "run.mcap"
         tl.fly("pentagon-laplacian", record=file)
         a = tl.audit(file)
-        self.assertEqual(a.to_dict(), told(["audit", "--json", str(file)]))
+        self.assertEqual(a.to_dict(), printed_json(["audit", "--json", str(file)]))
         self.assertEqual(a.verdict, "VIOLATION")
         a.to_html(self.folder / "a.html")
         self.assertTrue((self.folder / "a.html").exists())

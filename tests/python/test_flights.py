@@ -1,6 +1,5 @@
 """Flights and laws in Python: the same bits as the program flies, exceptions whole, the interpreter free."""
 
-import json
 import os
 import signal
 import sys
@@ -11,15 +10,14 @@ import unittest
 
 import numpy as np
 import tautline as tl
-from shared import Case, Springs, short
-from tautline import _native
+from shared import Case, Springs, printed_json, short
 
 
 class Flights(Case):
     def test_a_flight_is_the_programs_to_the_bit(self) -> None:
         ours = tl.fly(short(), record=self.folder / "ours.mcap").to_dict()
         words = ["run", "pentagon", "--set=time.duration_s=2.0", "--json", "--no-figures", f"--out={self.folder / 'theirs'}"]
-        theirs = json.loads(_native.call(words)[1])
+        theirs = printed_json(words)
         for report in (ours, theirs):
             del report["performance"]
         self.assertEqual(ours, theirs)

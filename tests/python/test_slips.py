@@ -75,8 +75,8 @@ class Words(Case):
             ("names: a list of names is needed, not str", {"names": "abcd"}),
             ("limit: a dictionary is needed, not int", {"limit": 5}),
             ("offset: a dictionary is needed, not int", {"offset": 5}),
-            ("expect_vehicles: a number is needed, not bool", {"expect_vehicles": True}),
-            ("motion: a number is needed, not bool", {"motion": False}),
+            ("expect_vehicles: a whole number is needed, not bool", {"expect_vehicles": True}),
+            ("motion: a string is needed, not bool", {"motion": False}),
             ("unexpected keyword argument 'detla'", {"detla": 1.0}),
         ):
             self.refuses(TypeError, says, lambda asked=asked: tl.audit(t, p, **{"delta": 0.1, **asked}))

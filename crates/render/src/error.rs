@@ -1,6 +1,7 @@
 //! Why there is no picture, no film or no window.
 
 use tautline_core::record::RecordError;
+use tautline_report::request::Failure;
 
 /// Largest coordinate and radius that are drawn \[m\]: more than twice as far as the Moon. Pictures are made in single
 /// precision, where fourth powers of lengths must have room.
@@ -63,6 +64,30 @@ pub enum RenderError {
 }
 
 impl RenderError {
+    /// The stable name of the problem, such as `render/no-adapter`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Record(_) => "recording/malformed",
+            Self::TooFar(_) => "render/too-far",
+            Self::Empty(_) => "render/empty",
+            Self::Camera(_) => "render/camera",
+            Self::NoVehicle(_) => "render/no-vehicle",
+            Self::NoAdapter => "render/no-adapter",
+            Self::NoSuchAdapter(_) => "render/no-such-adapter",
+            Self::PictureSize(_) => "render/picture-size",
+            Self::Driver(_) => "render/driver",
+            Self::Picture(_) => "render/picture",
+            Self::UnknownFilm(_) => "render/unknown-film",
+            Self::FilmRate(_) => "render/film-rate",
+            Self::FilmSize(_) => "render/film-size",
+            Self::Film(_) => "render/film",
+            Self::Write(_) => "files/cannot-write",
+            Self::NoDisplay(_) => "render/no-display",
+            Self::NoWindow(_) => "render/no-window",
+        }
+    }
+
     /// Whether the machine is at fault, and not what was asked for.
     #[must_use]
     pub fn is_machine(&self) -> bool {
@@ -111,4 +136,16 @@ pub(super) fn check_lengths<'a>(
     too_far.map_or(Ok(()), |length_m| {
         Err(RenderError::TooFar(format!("vehicle {} has a {what} of {length_m:?} m at {time_s} s", vehicle())))
     })
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Record(error) => error.into(),
+            error => {
+                let failure = Self::told(error.code(), error.is_machine(), error.to_string());
+                error.help().into_iter().fold(failure, Self::with_help)
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //!
 //! | module | holds |
 //! | --- | --- |
+//! | [`request`] | everything that `tautline run` and `tautline audit` do, for programs |
 //! | [`run`] | flies a scenario and returns its report |
 //! | [`report`] | `report.json`, `report.html` and the verdict in words |
 //! | [`figures`] | a run as charts in SVG |
@@ -12,6 +13,7 @@
 pub mod figures;
 pub mod replay;
 pub mod report;
+pub mod request;
 pub mod run;
 
 pub use tautline_sim::scenario;

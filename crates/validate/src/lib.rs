@@ -24,12 +24,14 @@ mod law;
 mod margins;
 mod page;
 mod rates;
+mod request;
 mod result;
 mod starts;
 mod tension;
 
 pub use claim::{Claim, Group, Kind};
 pub use convergence::Refinement;
+pub use request::{ValidateRequest, validate_into};
 pub use result::{Performance, SCHEMA_VERSION, Validation};
 
 use std::time::Instant;

@@ -49,6 +49,20 @@ impl ExportError {
         .to_owned()
     }
 
+    /// The stable name of the problem, such as `export/curves`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Read(error) => error.code(),
+            Self::Write(_) => "files/cannot-write",
+            Self::Curves => "export/curves",
+            Self::NoCurves => "export/no-curves",
+            Self::SampleRate(_) => "export/sample-rate",
+            Self::NotWritten(_) => "export/not-written",
+            Self::Name(_) => "export/name",
+        }
+    }
+
     /// Whether the machine failed and not the input.
     #[must_use]
     pub fn is_machine(&self) -> bool {

@@ -1,5 +1,7 @@
 //! Axes of recordings turned to x, y and z of ours: east, north and up, or any frame whose z is up.
 
+use std::str::FromStr;
+
 use nalgebra::Vector3;
 
 /// Which axis of a recording becomes x, y and z, and by what it is multiplied.
@@ -13,6 +15,16 @@ impl Default for Axes {
     /// Axes as they are.
     fn default() -> Self {
         Self { from: [0, 1, 2], factors: [1.0; 3] }
+    }
+}
+
+impl FromStr for Axes {
+    type Err = String;
+
+    /// As [`Self::from_name`].
+    fn from_str(name: &str) -> Result<Self, String> {
+        let help = "three directions such as enu, ned or nwu, or what becomes x, y and z, such as y,x,-z";
+        Self::from_name(name).ok_or_else(|| format!("`{name}` is not {help}"))
     }
 }
 

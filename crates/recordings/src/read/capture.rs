@@ -78,8 +78,8 @@ pub(super) fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
 
 /// Opens a table with these columns.
 pub(super) fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if options.scale != 1.0 {
-        let problem = format!("it says its unit of length, and --scale {} another", options.scale);
+    if options.metres() != 1.0 {
+        let problem = format!("it says its unit of length, and --scale {} another", options.metres());
         return Err(Fault::content(problem, "leave --scale away").into());
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();

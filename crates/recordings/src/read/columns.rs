@@ -92,7 +92,7 @@ impl<'a> Columns<'a> {
         }
         let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
         let turned = if is_turned { ", with the sign turned" } else { "" };
-        let scale = options.scale;
+        let scale = options.metres();
         let unit = match self.units.get(&first) {
             None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
             None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),

@@ -38,7 +38,7 @@ pub(super) fn open(
         return Err(Fault::content(problem, "name vehicles in --start as their files are called").into());
     }
     for (name, files) in vehicles {
-        let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.scale, items: Vec::new() };
+        let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
         for file in &files {
             let appended = curve.append(file).map_err(|fault| fault.of(&file.shown()));
             appended.map_err(|fault| if several { fault.among_others() } else { fault })?;

@@ -54,6 +54,12 @@ impl ReadError {
         self.fault.help().to_owned()
     }
 
+    /// The stable name of the problem, such as `recording/unknown-format`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        self.fault.code()
+    }
+
     /// Whether the machine failed and not the input.
     #[must_use]
     pub fn is_machine(&self) -> bool {
@@ -137,6 +143,8 @@ pub enum Fault {
     /// The content is of its format, but cannot be read as motion.
     #[error("{problem}")]
     Content {
+        /// The stable name of the problem, such as `recording/time-backwards`.
+        code: &'static str,
         /// What is wrong.
         problem: String,
         /// What helps.
@@ -162,8 +170,12 @@ impl Fault {
         ReadError { place: Some(place), ..self.into() }
     }
 
+    pub(super) fn coded(code: &'static str, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Content { code, problem: problem.into(), remedy: remedy.into() }
+    }
+
     pub(super) fn content(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Content { problem: problem.into(), remedy: remedy.into() }
+        Self::coded("recording/content", problem, remedy)
     }
 
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
@@ -172,18 +184,19 @@ impl Fault {
 
     /// There is a header and nothing below it.
     pub(super) fn header_only() -> Self {
-        Self::content("it has a header and no rows", NOTHING_RECORDED)
+        Self::coded("recording/empty", "it has a header and no rows", NOTHING_RECORDED)
     }
 
     /// A number is infinite or not a number.
     pub(super) fn not_finite(column: &str, value: &str, remedy: &str) -> Self {
-        Self::content(format!("column `{column}` holds {}, which is not finite", quoted(value)), remedy)
+        let problem = format!("column `{column}` holds {}, which is not finite", quoted(value));
+        Self::coded("recording/not-finite", problem, remedy)
     }
 
     /// A cell is empty that must not be.
     pub(super) fn empty_cell(column: &str) -> Self {
         let remedy = "fill it, or leave all cells of the position empty where the vehicle was not seen";
-        Self::content(format!("column `{column}` is empty"), remedy)
+        Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
     }
 
     /// Time runs backwards where it must not.
@@ -192,19 +205,40 @@ impl Fault {
         let remedy = "look whether two recordings were joined or the clock was set; where the rows are of several \
                       vehicles, name the column that tells them apart with --column id=NAME; where the lines are only \
                       out of order, sort the lines by time, or have them sorted with --sort";
-        Self::content(problem, remedy)
+        Self::coded("recording/time-backwards", problem, remedy)
     }
 
     /// Times are numbers of frames, and nobody says how long one lasts.
     pub(super) fn frames(problem: impl Into<String>) -> Self {
         let remedy = "say how many there are in a second with --fps, such as --fps 30, or how many seconds each lasts \
                       with --time-scale";
-        Self::content(problem, remedy)
+        Self::coded("recording/frames", problem, remedy)
     }
 
     /// Numbers that are finite in the file are not in metres and seconds.
     pub(super) fn out_of_range() -> Self {
-        Self::content("its numbers leave the range of numbers", "look at --scale and at the numbers themselves")
+        Self::coded(
+            "recording/overflow",
+            "its numbers leave the range of numbers",
+            "look at --scale and at the numbers themselves",
+        )
+    }
+
+    fn code(&self) -> &'static str {
+        match self {
+            Self::System(error) if error.kind() == io::ErrorKind::NotFound => "recording/not-found",
+            Self::System(_) => "recording/cannot-read",
+            Self::Empty => "recording/empty",
+            Self::UnknownFormat => "recording/unknown-format",
+            Self::WrongFormat(_) => "recording/wrong-format",
+            Self::LineTooLong(_) => "recording/line-too-long",
+            Self::NotUtf8 => "recording/not-utf8",
+            Self::Truncated(_) => "recording/truncated",
+            Self::Unfinished => "recording/unfinished",
+            Self::Bomb(_) => "recording/grows-too-large",
+            Self::Damaged(_) => "recording/damaged",
+            Self::Content { code, .. } => code,
+        }
     }
 
     fn help(&self) -> &str {

@@ -144,7 +144,7 @@ impl Layout {
             let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
             layout.slots = leftovers::examine(header, &unused, &layout.names)?;
         }
-        layout.metres = columns.metres(&used, options.scale)?;
+        layout.metres = columns.metres(&used, options.metres())?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
         layout.notes.extend(convention.note.clone());
         if is_planar {
@@ -189,8 +189,8 @@ impl Layout {
     /// name no vehicle.
     fn check(&mut self, header: &[String], options: &ReadOptions, one: bool) -> Result<(), Fault> {
         let (convention, used) = (&self.convention, self.columns());
-        if convention.reference.is_some() && options.scale != 1.0 {
-            let problem = format!("its positions are in metres, and --scale {} says another unit", options.scale);
+        if convention.reference.is_some() && options.metres() != 1.0 {
+            let problem = format!("its positions are in metres, and --scale {} says another unit", options.metres());
             return Err(Fault::content(problem, "leave --scale away"));
         }
         let several = self
@@ -227,9 +227,9 @@ impl Layout {
         let is_told = is_one_vehicle || convention.is_one_vehicle;
         if self.id.is_none() && one && !is_told && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(match missing(header, ID, "") {
-                Fault::Content { problem, remedy } => {
+                Fault::Content { code, problem, remedy } => {
                     let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
-                    Fault::content(problem, remedy)
+                    Fault::coded(code, problem, remedy)
                 }
                 fault => fault,
             });

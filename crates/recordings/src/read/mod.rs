@@ -65,7 +65,7 @@ pub use error::{Fault, Place, ReadError};
 pub use format::Format;
 pub use heading::is_read;
 pub use mcap::Channels;
-pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions};
+pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions, Scale};
 pub use order::Recording;
 
 use std::fs;
@@ -134,7 +134,7 @@ pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
     let mut source = Source::file(path);
     let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::Skybrush;
     let limit = if is_show { skybrush::least_distance(&source).ok()?? } else { return None };
-    Some(limit * options.scale).filter(|limit| limit.is_finite() && *limit > 0.0)
+    Some(limit * options.metres()).filter(|limit| limit.is_finite() && *limit > 0.0)
 }
 
 /// The files of a folder, or of an archive that is no recording itself.

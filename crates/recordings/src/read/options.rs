@@ -1,10 +1,11 @@
 //! What the user says of a recording.
 
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 use super::axes::Axes;
 use super::clock::TimeUnit;
-use super::error::Fault;
+use super::error::{Fault, quoted};
 use super::format::Format;
 
 /// What an axis of an array of positions counts.
@@ -55,6 +56,57 @@ impl ArrayAxis {
     pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
         let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
         layout.ok_or_else(|| format!("`{name}` is none of {}", Self::LAYOUTS.map(Self::layout_name).join(" ")))
+    }
+}
+
+/// Metres per unit of length of a recording, for all axes or for each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// The part that all axes have in common.
+    metres: f64,
+    /// What each axis is multiplied by beside it, with its sign.
+    each: [f64; 3],
+}
+
+impl Default for Scale {
+    /// Lengths are in metres.
+    fn default() -> Self {
+        Self::from(1.0)
+    }
+}
+
+impl From<f64> for Scale {
+    /// The same for all axes, without a check: an option out of range is an error when a recording is opened.
+    fn from(metres: f64) -> Self {
+        Self { metres, each: [1.0; 3] }
+    }
+}
+
+impl From<[f64; 3]> for Scale {
+    /// One number for each axis, with signs. Axes of one length share it.
+    fn from(each: [f64; 3]) -> Self {
+        let metres = each[0].abs();
+        if metres > 0.0 && each.iter().all(|x| x.abs() == metres) {
+            return Self { metres, each: each.map(f64::signum) };
+        }
+        Self { metres: 1.0, each }
+    }
+}
+
+impl FromStr for Scale {
+    type Err = String;
+
+    /// Reads a number, or three between commas, as `--scale` takes them.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(metres) = text.trim().parse::<f64>() {
+            return Ok(metres.into());
+        }
+        let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+        match <[f64; 3]>::try_from(numbers.unwrap_or_default()) {
+            Ok(each) if each.contains(&0.0) => Err("a scale of 0 makes all places the same".to_owned()),
+            Ok(each) if each.iter().all(|x| x.is_finite()) => Ok(each.into()),
+            _ => Err(format!("`{text}` is neither a number nor three, such as 1,1,-1")),
+        }
     }
 }
 
@@ -150,7 +202,7 @@ impl ColumnNames {
 }
 
 /// What the user knows about a recording that its file does not say.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct ReadOptions {
     /// The format, instead of recognising it by the content.
@@ -164,10 +216,10 @@ pub struct ReadOptions {
     /// Which of several rows of a vehicle at one time is read. Where nothing is said, rows that say the same are read once
     /// and others are refused.
     pub duplicates: Option<Duplicates>,
-    /// Metres per unit of length of the file; velocities and radii are scaled too.
-    pub scale: f64,
-    /// What becomes x, y and z. The lengths of its axes are those of the file times `scale`.
-    pub axes: Axes,
+    /// Metres per unit of length of the file, by default 1; velocities and radii are scaled too.
+    pub scale: Option<Scale>,
+    /// Which axes of the file become x, y and z; by default they stay as they are.
+    pub axes: Option<Axes>,
     /// The numbers of a vehicle in a table without a header, where their count does not tell.
     pub dimensions: Option<Dimensions>,
     /// Whether a table whose rows name no vehicle is of one, whatever other columns it has.
@@ -195,46 +247,61 @@ pub struct ReadOptions {
     pub allow_unfinished: bool,
 }
 
-impl Default for ReadOptions {
-    /// Everything recognised, lengths in metres.
-    fn default() -> Self {
-        Self {
-            format: None,
-            time_unit: None,
-            times_per_second: None,
-            sort: false,
-            duplicates: None,
-            scale: 1.0,
-            axes: Axes::default(),
-            dimensions: None,
-            one_vehicle: false,
-            is_joined: false,
-            starts: BTreeMap::new(),
-            columns: ColumnNames::default(),
-            layout: None,
-            usual_layout: None,
-            frame: None,
-            topics: Vec::new(),
-            origin: None,
-            allow_unfinished: false,
-        }
-    }
-}
-
 impl ReadOptions {
+    /// Metres per unit of length that all axes have in common.
+    #[must_use]
+    pub fn metres(&self) -> f64 {
+        self.scale.unwrap_or_default().metres
+    }
+
+    /// How axes are turned and stretched, lengths apart from [`Self::metres`].
+    pub(super) fn turn(&self) -> Axes {
+        self.axes.unwrap_or_default().scaled(self.scale.unwrap_or_default().each)
+    }
+
     /// Refuses numbers out of range.
     pub(super) fn check(&self) -> Result<(), Fault> {
-        if !(self.scale.is_finite() && self.scale > 0.0) {
-            let problem = format!("its lengths cannot be scaled by {}", self.scale);
-            return Err(Fault::content(problem, "give a positive number of metres per unit of length"));
+        let metres = self.metres();
+        if !(metres.is_finite() && metres > 0.0) {
+            let problem = format!("its lengths cannot be scaled by {metres}");
+            return Err(Fault::coded(
+                "recording/option-out-of-range",
+                problem,
+                "give a positive number of metres per unit of length",
+            ));
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("its times cannot be counted with {rate} in a second");
-            return Err(Fault::content(problem, "give a positive number with --fps or --time-scale"));
+            return Err(Fault::coded(
+                "recording/option-out-of-range",
+                problem,
+                "give a positive number with --fps or --time-scale",
+            ));
         }
-        if !self.axes.are_finite() {
+        if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
+            let problem = format!("its times are in {} and in parts of a second of your own", unit.name());
+            let remedy = "leave --time-unit out, or --fps and --time-scale";
+            return Err(Fault::coded("recording/two-time-units", problem, remedy));
+        }
+        if let Some([latitude, longitude, height_m]) = self.origin {
+            let is_on_earth = latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && height_m.is_finite();
+            if !is_on_earth {
+                let problem = format!("no place on the Earth is at {latitude}, {longitude}, {height_m} m");
+                let remedy = "a latitude is within 90 degrees, and a longitude within 360";
+                return Err(Fault::coded("recording/option-out-of-range", problem, remedy));
+            }
+        }
+        if let Some((name, _)) = self.starts.iter().find(|(_, start)| !start.iter().all(|x| x.is_finite())) {
+            let problem = format!("the start of {} is not finite", quoted(name));
+            return Err(Fault::coded("recording/option-out-of-range", problem, "give three finite numbers of metres"));
+        }
+        if !self.turn().are_finite() {
             let problem = "the lengths of its axes cannot be multiplied by 0, nor by what is not finite";
-            return Err(Fault::content(problem, "give three numbers with --scale that are not 0, such as 1,1,-1"));
+            return Err(Fault::coded(
+                "recording/option-out-of-range",
+                problem,
+                "give three numbers with --scale that are not 0, such as 1,1,-1",
+            ));
         }
         Ok(())
     }
@@ -266,14 +333,16 @@ impl ReadOptions {
             ),
             (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
             (!self.topics.is_empty() && !is_mcap && !is_ulog, "--topic", "has no topics"),
-            (!self.axes.is_identity() && has_axes, "--axes", "gives the directions of its axes"),
+            (!self.turn().is_identity() && has_axes, "--axes", "gives the directions of its axes"),
             (self.one_vehicle && !self.is_joined && !is_table, "--one-vehicle", "names its vehicles"),
             (self.allow_unfinished && !is_mcap && !is_ulog, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(needless, ..)| *needless) {
-            Some((_, option, why)) => {
-                Err(Fault::content(format!("{} {why}", format.title()), format!("leave {option} away")))
-            }
+            Some((_, option, why)) => Err(Fault::coded(
+                "recording/unused-option",
+                format!("{} {why}", format.title()),
+                format!("leave {option} away"),
+            )),
             None => Ok(()),
         }
     }

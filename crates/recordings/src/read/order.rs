@@ -69,7 +69,7 @@ impl About {
             unit,
             times_per_second: options.times_per_second,
             epoch_ns: 0,
-            scale: options.scale,
+            scale: options.metres(),
             sort: options.sort,
             duplicates: options.duplicates,
             frame: Frame::default(),

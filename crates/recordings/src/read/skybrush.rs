@@ -121,7 +121,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             trajectory = referenced(archive.as_mut(), elsewhere)?;
         }
         let name = settings.name.unwrap_or_else(|| (index + 1).to_string());
-        let items = items(&trajectory, index, options.scale).map_err(|(point, fault)| {
+        let items = items(&trajectory, index, options.metres()).map_err(|(point, fault)| {
             let place = point.map_or(format!("drone `{name}`"), |point| format!("drone `{name}`, point {}", point + 1));
             fault.at(Place::Part(place))
         })?;

@@ -8,21 +8,21 @@ use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// A recording whose axes are turned as the user says.
 pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if options.axes.is_identity() {
+    if options.turn().is_identity() {
         return Ok(recording);
     }
-    if recording.is_planar() && !options.axes.keeps_plane() {
+    if recording.is_planar() && !options.turn().keeps_plane() {
         let problem = "its third axis would become x or y, and it has none";
         let remedy = "name the column of the third axis with --column z=NAME, or give --axes that leave z in its place";
         return Err(Fault::content(problem, remedy).into());
     }
-    let notes = [recording.notes(), &[options.axes.note()]].concat();
-    Ok(Box::new(Turned { recording, axes: options.axes, notes }))
+    let notes = [recording.notes(), &[options.turn().note()]].concat();
+    Ok(Box::new(Turned { recording, axes: options.turn(), notes }))
 }
 
 /// Refuses to turn axes whose directions are known, in what is called so.
 pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Fault> {
-    if options.axes.is_identity() {
+    if options.turn().is_identity() {
         return Ok(());
     }
     Err(Fault::content(format!("{what} gives the directions of its axes"), "leave --axes and signs of --scale away"))
@@ -30,7 +30,7 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
 
 /// Refuses to turn a height over that is up by the name of its column.
 pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Result<(), Fault> {
-    if options.axes.keeps_up() {
+    if options.turn().keeps_up() {
         return Ok(());
     }
     let problem =

@@ -79,7 +79,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             let fault = Fault::content("two drones have this id", "give each an id of its own");
             return Err(fault.at(place(None)));
         }
-        let flown = items(&performance.agent_description, vehicles.len(), &show, options.scale);
+        let flown = items(&performance.agent_description, vehicles.len(), &show, options.metres());
         let items = flown.map_err(|(step, fault)| fault.at(place(step)))?;
         vehicles.push((name, items));
     }

@@ -26,7 +26,7 @@ fn folder(files: &[(&str, &[u8])]) -> TempDir {
 }
 
 fn turned(name: &str, scale: [f64; 3]) -> ReadOptions {
-    ReadOptions { axes: Axes::from_name(name).expect("axes").scaled(scale), ..ReadOptions::default() }
+    ReadOptions { axes: Axes::from_name(name), scale: Some(scale.into()), ..ReadOptions::default() }
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn local_positions_of_px4_without_a_reference_are_not_known() {
     }
     let error = read(b"timestamp,x,y,z,ref_lat,ref_lon\n0,1,2,3,47,8\n").expect_err("no height");
     assert!(error.to_string().contains("ref_alt") && error.help().contains("vehicle_global_position"), "{error}");
-    let scaled = ReadOptions { scale: 0.001, ..ReadOptions::default() };
+    let scaled = ReadOptions { scale: Some(0.001.into()), ..ReadOptions::default() };
     assert!(read_bytes("px4.csv", &px4("47.0", &[("1", 1)]), &scaled).expect_err("metres").help().contains("--scale"));
 }
 

@@ -157,7 +157,7 @@ fn takes_of_motive_are_refused_where_they_are_wrong() {
     assert!(read(&markers).expect_err("twice").to_string().contains("two markers are called `cf1`"));
     let none = MOTIVE.replace(",Position", ",Place");
     assert!(read(&none).expect_err("none").to_string().contains("neither the position of a rigid body"));
-    let scaled = ReadOptions { scale: 0.1, ..ReadOptions::default() };
+    let scaled = ReadOptions { scale: Some(0.1.into()), ..ReadOptions::default() };
     let error = read_bytes("take.csv", MOTIVE.as_bytes(), &scaled).expect_err("scaled");
     assert_eq!(error.help(), "leave --scale away");
 }

@@ -54,7 +54,7 @@ fn units_of_length_are_honoured_wherever_a_name_says_them() {
 
 #[test]
 fn units_that_are_not_known_or_contradict_each_other_are_refused() {
-    let scaled = ReadOptions { scale: 0.001, ..ReadOptions::default() };
+    let scaled = ReadOptions { scale: Some(0.001.into()), ..ReadOptions::default() };
     let plain = ReadOptions::default();
     for (header, options, said, remedy) in [
         (

@@ -136,7 +136,7 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
     let rows = "0,a,47,8,1000\n1,a,47,8,1100\n1,b,47,8.001,1100\n";
     let origin = [47.0, 8.0, 304.8];
     let read = |height: &str, scale: f64| {
-        let options = ReadOptions { scale, origin: Some(origin), ..ReadOptions::default() };
+        let options = ReadOptions { scale: Some(scale.into()), origin: Some(origin), ..ReadOptions::default() };
         read(&format!("t,id,lat,lon,{height}\n{rows}"), &options)
     };
     let metres = read("alt", 1.0).expect("read");

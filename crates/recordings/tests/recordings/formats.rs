@@ -131,7 +131,8 @@ fn without_z_everything_is_in_a_plane_and_it_is_said() {
 
 #[test]
 fn names_of_columns_unit_and_scale_can_be_given() {
-    let mut options = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), scale: 0.01, ..ReadOptions::default() };
+    let mut options =
+        ReadOptions { time_unit: Some(TimeUnit::Milliseconds), scale: Some(0.01.into()), ..ReadOptions::default() };
     for (role, name) in [("t", "clock"), ("id", "who"), ("x", "east"), ("y", "north"), ("z", "up")] {
         assert!(options.columns.set(role, name));
     }

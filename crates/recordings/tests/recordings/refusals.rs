@@ -316,7 +316,7 @@ fn a_format_that_is_forced_on_other_content_is_refused() {
         assert_eq!(error.help(), format!("leave {option} away"), "{error}");
     }
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let options = ReadOptions { scale, ..ReadOptions::default() };
+        let options = ReadOptions { scale: Some(scale.into()), ..ReadOptions::default() };
         assert!(refused_with("flight.csv", LONG.as_bytes(), &options).help().contains("positive"));
     }
 }

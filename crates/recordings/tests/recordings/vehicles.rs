@@ -190,7 +190,7 @@ fn a_show_says_itself_how_close_drones_may_come() {
     ]);
     let limit = |name: &str| read::own_limit_m(&folder.path().join(name), &ReadOptions::default());
     assert_eq!(["said.json", "silent.json", "wrong.json", "table.csv"].map(limit), [Some(2.5), None, None, None]);
-    let scaled = ReadOptions { scale: 0.5, ..ReadOptions::default() };
+    let scaled = ReadOptions { scale: Some(0.5.into()), ..ReadOptions::default() };
     assert_eq!(read::own_limit_m(&folder.path().join("said.json"), &scaled), Some(1.25));
 }
 

@@ -9,6 +9,7 @@ mod numbers;
 mod missions;
 mod random_scenarios;
 mod recorded;
+mod requests;
 mod rivals;
 mod steps;
 mod verdicts;

@@ -29,6 +29,8 @@ pub(super) struct KeyError {
     pub(super) span: Option<Range<usize>>,
     /// Whether the type of the value asks for a whole number, which the value is not.
     pub(super) asks_for_whole: bool,
+    /// Whether a key is missing.
+    pub(super) is_missing: bool,
 }
 
 /// A name where another was expected.
@@ -57,11 +59,11 @@ impl KeyError {
 
 impl de::Error for KeyError {
     fn custom<T: Display>(message: T) -> Self {
-        Self { message: message.to_string(), unknown: None, span: None, asks_for_whole: false }
+        Self { message: message.to_string(), unknown: None, span: None, asks_for_whole: false, is_missing: false }
     }
 
     fn missing_field(field: &'static str) -> Self {
-        Self::custom(format_args!("missing key `{field}`"))
+        Self { is_missing: true, ..Self::custom(format_args!("missing key `{field}`")) }
     }
 
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {

@@ -12,6 +12,7 @@ const EXCERPT_CHARS: usize = 100;
 /// there for programs that render their own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenarioError {
+    code: &'static str,
     message: String,
     help: Option<String>,
     fields: Vec<Field>,
@@ -47,7 +48,19 @@ pub struct Place {
 
 impl ScenarioError {
     pub(super) fn new(message: impl AsRef<str>) -> Self {
-        Self { message: printable(message.as_ref()), help: None, fields: Vec::new(), place: None }
+        let message = printable(message.as_ref());
+        Self { code: "scenario/inconsistent", message, help: None, fields: Vec::new(), place: None }
+    }
+
+    /// A value out of its range.
+    pub(super) fn out_of_range(message: impl AsRef<str>) -> Self {
+        Self::new(message).coded("scenario/out-of-range")
+    }
+
+    /// Gives the error another code than `scenario/inconsistent`, the one of keys that contradict each other.
+    pub(super) fn coded(mut self, code: &'static str) -> Self {
+        self.code = code;
+        self
     }
 
     pub(super) fn with_help(mut self, help: impl AsRef<str>) -> Self {
@@ -89,6 +102,12 @@ impl ScenarioError {
     pub(super) fn with_place(mut self, place: Place) -> Self {
         self.place = Some(Box::new(place));
         self
+    }
+
+    /// The stable name of the problem, such as `scenario/out-of-range`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        self.code
     }
 
     /// What is wrong, in one sentence.

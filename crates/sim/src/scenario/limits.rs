@@ -57,7 +57,7 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
         return Ok(());
     }
     let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
-    Err(ScenarioError::new(format!("{count} {vehicles} cannot form a formation"))
+    Err(ScenarioError::out_of_range(format!("{count} {vehicles} cannot form a formation"))
         .with_help("a swarm has at least 2 vehicles")
         .at("swarm.count"))
 }
@@ -82,7 +82,7 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
     if bytes <= MAX_MEMORY_BYTES {
         return Ok(());
     }
-    Err(ScenarioError::new(format!(
+    Err(ScenarioError::out_of_range(format!(
         "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
          {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
         bytes as f64 / GIB,
@@ -124,7 +124,7 @@ pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64
 pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
     let required = require_finite(what, number).and_then(|number| match number {
         0.0.. => Ok(number),
-        _ => Err(ScenarioError::new(format!("{what} is {number}")).with_help("it must be at least 0")),
+        _ => Err(ScenarioError::out_of_range(format!("{what} is {number}")).with_help("it must be at least 0")),
     });
     required.map_err(|error| error.at(key))
 }
@@ -133,7 +133,7 @@ pub(super) fn require_positive(what: impl Display, number: f64) -> Result<f64, S
     require_finite(&what, number)?;
     require_more_than_zero(&what, number)?;
     if number < SMALLEST {
-        return Err(ScenarioError::new(format!("{what} is {number:e}, too small to compute with"))
+        return Err(ScenarioError::out_of_range(format!("{what} is {number:e}, too small to compute with"))
             .with_help(format!("the least is {SMALLEST:e}")));
     }
     Ok(number)
@@ -144,7 +144,7 @@ pub(super) fn require_more_than_zero(what: impl Display, number: f64) -> Result<
         return Ok(number);
     }
     let shown = not_finite(number).map_or_else(|| number.to_string(), str::to_owned);
-    Err(ScenarioError::new(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
+    Err(ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
 }
 
 pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
@@ -152,8 +152,8 @@ pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, Sce
         return Ok(number);
     }
     Err(match not_finite(number) {
-        Some(shown) => ScenarioError::new(format!("{what} is {shown}")).with_help("give a finite number"),
-        None => ScenarioError::new(format!("{what} is {number:e}, too large to compute with"))
+        Some(shown) => ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("give a finite number"),
+        None => ScenarioError::out_of_range(format!("{what} is {number:e}, too large to compute with"))
             .with_help(format!("the most is {LARGEST:e} in either direction")),
     })
 }

@@ -58,6 +58,7 @@ impl Override {
         let place = |span: Range<usize>| Place::new(SOURCE, text, span);
         let Some(equals) = text.find('=') else {
             return Err(ScenarioError::new("an override has no `=`")
+                .coded("scenario/override")
                 .with_help("write it as key.path=value, for example time.dt_s=0.001")
                 .with_place(place(0..text.len())));
         };
@@ -67,6 +68,7 @@ impl Override {
             let key = trimmed(text, start..start + part.len());
             if key.is_empty() || !text[key.clone()].chars().all(is_word) {
                 return Err(ScenarioError::new(format!("`{part}` is not a key of an override"))
+                    .coded("scenario/override")
                     .with_help("a path is keys and entry numbers with dots between them, such as start.positions_m.2.x")
                     .with_place(place(start..start + part.len())));
             }

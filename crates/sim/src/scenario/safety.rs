@@ -38,9 +38,10 @@ impl SafetyTable {
         let wrong = |said: String, help: &str| ScenarioError::new(said).with_help(help).at("safety.half_axes_m");
         match (self.shape, self.half_axes_m, delta_m) {
             (SafetyKind::Ball, None, Some(delta_m)) => Ok((delta_m, Safety::Ball)),
-            (SafetyKind::Ball, None, None) => {
-                Err(ScenarioError::new("missing key `delta_m`").with_help("give the safety distance").at("law"))
-            }
+            (SafetyKind::Ball, None, None) => Err(ScenarioError::new("missing key `delta_m`")
+                .coded("scenario/missing-key")
+                .with_help("give the safety distance")
+                .at("law")),
             (SafetyKind::Ball, Some(_), _) => Err(wrong(
                 "half axes of a ball".to_owned(),
                 "set safety.shape to \"ellipsoid\", or leave them out: a ball is half of law.delta_m in radius",

@@ -140,7 +140,9 @@ fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioErro
 
 fn unknown_builtin(name: &str) -> ScenarioError {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
-    ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file")).with_help(suggest(name, &names))
+    ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file"))
+        .coded("scenario/not-found")
+        .with_help(suggest(name, &names))
 }
 
 /// What a name may not hold becomes `-`.
@@ -153,13 +155,16 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
         return Err(ScenarioError::new(format!("{shown} is a directory"))
+            .coded("scenario/cannot-read")
             .with_help("give the path of a scenario file within it"));
     }
     read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
 }
 
 fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
+    let is_missing = error.kind() == std::io::ErrorKind::NotFound;
     ScenarioError::new(format!("cannot read {shown}: {error}"))
+        .coded(if is_missing { "scenario/not-found" } else { "scenario/cannot-read" })
         .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
 }
 
@@ -170,6 +175,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
+            .coded("scenario/too-large")
             .with_help("no scenario is that long: is it the right file?"));
     }
     String::from_utf8(bytes).map_err(|error| {
@@ -177,6 +183,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
         let bytes = error.into_bytes();
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
         ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
+            .coded("scenario/not-utf8")
             .with_help("save the file as UTF-8 text")
             .with_place(Place::new(shown, &text, valid..valid + '\u{fffd}'.len_utf8()))
     })

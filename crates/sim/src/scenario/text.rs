@@ -75,6 +75,7 @@ impl<'a> Text<'a> {
             let mut root = self.tree()?;
             if root.get_ref().as_table().is_some_and(Map::is_empty) {
                 return Err(ScenarioError::new("the scenario is empty")
+                    .coded("scenario/empty")
                     .with_help("start from a built-in scenario, such as `pentagon`")
                     .with_place(Place::new(self.name, self.toml, 0..0)));
             }
@@ -144,6 +145,7 @@ impl<'a> Text<'a> {
     fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
+                .coded("scenario/syntax")
                 .with_help("a scenario is `key = value` lines below `[table]` headers")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
@@ -227,6 +229,12 @@ impl<'a> Text<'a> {
     /// An error about a key with its place and its remedy.
     fn explain(&self, error: KeyError) -> ScenarioError {
         let short = |name: &str| name.chars().take(NAME_CHARS).collect::<String>();
+        let code = match error.unknown {
+            Some(Unknown::Key(..)) => "scenario/unknown-key",
+            Some(Unknown::Choice(..)) => "scenario/unknown-choice",
+            None if error.is_missing => "scenario/missing-key",
+            None => "scenario/wrong-type",
+        };
         let (said, help) = match error.unknown {
             Some(Unknown::Key(name, mut known)) => {
                 known.sort_unstable();
@@ -251,7 +259,7 @@ impl<'a> Text<'a> {
                 "the built-in scenarios show every table; `tautline schema` describes every key".to_owned(),
             ),
         };
-        ScenarioError::new(said).with_help(help).with_place(self.locate(error.span.unwrap_or(0..0)))
+        ScenarioError::new(said).coded(code).with_help(help).with_place(self.locate(error.span.unwrap_or(0..0)))
     }
 }
 

@@ -256,6 +256,7 @@ impl Scenario {
         let delta_m = self.delta_m;
         let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
             Err(ScenarioError::new(said)
+                .coded("scenario/within-delta")
                 .with_help(help)
                 .at_leg_entry(leg, key, pair.second())
                 .at_leg_entry(leg, key, pair.first())
@@ -309,6 +310,7 @@ impl Scenario {
             Pair::new(i, j),
             self.delta_m
         ))
+        .coded("scenario/hulls-touch")
         .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
             _ if self.airframe.quadrotor().is_some() => {
                 format!(
@@ -372,6 +374,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "a step is halved at most {MAX_HALVINGS} times, not {max_halvings}"
             ))
+            .coded("scenario/out-of-range")
             .with_help("the default is 10")
             .at("time.max_halvings"));
         }
@@ -401,7 +404,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     } else {
         return Ok(());
     };
-    Err(ScenarioError::new(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
+    Err(ScenarioError::out_of_range(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
@@ -416,6 +419,7 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
         "the graph is not connected: no path joins vehicle 1 to {}{more}",
         named.join(", ")
     ))
+    .coded("scenario/disconnected")
     .with_help("add edges until every vehicle can be reached from every other")
     .at("graph.edges"))
 }

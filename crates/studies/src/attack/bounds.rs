@@ -1,5 +1,7 @@
 //! What is varied, and between which values.
 
+use std::fmt;
+
 use serde::Serialize;
 
 /// Steps, from one bound to the other, that a value is rounded to: what is flown again is said in few digits.
@@ -29,6 +31,13 @@ pub struct Bound {
     pub high: f64,
     /// Whether it is a whole number.
     pub whole: bool,
+}
+
+impl fmt::Display for Variation {
+    /// As [`Variation::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}..{}", self.key, self.low, self.high)
+    }
 }
 
 impl Variation {

@@ -27,6 +27,20 @@ pub enum Method {
     Random,
 }
 
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 2] = [Self::CmaEs, Self::Random];
+
+    /// The name of the method for `--method`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CmaEs => "cma-es",
+            Self::Random => "random",
+        }
+    }
+}
+
 /// A search under way.
 #[derive(Clone, Debug)]
 pub(super) struct Searcher {

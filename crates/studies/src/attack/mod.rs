@@ -10,6 +10,7 @@ mod fold;
 mod html;
 mod method;
 mod plan;
+mod request;
 mod result;
 mod search;
 mod words;
@@ -18,6 +19,7 @@ pub use bounds::{Bound, Variation};
 pub use html::AttackPage;
 pub use method::Method;
 pub use plan::{Asked, AttackError, Plan};
+pub use request::{AttackRequest, FLIGHTS, SEEDS_OF_A_CANDIDATE, attack};
 pub use result::{Attack, Candidate, Flown, SCHEMA_VERSION};
 
 #[cfg(test)]

@@ -127,6 +127,23 @@ fn in_words(damaged: &[DamagedPart]) -> String {
 }
 
 impl CampaignError {
+    /// The stable name of the problem, such as `campaign/missing-shards`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Spec { .. } => "campaign/specification",
+            Self::Vary { .. } => "campaign/variation",
+            Self::Plan { .. } => "campaign/plan",
+            Self::Scenario { error, .. } => error.code(),
+            Self::Flight { .. } => "campaign/flight",
+            Self::Splitting { .. } => "campaign/splitting",
+            Self::Foreign { .. } => "campaign/other-campaign",
+            Self::Holes { .. } => "campaign/missing-shards",
+            Self::Alarm { .. } => "campaign/other-bits",
+            Self::Machine { .. } => "files/cannot-access",
+        }
+    }
+
     pub(super) fn plan(why: impl Into<String>, help: impl Into<String>) -> Self {
         Self::Plan { why: why.into(), help: help.into(), key: String::new() }
     }

@@ -5,6 +5,7 @@
 //! merged into one table of a row a flight and a [`Summary`]. The bytes of both are the same for any number of shards,
 //! threads, machines and interruptions.
 
+mod again;
 mod bins;
 mod error;
 mod fly;
@@ -16,6 +17,7 @@ mod overlaps;
 mod part;
 mod place;
 mod plan;
+mod request;
 mod result;
 mod row;
 mod shard;
@@ -34,6 +36,10 @@ pub use manifest::{Manifest, Program};
 pub use merge::{ANSWER, Merged, RESULTS};
 pub use part::Found;
 pub use plan::{Campaign, Law, MOST_RUNS};
+pub use request::{
+    CampaignAnswer, CampaignRequest, MOST_WORST, ReplayRequest, campaign, fly_shards, merge, missing_shards, replay,
+    report,
+};
 pub use result::{BadRun, LawSummary, Pair, Quantiles, SCHEMA_VERSION, Summary};
 pub use row::{Known, Row};
 pub use shard::Shard;

@@ -11,6 +11,7 @@ mod latex;
 mod measures;
 mod parallel;
 mod plan;
+mod request;
 mod result;
 mod side_by_side;
 mod words;
@@ -20,6 +21,7 @@ pub use flight::{FlightRow, Outcome, fly};
 pub use html::ComparePage;
 pub use parallel::in_parallel;
 pub use plan::{CompareError, Plan};
+pub use request::{CompareRequest, compare};
 pub use result::{Comparison, LawPerformance, LawRow, Performance, SCHEMA_VERSION};
 pub use side_by_side::Watch;
 

@@ -7,12 +7,14 @@ mod csv;
 mod fly;
 mod html;
 mod plan;
+mod request;
 mod result;
 mod search;
 mod words;
 
 pub use html::MarginPage;
 pub use plan::{Asked, MarginError, Plan, Question};
+pub use request::{MarginRequest, margin};
 pub use result::{Flown, Margin, Probe, SCHEMA_VERSION, Turn};
 pub use search::Range;
 

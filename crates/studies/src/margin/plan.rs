@@ -24,6 +24,21 @@ pub enum Question {
     Reached,
 }
 
+impl Question {
+    /// All questions.
+    pub const ALL: [Self; 3] = [Self::Pass, Self::Clear, Self::Reached];
+
+    /// The name of the question for `--verdict`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Clear => "clear",
+            Self::Reached => "reached",
+        }
+    }
+}
+
 /// What is asked of each value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {

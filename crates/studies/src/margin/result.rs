@@ -135,6 +135,12 @@ impl Probe {
 }
 
 impl Margin {
+    /// Whether the verdict turns or holds everywhere, and the search came to its end.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        !self.interrupted && (self.turn.is_some() || self.holds_everywhere())
+    }
+
     pub(super) fn new(plan: &Plan, probes: Vec<Probe>, found: &Found, interrupted: bool) -> Self {
         let (own, range, asked) = (plan.own(), plan.range(), plan.asked());
         let turn = match *found {

@@ -5,18 +5,21 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::folder::try_to_write_in;
-use super::{Failure, console};
-use tautline_report::report::write_atomically;
+use super::{Failure, Monitor};
+use crate::report::write_atomically;
 
 /// The name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";
 
 /// A file and what it is called: `--events`, or `the recording`.
-pub(super) type Called<'a> = (&'static str, &'a Path);
+pub type Called<'a> = (&'static str, &'a Path);
 
 /// Refuses outputs that would replace an input, become a part of an input that is a folder of CSV files, or replace each
 /// other.
-pub(super) fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failure> {
+///
+/// # Errors
+/// [`Failure`] that names both.
+pub fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failure> {
     let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|&(called, path)| Some((place(path)?, called))).collect();
     for &(option, path) in outputs {
         let Some(place) = place(path) else { continue };
@@ -24,7 +27,11 @@ pub(super) fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(),
         let within = if csv { usize::MAX } else { 1 };
         if let Some(called) = place.ancestors().take(within).find_map(|place| taken.get(place)) {
             let message = format!("{option} {} would overwrite {called}, or be part of it", path.display());
-            return Err(Failure::input(message, "write another file, or into another folder"));
+            return Err(Failure::input(
+                "files/overwrites-input",
+                message,
+                "write another file, or into another folder",
+            ));
         }
         taken.insert(place, option);
     }
@@ -33,15 +40,14 @@ pub(super) fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(),
 
 /// Refuses outputs of a command about a scenario that would replace it, each other, or without `--force` a file that is
 /// there, and places that cannot be written to, before an hour of flights.
-pub(super) fn check_new<'a>(
-    scenario: &str,
-    outputs: impl Iterator<Item = Called<'a>>,
-    force: bool,
-) -> Result<(), Failure> {
+///
+/// # Errors
+/// [`Failure`] that names the file.
+pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = Called<'a>>, force: bool) -> Result<(), Failure> {
     let (piped, files): (Vec<_>, Vec<_>) = outputs.partition(|(_, file)| is_standard_output(file));
     if let [(first, _), (second, _), ..] = piped[..] {
         let message = format!("{first} and {second} are both to go to standard output");
-        return Err(Failure::input(message, "write one of them into a file"));
+        return Err(Failure::input("files/one-standard-output", message, "write one of them into a file"));
     }
     let scenario = Path::new(scenario);
     let inputs: Vec<_> = scenario.is_file().then_some(("the scenario", scenario)).into_iter().collect();
@@ -50,29 +56,39 @@ pub(super) fn check_new<'a>(
         let shown = file.display();
         if file.is_dir() {
             let help = format!("give {option} a file within it");
-            return Err(Failure::input(format!("{shown} is a directory"), help));
+            return Err(Failure::input("files/is-directory", format!("{shown} is a directory"), help));
         }
         if file.is_file() && !force {
-            return Err(Failure::input(format!("{shown} exists"), "overwrite it with --force, or write another file"));
+            return Err(Failure::input(
+                "files/exists",
+                format!("{shown} exists"),
+                "overwrite it with --force, or write another file",
+            ));
         }
         let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
         let folder = file.parent().unwrap_or(Path::new(""));
         if is_new_or_plain && let Err(error) = try_to_write_in(folder) {
             let message = format!("cannot write {shown}: {error}");
-            return Err(Failure::machine(message).with_help(format!("give {option} a file that can be written")));
+            return Err(Failure::machine("files/cannot-write", message)
+                .with_help(format!("give {option} a file that can be written")));
         }
     }
     Ok(())
 }
 
-pub(super) fn is_standard_output(file: &Path) -> bool {
+/// Whether the name of an output stands for standard output.
+#[must_use]
+pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new(STANDARD_OUTPUT)
 }
 
 /// Writes a file whole, or to standard output.
-pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
+///
+/// # Errors
+/// [`Failure`] where it cannot be written.
+pub fn write(file: &Path, bytes: &[u8], monitor: &dyn Monitor) -> Result<(), Failure> {
     if is_standard_output(file) {
-        return console::data(&String::from_utf8_lossy(bytes));
+        return monitor.data(&String::from_utf8_lossy(bytes));
     }
     Ok(write_atomically(file, bytes)?)
 }
@@ -109,7 +125,7 @@ mod tests {
     use super::*;
 
     fn clash(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Option<String> {
-        check(inputs, outputs).err().map(|failure| failure.said.message)
+        check(inputs, outputs).err().map(|failure| failure.message().to_owned())
     }
 
     #[test]

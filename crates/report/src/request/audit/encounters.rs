@@ -1,13 +1,11 @@
 //! Those who came closest in a recording, as figures.
 
-use std::sync::atomic::Ordering;
-
-use super::open::Open;
-use super::{Failure, caller};
+use super::super::{Failure, Monitor};
+use super::Open;
+use crate::figures::{self, Encounter, Figure};
+use crate::report::recorded::interval;
 use tautline_audit::Slice;
 use tautline_audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
-use tautline_report::figures::{self, Encounter, Figure};
-use tautline_report::report::recorded::interval;
 
 /// Pairs, and approaches to obstacles, that are drawn.
 const DRAWN: usize = 3;
@@ -15,6 +13,7 @@ const DRAWN: usize = 3;
 /// Reads the recording again for those who came closest, and for the places of all.
 pub(super) fn figures(
     open: &Open<'_>,
+    monitor: &dyn Monitor,
     settings: &Settings,
     outcome: &Outcome,
     places: &mut Places,
@@ -24,10 +23,9 @@ pub(super) fn figures(
     let (mut pairs, mut obstacles) = (closest(&outcome.closest)?, closest(&outcome.obstacles)?);
     let mut recording = open()?;
     let (mut items, mut more) = (Vec::new(), true);
-    let interrupted = caller::interruption();
     while more {
-        if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
-            return Err(Failure::machine("interrupted"));
+        if monitor.is_interrupted() {
+            return Err(Failure::interrupted());
         }
         items.clear();
         more = recording.read(&mut items)?;

@@ -1,7 +1,7 @@
 //! Questions about heights and places that a recording cannot answer.
 
-use super::Failure;
-use super::audit_arguments::AuditArguments;
+use super::super::Failure;
+use super::AuditRequest;
 use tautline_audit::Obstacle;
 use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Settings;
@@ -75,7 +75,8 @@ pub(super) struct Level<'a> {
 /// Refuses questions about heights where the recording has none, and about places whose origin
 /// is not given.
 pub(super) fn refuse_unknown<'a>(
-    arguments: &AuditArguments,
+    request: &AuditRequest<'_>,
+    asked_by: Option<&str>,
     settings: &'a Settings,
     recording: &dyn Tracks<Error = ReadError>,
 ) -> Result<Level<'a>, Failure> {
@@ -95,8 +96,12 @@ pub(super) fn refuse_unknown<'a>(
     let Some((problem, help)) = of_heights().or_else(of_places) else {
         return Ok(Level { settings, asked: origin.and_then(|_| asked.of_level()) });
     };
-    let asked_by = arguments.asked_by.as_ref().map_or(String::new(), |note| format!(" ({note})"));
-    Err(Failure::input(format!("{}: {problem}", arguments.reading.called()), format!("{help}{asked_by}")))
+    let asked_by = asked_by.map_or(String::new(), |note| format!(" ({note})"));
+    Err(Failure::input(
+        "audit/unknown-place",
+        format!("{}: {problem}", request.subject.called()),
+        format!("{help}{asked_by}"),
+    ))
 }
 
 impl Level<'_> {
@@ -121,7 +126,7 @@ impl Level<'_> {
                      lower, and {asked} needs heights above the ground"
                 );
                 let help = "give an --origin within 3 km of all vehicles, or judge a part with --ids, --from and --to";
-                return Err(Failure::input(message, help));
+                return Err(Failure::input("audit/far-from-origin", message, help));
             }
         }
         Ok(())

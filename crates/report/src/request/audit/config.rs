@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::Failure;
-use super::audit_arguments::AuditArguments;
-use super::text_file;
+use super::super::{Failure, text_file};
+use super::{AuditRequest, ConfigFile, ConfiguredAudit, Subject};
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Motion;
-use tautline_recordings::read::ArrayAxis;
+use tautline_recordings::read::{ArrayAxis, Axes, Scale};
 
 /// What the file is called.
 const NAME: &str = "tautline.toml";
@@ -41,7 +40,7 @@ struct AuditTable {
     layout: Option<String>,
     allow_undecided: Option<bool>,
     axes: Option<String>,
-    scale: Option<Scale>,
+    scale: Option<ScaleEntry>,
     require_presence: Option<bool>,
     accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
@@ -50,17 +49,17 @@ struct AuditTable {
 /// Metres per unit of length, of all axes or of each.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged)]
-enum Scale {
+enum ScaleEntry {
     All(f64),
     Each([f64; 3]),
 }
 
-impl Scale {
-    /// As `--scale` says it.
-    fn word(self) -> String {
+impl ScaleEntry {
+    fn scale(self) -> Result<Scale, String> {
         match self {
-            Self::All(metres) => format!("{metres:?}"),
-            Self::Each([x, y, z]) => format!("{x:?},{y:?},{z:?}"),
+            Self::All(metres) => Ok(metres.into()),
+            // The words of `--scale` have the same checks.
+            Self::Each([x, y, z]) => format!("{x:?},{y:?},{z:?}").parse(),
         }
     }
 }
@@ -85,18 +84,18 @@ impl From<MotionName> for Motion {
     }
 }
 
-/// The arguments for one recording, with what its `tautline.toml` asks where they are silent.
-pub(super) fn configured(mut arguments: AuditArguments) -> Result<AuditArguments, Failure> {
-    if arguments.config.is_none() && !arguments.no_config {
-        arguments.config = nearest(&arguments.reading.recording);
-        let is_none = arguments.config.as_ref().filter(|path| !path.is_file());
-        if let Some(path) = is_none {
-            return Err(Failure::input(format!("{} is no file", path.display()), HELP));
+/// The request with what its `tautline.toml` asks where it is silent.
+pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudit<'_>, Failure> {
+    if let (ConfigFile::Nearest, Some(recording)) = (&request.config, request.subject.paths().first()) {
+        let found = nearest(recording);
+        if let Some(path) = found.as_ref().filter(|path| !path.is_file()) {
+            return Err(Failure::input("audit/settings-file", format!("{} is no file", path.display()), HELP));
         }
+        request.config = found.map_or(ConfigFile::None, ConfigFile::File);
     }
-    match arguments.config.clone() {
-        Some(path) => parse(&text_file::read(&path, MOST_BYTES, HELP)?, &path)?.fill(arguments, &path),
-        None => Ok(arguments),
+    match request.config.clone() {
+        ConfigFile::File(path) => parse(&text_file::read(&path, MOST_BYTES, HELP)?, &path)?.fill(request, &path),
+        ConfigFile::Nearest | ConfigFile::None => Ok(ConfiguredAudit { request, asked_by: None }),
     }
 }
 
@@ -118,17 +117,19 @@ fn parse(text: &str, path: &Path) -> Result<AuditTable, Failure> {
     let document: Document = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start.min(text.len()));
         let line = 1 + text[..start].matches('\n').count();
-        Failure::input(format!("{}, line {line}: {}", path.display(), error.message()), HELP)
+        Failure::input("audit/settings-file", format!("{}, line {line}: {}", path.display(), error.message()), HELP)
     })?;
     Ok(document.audit)
 }
 
 impl AuditTable {
-    /// Fills what the command line leaves open. Files are named from the folder of `tautline.toml`.
-    fn fill(self, mut arguments: AuditArguments, path: &Path) -> Result<AuditArguments, Failure> {
-        let wrong = |message: String| Failure::input(format!("{}: {message}", path.display()), HELP);
+    /// Fills what the request leaves open. Files are named from the folder of `tautline.toml`.
+    fn fill<'a>(self, mut request: AuditRequest<'a>, path: &Path) -> Result<ConfiguredAudit<'a>, Failure> {
+        let wrong =
+            |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), HELP);
         let folder = path.parent().unwrap_or(Path::new(""));
-        let asks_otherwise = arguments.delta.is_some() || !arguments.radius.is_empty() || arguments.ellipsoid.is_some();
+        let is_silent = request.is_silent();
+        let is_bounded = self.motion.is_some_and(|motion| matches!(motion, MotionName::Bounded));
         if self.ellipsoid_m.is_some() && self.radius_m.is_some() {
             return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
         }
@@ -143,82 +144,86 @@ impl AuditTable {
         if let Some((key, _)) = numbers.into_iter().find(|(_, value)| value.is_some_and(|value| !value.is_finite())) {
             return Err(wrong(format!("{key} must be a finite number")));
         }
-        if self.max_accel_m_s2.is_some()
-            && arguments.motion.is_none()
-            && !matches!(self.motion, Some(MotionName::Bounded))
-        {
+        if self.max_accel_m_s2.is_some() && request.settings.motion.is_none() && !is_bounded {
             return Err(wrong(
                 "max_accel_m_s2 says nothing of a motion that is known exactly: add motion = \"bounded\"".to_owned(),
             ));
         }
-        // Limits of distance are one question: a part of it from the command line and a part from here would be a third.
-        if !asks_otherwise {
-            arguments.delta = self.delta_m;
-            arguments.radius.extend(self.radius_m.map(|radius_m| (None, radius_m)));
-            arguments.ellipsoid = self.ellipsoid_m.map(Vector3::from);
+        let has_max_accel = request.has_max_accel();
+        let settings = &mut request.settings;
+        // Limits of distance are one question: a part of it from the request and a part from here would be a third.
+        if is_silent {
+            settings.delta_m = self.delta_m;
+            settings.radius_m = self.radius_m;
+            settings.ellipsoid_m = self.ellipsoid_m.map(Vector3::from);
         }
-        if arguments.motion.is_none() {
-            arguments.motion = self.motion.map(Motion::from);
+        settings.motion = settings.motion.or(self.motion.map(Motion::from));
+        if settings.motion == Some(Motion::Bounded) && !has_max_accel {
+            settings.max_accel_m_s2 = self.max_accel_m_s2;
         }
-        if arguments.motion == Some(Motion::Bounded) && arguments.max_accel.is_empty() {
-            arguments.max_accel.extend(self.max_accel_m_s2.map(|accel| (None, accel)));
-        }
-        let scale = self.scale.map(Scale::word);
-        arguments.reading.fill(self.axes.as_deref(), scale.as_deref()).map_err(wrong)?;
-        arguments.obstacles = arguments.obstacles.or(self.obstacles.map(|file| folder.join(file)));
-        arguments.fence = arguments.fence.or(self.fence.map(|file| folder.join(file)));
-        arguments.above = arguments.above.or(self.above_m);
-        arguments.max_gap = arguments.max_gap.or(self.max_gap_s);
-        arguments.expect_vehicles = arguments.expect_vehicles.or(self.expect_vehicles);
+        settings.above_m = settings.above_m.or(self.above_m);
+        settings.max_gap_s = settings.max_gap_s.or(self.max_gap_s);
+        settings.accel_window_s = settings.accel_window_s.or(self.accel_window_s);
+        settings.require_presence |= self.require_presence.unwrap_or(false);
         let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
-        arguments.reading.usual_layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
-        arguments.accel_window = arguments.accel_window.or(self.accel_window_s);
-        arguments.require_presence |= self.require_presence.unwrap_or(false);
-        arguments.allow_undecided |= self.allow_undecided.unwrap_or(false);
+        let layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
+        let axes = self.axes.map(|axes| axes.parse::<Axes>()).transpose().map_err(wrong)?;
+        let scale = self.scale.map(ScaleEntry::scale).transpose().map_err(wrong)?;
+        if let Subject::Files { options, .. } = &mut request.subject {
+            options.axes = options.axes.or(axes);
+            options.scale = options.scale.or(scale);
+            options.usual_layout = layout;
+        }
+        request.obstacles = request.obstacles.or(self.obstacles.map(|file| folder.join(file)));
+        request.fence = request.fence.or(self.fence.map(|file| folder.join(file)));
+        request.expect_vehicles = request.expect_vehicles.or(self.expect_vehicles);
+        request.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);
             let quantity = quantity.ok_or_else(|| {
                 let keys = Quantity::NUMBERS.map(Quantity::key).join(", ");
                 wrong(format!("`{key}` is no limit: the limits are {keys}"))
             })?;
-            if arguments.limit.iter().all(|given| given.quantity != quantity) {
-                arguments.limit.push(Limit { quantity, allowed });
+            let limits = &mut request.settings.envelope.limits;
+            if limits.iter().all(|given| given.quantity != quantity) {
+                limits.push(Limit { quantity, allowed });
             }
         }
-        arguments.asked_by = Some(format!("what the command line leaves open is asked as {} says", path.display()));
-        Ok(arguments)
+        let asked_by = Some(format!("what the command line leaves open is asked as {} says", path.display()));
+        Ok(ConfiguredAudit { request, asked_by })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
+    use tautline_recordings::read::ReadOptions;
 
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        audit: AuditArguments,
+    fn request() -> AuditRequest<'static> {
+        let paths = vec![PathBuf::from("show/a.csv")];
+        AuditRequest::new(Subject::Files { paths, options: ReadOptions::default() })
     }
 
-    fn filled(line: &[&str], text: &str) -> Result<AuditArguments, String> {
-        let line = Line::parse_from(["audit", "show/a.csv"].iter().chain(line));
+    fn filled(request: AuditRequest<'static>, text: &str) -> Result<ConfiguredAudit<'static>, String> {
         let path = Path::new("show/tautline.toml");
-        parse(text, path).and_then(|table| table.fill(line.audit, path)).map_err(|failure| failure.said.message)
+        parse(text, path).and_then(|table| table.fill(request, path)).map_err(|failure| failure.message().to_owned())
     }
 
     #[test]
-    fn the_command_line_goes_before_the_file() {
+    fn the_request_goes_before_the_file() {
         let text = "[audit]\ndelta_m = 1.5\nabove_m = 0.5\nobstacles = \"venue.toml\"\n[audit.limits]\nspeed_m_s = 5.0\nclimb_m_s = 2";
-        let asked = filled(&[], text).expect("a question");
-        assert_eq!((asked.delta, asked.above), (Some(1.5), Some(0.5)));
-        assert_eq!(asked.obstacles, Some(PathBuf::from("show/venue.toml")));
-        assert_eq!(asked.limit.len(), 2);
-        assert!(asked.asked_by.is_some_and(|note| note.contains("show/tautline.toml")));
-        let asked = filled(&["--radius", "0.2", "--limit", "speed=9", "--above", "1"], text).expect("a question");
-        assert_eq!((asked.delta, asked.above), (None, Some(1.0)));
-        assert_eq!(asked.limit.iter().map(|limit| limit.allowed).collect::<Vec<_>>(), [9.0, 2.0]);
+        let asked = filled(request(), text).expect("a question");
+        assert!(asked.asked_by().is_some_and(|note| note.contains("show/tautline.toml")));
+        let AuditRequest { settings, obstacles, .. } = asked.request;
+        assert_eq!((settings.delta_m, settings.above_m), (Some(1.5), Some(0.5)));
+        assert_eq!(obstacles, Some(PathBuf::from("show/venue.toml")));
+        assert_eq!(settings.envelope.limits.len(), 2);
+        let mut other = request();
+        (other.settings.radius_m, other.settings.above_m) = (Some(0.2), Some(1.0));
+        other.settings.envelope.limits = vec![Limit { quantity: Quantity::Speed, allowed: 9.0 }];
+        let settings = filled(other, text).expect("a question").request.settings;
+        assert_eq!((settings.delta_m, settings.above_m), (None, Some(1.0)));
+        assert_eq!(settings.envelope.limits.iter().map(|limit| limit.allowed).collect::<Vec<_>>(), [9.0, 2.0]);
     }
 
     #[test]
@@ -235,7 +240,7 @@ mod tests {
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {
-            let message = filled(&[], text).unwrap_err();
+            let message = filled(request(), text).map(drop).unwrap_err();
             assert!(message.contains(expected), "{message}");
         }
     }

@@ -1,21 +1,17 @@
 //! Flights of a campaign flown again: the worst of them for its page, and any of them by its number.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::Args;
-
-use super::console::{self, Console};
-use super::pictures;
-use super::run::{Left, RECORDING, RunArguments, fly_into};
-use super::{Exit, Failure};
+use super::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
+use crate::compare::Outcome;
+use crate::splitting::{self, StateAt};
 use tautline_core::text::metres;
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_report::replay::PAGE_BYTES;
 use tautline_report::report::page::Picture;
-use tautline_studies::campaign::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
-use tautline_studies::compare::Outcome;
-use tautline_studies::splitting::{self, StateAt};
+use tautline_report::request::{
+    Failure, Monitor, Pictures, Quiet, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into,
+};
 
 /// What helps where a flight that is flown again is another one.
 const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
@@ -23,18 +19,6 @@ const FAULTY: &str = "the same flight has the same bits everywhere: look for a f
 /// The number of a law of a campaign, from 0.
 fn number_of(campaign: &Campaign, law: &Law) -> usize {
     campaign.laws().iter().position(|other| other == law).unwrap_or_default()
-}
-
-/// Which flights are flown again for the page.
-#[derive(Debug, Args)]
-pub(super) struct Looks {
-    /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
-    worst: u8,
-    /// Take no pictures of them.
-    #[cfg(feature = "viewer")]
-    #[arg(long)]
-    no_snapshots: bool,
 }
 
 /// Flights that were flown again.
@@ -59,49 +43,46 @@ pub(super) fn place(folder: &Folder, law: &str, run: u64) -> PathBuf {
 pub(super) fn flown_again(
     folder: &Folder,
     summary: &Summary,
-    looks: &Looks,
-    console: Console,
-    interrupted: &AtomicBool,
+    most: usize,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
 ) -> Result<Again, Failure> {
     let campaign = folder.campaign();
     if campaign.splitting().is_some() {
-        return bad_again(folder, summary, looks, interrupted);
+        return bad_again(folder, summary, most, monitor);
     }
     let laws = std::iter::zip(campaign.laws(), &summary.laws);
     let mut worst: Vec<(&Law, &Worst)> =
         laws.flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
-    worst.truncate(looks.worst.into());
+    worst.truncate(most);
     let mut again = Again { flights: Vec::new(), no_pictures: None };
     for (law, worst) in worst {
-        if interrupted.load(Ordering::Relaxed) {
-            console.warn("interrupted: the page has no recordings of the flights that were not flown again");
+        if monitor.is_interrupted() {
+            monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
             break;
         }
         let path = place(folder, &law.name, worst.run);
-        let options = RunArguments::for_folder(path);
-        #[cfg(feature = "viewer")]
-        let options = options.without_pictures(looks.no_snapshots);
         let scenario = campaign.scenario(worst.run, law)?;
-        let left = fly_into(&options, &scenario, &command(campaign, worst.run, law), interrupted)?;
+        let run = RunRequest::reproducible(&scenario, command(campaign, worst.run, law), path);
+        let left = run_into(&run, pictures, &Quiet::new(monitor))?;
         check(&left, worst.run, law, &worst.state_hash)?;
-        let replay =
-            pictures::replay(&scenario, &left.film, &left.report, PAGE_BYTES / usize::from(looks.worst).max(1));
+        let replay = replay_of_run(&scenario, &left.film, &left.report, PAGE_BYTES / most.max(1));
         again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
     Ok(again)
 }
 
 /// Flies flights again that were violated in estimates, those furthest into a violation first.
-fn bad_again(folder: &Folder, summary: &Summary, looks: &Looks, interrupted: &AtomicBool) -> Result<Again, Failure> {
+fn bad_again(folder: &Folder, summary: &Summary, most: usize, monitor: &dyn Monitor) -> Result<Again, Failure> {
     let laws = std::iter::zip(folder.campaign().laws(), &summary.laws);
     let mut worst: Vec<_> = laws.flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
     worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
-    worst.truncate(looks.worst.into());
+    worst.truncate(most);
     let mut again = Again { flights: Vec::new(), no_pictures: None };
     for (law, bad) in worst {
-        if interrupted.load(Ordering::Relaxed) {
+        if monitor.is_interrupted() {
             break;
         }
         let place = place_of_bad(folder, &law.name, bad.run, bad.bad);
@@ -120,7 +101,7 @@ fn bad_again(folder: &Folder, summary: &Summary, looks: &Looks, interrupted: &At
                 metres(-bad.clearance_m),
                 bad.violated_at_step
             ),
-            command: console::command_line(command.into_iter()),
+            command: command_line(command.into_iter()),
             recording: Some(format!("worst/{}-run-{}-bad-{}/{RECORDING}", law.name, bad.run, bad.bad)),
             picture: None,
             replay: None,
@@ -141,11 +122,16 @@ pub(super) fn fly_bad(folder: &Folder, law: &Law, [run, bad]: [u64; 2], place: &
     let flights = row.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(flight) = usize::try_from(bad).ok().and_then(|bad| flights.get(bad)) else {
         let help = format!("{} are kept of it, counted from 0", flights.len());
-        return Err(Failure::input(format!("run {run} under {} has no bad flight {bad}", law.name), help));
+        return Err(Failure::input(
+            "campaign/no-flight",
+            format!("run {run} under {} has no bad flight {bad}", law.name),
+            help,
+        ));
     };
     let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
-    std::fs::create_dir_all(place)
-        .map_err(|error| Failure::machine(format!("cannot write {}: {error}", place.display())))?;
+    std::fs::create_dir_all(place).map_err(|error| {
+        Failure::machine("files/cannot-write", format!("cannot write {}: {error}", place.display()))
+    })?;
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&place.join(RECORDING), &header)?;
     let mut state = StateAt::violation_of(flight);
@@ -161,11 +147,11 @@ pub(super) fn fly_bad(folder: &Folder, law: &Law, [run, bad]: [u64; 2], place: &
         "bad flight {bad} of run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {}",
         law.name, flight.state_hash
     );
-    Err(Failure::machine(message).with_help(FAULTY))
+    Err(Failure::machine("campaign/other-bits", message).with_help(FAULTY))
 }
 
 /// Refuses a flight that did not end as it did in the campaign.
-fn check(left: &Left, run: u64, law: &Law, state_hash: &str) -> Result<(), Failure> {
+fn check(left: &RunFiles, run: u64, law: &Law, state_hash: &str) -> Result<(), Failure> {
     if left.report.run.ended_early.as_deref() == Some(tautline_report::report::INTERRUPTED) {
         return Ok(());
     }
@@ -177,10 +163,10 @@ fn check(left: &Left, run: u64, law: &Law, state_hash: &str) -> Result<(), Failu
         "run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {state_hash}",
         law.name
     );
-    Err(Failure::machine(message).with_help(FAULTY))
+    Err(Failure::machine("campaign/other-bits", message).with_help(FAULTY))
 }
 
-fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> WorstFlight {
+fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &RunFiles) -> WorstFlight {
     let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!("vehicles {a} and {b} came to "));
     let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
@@ -206,46 +192,38 @@ fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &Left) -> Wors
 }
 
 /// The picture of the worst moment.
-fn closest(left: &Left, said: &str) -> Option<Picture> {
-    #[cfg(feature = "viewer")]
-    {
-        let place = tautline_render::snapshot_names().iter().position(|name| *name == "closest")?;
-        let picture = left.pictures.get(place)?;
-        Some(Picture { description: said.to_owned(), data_uri: picture.data_uri.clone() })
-    }
-    #[cfg(not(feature = "viewer"))]
-    {
-        let _ = (left, said);
-        None
-    }
+fn closest(left: &RunFiles, said: &str) -> Option<Picture> {
+    let (_, picture) = left.pictures.iter().find(|(name, _)| name == "closest")?;
+    Some(Picture { description: said.to_owned(), data_uri: picture.data_uri.clone() })
 }
 
 /// The command that flies a run again without its campaign.
 fn command(campaign: &Campaign, run: u64, law: &Law) -> String {
     let sets = campaign.sets(run, law);
     let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
-    console::command_line(["run", campaign.scenario_argument()].into_iter().chain(sets).collect::<Vec<_>>().into_iter())
+    command_line(["run", campaign.scenario_argument()].into_iter().chain(sets).collect::<Vec<_>>().into_iter())
 }
 
-/// Flies a run again and compares it with its row, where there is one.
+/// Flies a run again and compares it with its row, where there is one. Returns whether it passes.
 pub(super) fn replay(
     folder: &Folder,
     run: u64,
     law: &Law,
-    options: &RunArguments,
-    interrupted: &AtomicBool,
-) -> Result<Exit, Failure> {
+    out: PathBuf,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<bool, Failure> {
     let campaign = folder.campaign();
     let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
-    let left = fly_into(options, &scenario, &command(campaign, run, law), interrupted)?;
-    let console = Console { data_on_stdout: false, quiet: false };
+    let request = RunRequest::reproducible(&scenario, command(campaign, run, law), out);
+    let left = run_into(&request, pictures, monitor)?;
     let row = folder.row(run, number_of(campaign, law))?;
     match row.and_then(|row| row.flight) {
         Some(flight) => {
             check(&left, run, law, &flight.state_hash)?;
-            console.say(&format!("state hash {}, as in the campaign", flight.state_hash));
+            monitor.say(&format!("state hash {}, as in the campaign", flight.state_hash));
         }
-        None => console.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
+        None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
     }
-    Ok(if left.report.verdict.pass { Exit::Good } else { Exit::Bad })
+    Ok(left.report.verdict.pass)
 }

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::Failure;
-use super::text_file;
+use super::super::{Failure, text_file};
 use tautline_audit::Obstacle;
 use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
 use tautline_sim::sim;
@@ -32,7 +31,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Obstacle>, Failure> {
 fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     let wrong = |message: String, place: Option<Range<usize>>| {
         let line = place.map_or(1, |place| 1 + text[..place.start.min(text.len())].matches('\n').count());
-        Failure::input(format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
+        Failure::input("audit/obstacle-file", format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
     };
     let document: Document = toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
     if document.obstacle.is_empty() {
@@ -64,7 +63,7 @@ mod tests {
     use tautline_audit::Shape;
 
     fn read(text: &str) -> Result<Vec<Obstacle>, String> {
-        parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.said.message)
+        parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.message().to_owned())
     }
 
     #[test]

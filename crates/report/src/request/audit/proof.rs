@@ -8,14 +8,13 @@ use std::path::Path;
 use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
-use super::Failure;
-use super::audit_arguments::AuditArguments;
-use super::open::Open;
+use super::super::Failure;
+use super::{AuditRequest, Open};
+use crate::report::recorded::Clock;
+use crate::report::write_atomically;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
-use tautline_recordings::read;
-use tautline_report::report::recorded::Clock;
-use tautline_report::report::write_atomically;
+use tautline_recordings::read::{self, ColumnNames, ReadOptions};
 
 /// Names of the column of time that the checker knows.
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
@@ -57,11 +56,13 @@ struct Claim<'a> {
 }
 
 /// Refuses questions that a proof does not answer, before the work.
-pub(super) fn check(arguments: &AuditArguments, settings: &Settings) -> Result<(), Failure> {
-    if arguments.proof.is_none() {
+pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(), Failure> {
+    if request.proof.is_none() {
         return Ok(());
     }
-    let no_proof = |what: &str, remedy: &str| Err(Failure::input(format!("--proof: no proof of {what}"), remedy));
+    let no_proof = |what: &str, remedy: &str| {
+        Err(Failure::input("audit/no-proof", format!("--proof: no proof of {what}"), remedy))
+    };
     let is_other = [
         (settings.delta_m.is_none(), "a limit that is not --delta"),
         (settings.motion.is_some_and(|motion| motion != Motion::Linear), "a motion that is not linear"),
@@ -76,8 +77,10 @@ pub(super) fn check(arguments: &AuditArguments, settings: &Settings) -> Result<(
     if let Some((_, what)) = is_other.iter().find(|(is_asked, _)| *is_asked) {
         return no_proof(what, "ask for --delta alone, with --offset and --max-gap as needed");
     }
-    if !(is_table(&arguments.reading.recording) && arguments.reading.is_read_plainly()) {
-        let called = arguments.reading.called();
+    let is_plain =
+        request.subject.only_file().is_some_and(|(path, options)| is_table(path) && is_read_plainly(options));
+    if !is_plain {
+        let called = request.subject.called();
         let help = "write it as a table with `tautline export RECORDING -o FILE.csv`, and audit that";
         return no_proof(
             &format!("{called}: it is not one CSV file with the columns t_s, id, x, y and z in metres"),
@@ -85,6 +88,13 @@ pub(super) fn check(arguments: &AuditArguments, settings: &Settings) -> Result<(
         );
     }
     Ok(())
+}
+
+/// Whether a file is read as it is, in metres.
+fn is_read_plainly(options: &ReadOptions) -> bool {
+    let is_moved = options.scale.is_some() || options.axes.is_some() || options.times_per_second.is_some();
+    let is_chosen = options.sort || options.one_vehicle || options.duplicates.is_some();
+    options.columns == ColumnNames::default() && !is_moved && !is_chosen
 }
 
 /// Whether a file is a table that the checker reads.
@@ -109,7 +119,8 @@ fn is_table(path: &Path) -> bool {
 /// Reads the recording again and writes the proof; what it says where there is none.
 pub(super) fn write(
     file: &Path,
-    arguments: &AuditArguments,
+    path: &Path,
+    recording: &str,
     (settings, outcome): (&Settings, &Outcome),
     clock: &Clock,
     open: &Open<'_>,
@@ -119,28 +130,27 @@ pub(super) fn write(
         return none("the verdict is undecided");
     }
     let mut builder = ProofBuilder::new(settings, outcome);
-    let mut recording = open()?;
+    let mut tracks = open()?;
     let (mut items, mut more) = (Vec::new(), true);
     while more {
         items.clear();
-        more = recording.read(&mut items)?;
+        more = tracks.read(&mut items)?;
         builder.push(&items)?;
     }
     let Some(proof) = builder.finish(outcome) else {
         return none("the limit is that of radii which the recording holds, or it is not one of samples");
     };
-    let path = &arguments.reading.recording;
-    let bytes = fs::read(path).map_err(|error| Failure::machine(format!("cannot read {}: {error}", path.display())))?;
+    let bytes = fs::read(path)
+        .map_err(|error| Failure::machine("files/cannot-read", format!("cannot read {}: {error}", path.display())))?;
     let sha256 = Sha256::digest(&bytes).iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
         text
     });
-    let recording = arguments.reading.called();
     let offsets_s = settings.vehicles.iter().map(|(name, of)| (name.as_str(), of.offset_s)).collect();
     let content = ProofFile {
         format: "tautline proof",
         version: 1,
-        data: Data { recording: &recording, sha256 },
+        data: Data { recording, sha256 },
         claim: Claim {
             status: outcome.status,
             motion: "linear",
@@ -153,8 +163,8 @@ pub(super) fn write(
         },
         windows: &proof.windows,
     };
-    let text =
-        serde_json::to_string(&content).map_err(|error| Failure::machine(format!("cannot write a proof: {error}")))?;
+    let text = serde_json::to_string(&content)
+        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write a proof: {error}")))?;
     write_atomically(file, (text + "\n").as_bytes())?;
     Ok(None)
 }

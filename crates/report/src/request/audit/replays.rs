@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::Failure;
-use super::encounters;
-use super::open::Open;
+use super::super::{Failure, Monitor};
+use super::{Open, encounters};
+use crate::figures::Figure;
+use crate::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use crate::report::recorded::RecordedReport;
 use tautline_audit::Slices;
 use tautline_audit::recorded::{Motion, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
 use tautline_core::track::Item;
-use tautline_report::figures::Figure;
-use tautline_report::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
-use tautline_report::report::recorded::RecordedReport;
 
 /// Most times of a recording that are kept while it is judged.
 const MOST_TIMES: usize = 1 << 20;
@@ -69,6 +68,7 @@ impl Instants {
 /// Reads a recording again for its replay, or why there is none, and for the figures of those who came closest.
 pub(super) fn of_recording(
     open: &Open<'_>,
+    monitor: &dyn Monitor,
     settings: &Settings,
     outcome: &Outcome,
     report: &RecordedReport,
@@ -78,7 +78,7 @@ pub(super) fn of_recording(
     let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
     let seen = instants.seen;
     let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
-    let figures = encounters::figures(open, settings, outcome, &mut places)?;
+    let figures = encounters::figures(open, monitor, settings, outcome, &mut places)?;
     let mut near = Slices::default();
     outcome.smallest.iter().for_each(|slice| near.take(*slice));
     let half = |delta_m: f64| [0.5 * delta_m; 3];

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::Failure;
-use tautline_report::report::INTERRUPTED;
+use crate::report::INTERRUPTED;
 
 /// A folder that is finished once it holds its report.
-pub(super) struct OutFolder {
+pub struct OutFolder {
     path: PathBuf,
     what: &'static str,
     report: &'static str,
@@ -18,42 +18,52 @@ pub(super) struct OutFolder {
 
 impl OutFolder {
     /// The folder at `path` of a `what`, such as `run`, whose report has that name.
-    pub(super) fn at(path: impl Into<PathBuf>, what: &'static str, report: &'static str) -> Self {
+    #[must_use]
+    pub fn at(path: impl Into<PathBuf>, what: &'static str, report: &'static str) -> Self {
         Self { path: path.into(), what, report }
     }
 
-    pub(super) fn path(&self) -> &Path {
+    /// The path of the folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// A file in the folder.
-    pub(super) fn file(&self, name: &str) -> PathBuf {
+    #[must_use]
+    pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
     /// The report.
-    pub(super) fn report(&self) -> PathBuf {
+    #[must_use]
+    pub fn report(&self) -> PathBuf {
         self.file(self.report)
     }
 
     /// Makes the folder ready. A finished one is kept unless `force` says otherwise; a run that its user stopped is not.
     /// The lock keeps another writer out until it is dropped, where the system can lock a folder.
-    pub(super) fn open(&self, force: bool) -> Result<Option<File>, Failure> {
+    ///
+    /// # Errors
+    /// [`Failure`] where the folder holds a finished result, another process writes to it, or the system refuses.
+    pub fn open(&self, force: bool) -> Result<Option<File>, Failure> {
         let report = self.report();
         if report.exists() && !force && !was_interrupted(&report) {
             return Err(Failure::input(
+                "files/finished",
                 format!("{} holds a finished {}", self.path.display(), self.what),
                 format!("give another folder with --out, or overwrite the {} with --force", self.what),
             ));
         }
         let machine = |path: &Path, error: &io::Error| {
-            Failure::machine(format!("cannot write {}: {error}", path.display()))
+            Failure::machine("files/cannot-write", format!("cannot write {}: {error}", path.display()))
                 .with_help("give a folder that can be written to with --out")
         };
         fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
         let lock = File::open(&self.path).ok();
         if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
             return Err(Failure::input(
+                "files/busy",
                 format!("another {} is writing to {}", self.what, self.path.display()),
                 "wait for it, or give another folder with --out",
             ));
@@ -78,7 +88,10 @@ fn was_interrupted(report: &Path) -> bool {
 }
 
 /// Makes a folder and a file in it, and takes the file away again.
-pub(super) fn try_to_write_in(folder: &Path) -> io::Result<()> {
+///
+/// # Errors
+/// What the system says.
+pub fn try_to_write_in(folder: &Path) -> io::Result<()> {
     let probe = folder.join(format!(".tautline-{}", std::process::id()));
     fs::create_dir_all(folder).and_then(|()| File::create(&probe)).and_then(|_| fs::remove_file(&probe))
 }

@@ -1,19 +1,18 @@
 //! What a recording of `tautline run` says of itself beside positions.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
 
 use nalgebra::Vector3;
 
+use super::super::{Failure, Monitor};
 use super::own_obstacles::OwnObstacles;
 use super::own_told::{Near, told};
-use super::{Failure, caller};
+use crate::report::recorded::EarlyEnd;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Outcome, Settings, Told, ToldViolation};
 use tautline_core::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_recordings::mcap::{Entry, McapRecording, RunVerdict};
-use tautline_report::report::recorded::EarlyEnd;
 use tautline_sim::scenario::{self, Scenario};
 
 /// Scaled distance at which two equal ellipsoids touch.
@@ -32,9 +31,9 @@ pub struct OwnRecording {
     /// The times that it says a pair was too close in.
     pub(super) violations: Vec<ToldViolation>,
     /// Whether it holds every step that was flown, and every step was straight.
-    pub(super) has_every_step: bool,
+    pub has_every_step: bool,
     /// Most steps between two of its samples.
-    pub(super) most_steps: u64,
+    pub most_steps: u64,
     /// Times of the samples \[s\].
     samples_s: Vec<f64>,
     /// What it was flown past.
@@ -92,7 +91,7 @@ impl OwnRecording {
     ///
     /// # Errors
     /// [`Failure`] where its scenario cannot be read: nobody knows then what was flown past, or in which lengths it tells.
-    pub(super) fn read(path: &Path, scale: f64) -> Result<Option<Self>, Failure> {
+    pub fn read(path: &Path, scale: f64, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
         let Some(mut recording) = path.is_file().then(|| McapRecording::open(path).ok()).flatten() else {
             return Ok(None);
         };
@@ -106,13 +105,13 @@ impl OwnRecording {
                 format!("{} was flown by another tautline: its scenario cannot be read: {why}", path.display());
             let help =
                 "audit it with the tautline that flew it, or export it as CSV and say how close vehicles may come";
-            Failure::input(message, help)
+            Failure::input("recording/foreign-scenario", message, help)
         })?;
         let mut witness = Witness::new(&scenario, header.delta_m, scale);
-        let (mut states, interrupted) = (StateHash::new(), caller::interruption());
+        let mut states = StateHash::new();
         for entry in recording.by_ref().map_while(Result::ok) {
-            if interrupted.as_ref().is_some_and(|interrupted| interrupted.load(Ordering::Relaxed)) {
-                return Err(Failure::machine("interrupted"));
+            if monitor.is_interrupted() {
+                return Err(Failure::interrupted());
             }
             match entry {
                 Entry::Sample(sample) => {
@@ -181,6 +180,7 @@ impl OwnRecording {
         };
         let (x, y, z) = (axes.x, axes.y, axes.z);
         Err(Failure::input(
+            "audit/other-ellipsoid",
             format!(
                 "the run says what happened between its samples in lengths over its ellipsoids, of half axes {x:?}, {y:?} and {z:?} m"
             ),

@@ -1,0 +1,609 @@
+//! `audit_files`: judges a recording of any origin.
+
+mod config;
+mod encounters;
+mod fence_file;
+mod obstacle_file;
+mod own;
+mod own_obstacles;
+mod own_told;
+mod places;
+mod proof;
+mod replays;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+
+pub use own::{OwnRecording, Witness};
+
+use super::{Failure, Monitor, outputs};
+use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
+use crate::report::{Status, write_atomically};
+use replays::Instants;
+use tautline_audit::recorded::{Motion, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
+use tautline_core::text::counted;
+use tautline_core::track::{Item, Tracks};
+use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
+
+/// Items that are read before the first is judged: usual intervals are learnt from them.
+const OPENING: usize = 65_536;
+
+/// Vehicles that are never there with another and have a note of their own, at most.
+const MOST_ALONE: usize = 3;
+
+/// Opens what is judged, each time from its beginning.
+pub type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + Sync + 'a;
+
+/// What is judged.
+#[derive(Clone)]
+pub enum Subject<'a> {
+    /// Files or folders; several are one recording with a vehicle in each.
+    Files {
+        /// At least one path.
+        paths: Vec<PathBuf>,
+        /// How they are read.
+        options: ReadOptions,
+    },
+    /// Motion that the caller holds.
+    Held {
+        /// The name of the motion in messages.
+        name: &'a str,
+        /// What a flight of `tautline run` says of itself: its approaches between the instants count, and its limits and
+        /// obstacles are those of the audit where the request names none.
+        own: Option<&'a OwnRecording>,
+        /// Opens the motion.
+        open: &'a Open<'a>,
+    },
+}
+
+impl Subject<'_> {
+    /// The name of the recording in messages.
+    #[must_use]
+    pub fn called(&self) -> String {
+        match self {
+            Self::Files { paths, .. } => read::called(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>()),
+            Self::Held { name, .. } => (*name).to_owned(),
+        }
+    }
+
+    /// Opens the recording at its beginning.
+    ///
+    /// # Errors
+    /// [`ReadError`] where it cannot be read.
+    pub fn open(&self) -> Result<Box<dyn Tracks<Error = ReadError> + '_>, ReadError> {
+        match self {
+            Self::Files { paths, options } => open(paths, options).map(|recording| recording as _),
+            Self::Held { open, .. } => open(),
+        }
+    }
+
+    /// The only file and how it is read, where there is one.
+    fn only_file(&self) -> Option<(&Path, &ReadOptions)> {
+        match self {
+            Self::Files { paths, options } => match &paths[..] {
+                [path] => Some((path, options)),
+                _ => None,
+            },
+            Self::Held { .. } => None,
+        }
+    }
+
+    fn paths(&self) -> &[PathBuf] {
+        match self {
+            Self::Files { paths, .. } => paths,
+            Self::Held { .. } => &[],
+        }
+    }
+
+    /// What a recording of `tautline run` says of itself, and the limit that a show states \[m\].
+    fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
+        match self {
+            Self::Held { own, .. } => Ok((own.cloned(), None)),
+            Self::Files { paths, options } => {
+                let limit_m = paths.first().and_then(|path| read::own_limit_m(path, options));
+                Ok((own_recording(paths, options, monitor)?, limit_m))
+            }
+        }
+    }
+}
+
+/// Opens files or folders as one recording.
+///
+/// # Errors
+/// [`ReadError`] where one cannot be read.
+pub fn open(paths: &[PathBuf], options: &ReadOptions) -> Result<read::Recording, ReadError> {
+    match paths {
+        [path] => read::open(path, options),
+        paths => read::open_joined(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), options),
+    }
+}
+
+/// What a recording of `tautline run` says of itself; `None` for any other recording.
+///
+/// # Errors
+/// [`Failure`] where its scenario cannot be read.
+pub fn own_recording(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+    monitor: &dyn Monitor,
+) -> Result<Option<OwnRecording>, Failure> {
+    match paths {
+        [path] if options.format.is_none_or(|format| format == Format::Mcap) => {
+            OwnRecording::read(path, options.metres(), monitor)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Which `tautline.toml` fills what a request leaves open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ConfigFile {
+    /// The nearest beside the recording and above it, up to the working folder.
+    #[default]
+    Nearest,
+    /// This file.
+    File(PathBuf),
+    /// None.
+    None,
+}
+
+/// A recording and the question about it.
+#[derive(Clone)]
+pub struct AuditRequest<'a> {
+    /// What is judged.
+    pub subject: Subject<'a>,
+    /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence of a file are added to these.
+    pub settings: Settings,
+    /// TOML file of obstacles.
+    pub obstacles: Option<PathBuf>,
+    /// TOML file of a fence.
+    pub fence: Option<PathBuf>,
+    /// The number of vehicles that must be there to judge.
+    pub expect_vehicles: Option<usize>,
+    /// Whether the samples of a recording of `tautline run` are judged alone, without what its run saw between them.
+    pub independent: bool,
+    /// Whether an undecided verdict is good.
+    pub allow_undecided: bool,
+    /// Which file fills what is left open. Nothing is looked for beside motion that the caller holds.
+    pub config: ConfigFile,
+    /// The command or expression that judges again, for the page.
+    pub command: String,
+    /// Where the page with figures is written.
+    pub html: Option<PathBuf>,
+    /// Where a proof is written that `check_proof.py` confirms; of one CSV table and a safety distance alone.
+    pub proof: Option<PathBuf>,
+}
+
+impl<'a> AuditRequest<'a> {
+    /// A request that asks nothing yet.
+    #[must_use]
+    pub fn new(subject: Subject<'a>) -> Self {
+        Self {
+            subject,
+            settings: Settings::default(),
+            obstacles: None,
+            fence: None,
+            expect_vehicles: None,
+            independent: false,
+            allow_undecided: false,
+            config: ConfigFile::default(),
+            command: String::new(),
+            html: None,
+            proof: None,
+        }
+    }
+}
+
+/// The answer of an audit.
+#[derive(Clone, Debug)]
+pub struct Audited {
+    /// The report.
+    pub report: RecordedReport,
+    /// Whether an undecided verdict is good.
+    pub allows_undecided: bool,
+    /// A note on the file of settings that was used.
+    pub asked_by: Option<String>,
+}
+
+impl Audited {
+    /// Whether the verdict is clear, or undecided where that is allowed.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        match self.report.status {
+            Status::Clear => true,
+            Status::Undecided => self.allows_undecided,
+            Status::Violation => false,
+        }
+    }
+}
+
+/// A request that is complete: no file of settings fills it any more.
+#[derive(Clone)]
+pub struct ConfiguredAudit<'a> {
+    request: AuditRequest<'a>,
+    /// A note on the file of settings that was used.
+    asked_by: Option<String>,
+}
+
+/// Judges one recording, and writes the page and the proof that the request asks for.
+///
+/// ```
+/// # use std::fs;
+/// use tautline_audit::recorded::Settings;
+/// use tautline_report::request::{AuditRequest, ReadOptions, Silent, Subject, audit_files};
+///
+/// # let folder = std::env::temp_dir().join(format!("tautline-audit-files-{}", std::process::id()));
+/// # fs::create_dir_all(&folder)?;
+/// # let path = folder.join("two.csv");
+/// fs::write(&path, "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n")?;
+/// let subject = Subject::Files { paths: vec![path], options: ReadOptions::default() };
+/// let request = AuditRequest { settings: Settings::delta(2.0), ..AuditRequest::new(subject) };
+/// assert!(audit_files(&request, &Silent::default())?.is_good());
+/// # fs::remove_dir_all(&folder)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Failure`] where the question or the recording is wrong, or a file cannot be written. The monitor has the verdict
+/// before files are written.
+pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<Audited, Failure> {
+    request.configured()?.judge(monitor)
+}
+
+impl<'a> AuditRequest<'a> {
+    /// Fills what is left open as the file of settings says, and refuses outputs that would overwrite an input.
+    ///
+    /// # Errors
+    /// [`Failure`] where the file of settings is wrong, or an output would overwrite an input.
+    pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
+        let configured = config::configured(self.clone())?;
+        configured.check_outputs(&[])?;
+        Ok(configured)
+    }
+
+    /// Whether a radius is given for all vehicles or for one.
+    fn has_radius(&self) -> bool {
+        self.settings.radius_m.is_some() || self.settings.vehicles.values().any(|of| of.radius_m.is_some())
+    }
+
+    /// Whether a largest acceleration is given for all vehicles or for one.
+    fn has_max_accel(&self) -> bool {
+        self.settings.max_accel_m_s2.is_some() || self.settings.vehicles.values().any(|of| of.max_accel_m_s2.is_some())
+    }
+
+    /// Whether no limit on distances is given.
+    fn is_silent(&self) -> bool {
+        self.settings.delta_m.is_none() && !self.has_radius() && self.settings.ellipsoid_m.is_none()
+    }
+
+    /// The settings with the obstacles and the fence of files.
+    fn complete_settings(&self) -> Result<Settings, Failure> {
+        if self.has_max_accel() && self.settings.motion != Some(Motion::Bounded) {
+            return Err(Failure::input(
+                "audit/unused-acceleration",
+                "--max-accel says nothing of a motion that is known exactly",
+                "add --motion bounded, or leave --max-accel out",
+            ));
+        }
+        if self.settings.ellipsoid_m.is_some() && self.has_radius() {
+            return Err(Failure::input(
+                "audit/radius-and-ellipsoid",
+                "--radius and --ellipsoid are both given",
+                "an ellipsoid has its own size: leave one of them out",
+            ));
+        }
+        let limits = &self.settings.envelope.limits;
+        for (k, limit) in limits.iter().enumerate() {
+            if limits[..k].iter().any(|before| before.quantity == limit.quantity) {
+                let message = format!("--limit {} is given twice", limit.quantity.name());
+                return Err(Failure::input("audit/limit-twice", message, "give each limit once"));
+            }
+        }
+        let mut settings = self.settings.clone();
+        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacle_file::read)?);
+        if let Some(fence) = self.fence.as_deref() {
+            settings.envelope.fence = Some(fence_file::read(fence)?);
+        }
+        Ok(settings)
+    }
+
+    /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
+    fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
+        let path = self.subject.called();
+        let judged = outcome.presence.iter().flatten().count();
+        if let Some(expected) = self.expect_vehicles
+            && judged != expected
+        {
+            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
+            return Err(Failure::input(
+                "audit/vehicle-count",
+                message,
+                "look for who is missing or too many, or give another --expect-vehicles",
+            ));
+        }
+        let asked =
+            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
+        let asked = asked.count();
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
+            let message =
+                format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles, --limit, --fence";
+            return Err(Failure::input("audit/nothing-to-judge", message, help));
+        }
+        if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
+            let message = format!("{path}: no vehicle is there between --from and --to");
+            return Err(Failure::input(
+                "audit/empty-window",
+                message,
+                "give a window in which the recording has vehicles",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Refuses a question in seconds if the unit of time is a guess. Seconds are accepted if milliseconds would make the vehicles of
+    /// these first items faster than sound.
+    fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
+        /// Speed that no vehicle of a swarm has \[m/s\]: that of sound.
+        const FASTEST_M_S: f64 = 340.0;
+        let settings = &self.settings;
+        let asked = [
+            (settings.motion == Some(Motion::Bounded), "--motion bounded"),
+            (settings.from_s.is_some(), "--from"),
+            (settings.to_s.is_some(), "--to"),
+            (settings.max_gap_s.is_some(), "--max-gap"),
+            (settings.vehicles.values().any(|of| of.offset_s != 0.0), "--offset"),
+            (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
+        ];
+        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
+        let path = self.subject.called();
+        if unit != "s" {
+            let message = format!(
+                "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
+            );
+            return Err(Failure::input(
+                "audit/guessed-time-unit",
+                message,
+                format!("say --time-unit {unit}, or --time-unit s"),
+            ));
+        }
+        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+            return Ok(());
+        }
+        let message = format!(
+            "{path}: its times may be seconds or milliseconds, going by their steps, and {option} depends on it"
+        );
+        Err(Failure::input("audit/guessed-time-unit", message, "say --time-unit s, or --time-unit ms"))
+    }
+
+    /// What is taken to happen between samples of a recording of curves alone, or that may be ours, whose run may have answered
+    /// the question itself; nothing is proved where the samples themselves are assumed.
+    fn between(&self, curves: bool, own: Option<&OwnRecording>, is_judged: bool, assumed: Option<&str>) -> Between {
+        let most = || {
+            let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
+            let by_name =
+                |(name, of): (&String, &VehicleSettings)| of.max_accel_m_s2.map(|a| format!("{a:?} m/s^2 for {name}"));
+            all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
+        };
+        let (motion, basis) = match self.settings.motion {
+            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Motion::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
+            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
+            _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
+            None if is_judged => ("as the run judged every step".to_owned(), Basis::Run),
+            _ => ("straight between samples".to_owned(), Basis::Assumed),
+        };
+        match assumed {
+            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => Between { motion, basis },
+        }
+    }
+}
+
+impl ConfiguredAudit<'_> {
+    /// A note on the file of settings that was used.
+    #[must_use]
+    pub fn asked_by(&self) -> Option<&str> {
+        self.asked_by.as_deref()
+    }
+
+    /// Refuses outputs of the request, and `more` of the caller, that would overwrite an input or each other.
+    ///
+    /// # Errors
+    /// [`Failure`] that names both.
+    pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
+        let AuditRequest { subject, obstacles, fence, config, html, proof, .. } = &self.request;
+        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
+        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        if let ConfigFile::File(path) = config {
+            inputs.push(("the file of settings", path));
+        }
+        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
+        let own = [("--html", html), ("--proof", proof)];
+        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
+        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
+    }
+
+    /// Judges the recording.
+    ///
+    /// # Errors
+    /// As [`audit_files`].
+    pub fn judge(&self, monitor: &dyn Monitor) -> Result<Audited, Failure> {
+        let request = &self.request;
+        let mut settings = request.complete_settings()?;
+        let (own, own_limit_m) = request.subject.own(monitor)?;
+        let open: &Open<'_> = &|| request.subject.open();
+        let own = if request.independent { own.map(OwnRecording::independent) } else { own };
+        let is_silent = request.is_silent();
+        let own_delta_m = own.as_ref().map(|own| own.delta_m).or(own_limit_m);
+        let own_ellipsoid_m = own.as_ref().and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
+        let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
+        settings.delta_m = settings.delta_m.or(own_delta_m);
+        settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
+        settings.is_own_limit = is_silent && request.obstacles.is_none();
+        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
+        settings.max_gap_s = settings.max_gap_s.or(own.as_ref().filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
+        settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
+        let own_obstacles = own
+            .as_ref()
+            .map(|own| &own.obstacles)
+            .filter(|own| request.obstacles.is_none() && settings.ellipsoid_m.is_none() && !own.obstacles.is_empty());
+        settings.obstacles.extend(own_obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
+        proof::check(request, &settings)?;
+        let mut auditor = TrackAuditor::new(settings.clone())?;
+        if request.html.is_some() {
+            auditor = auditor.with_smallest();
+        }
+        auditor = auditor.with_interruption(monitor.interruption().clone());
+        own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
+        own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
+        own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
+        let mut instants = request.html.as_ref().map(|_| Instants::default());
+        let Judged { mut outcome, clock, mut notes, assumed, curves, is_planar } =
+            self.judged(auditor, &settings, open, monitor, &mut |items, names| {
+                if let Some(instants) = &mut instants {
+                    instants.note(items, names, &settings);
+                }
+            })?;
+        if let Some(own) = own_obstacles {
+            own.bind(&mut outcome, &settings);
+        }
+        request.check_count(&outcome, &settings)?;
+        let own_now = own.as_ref().filter(|_| request.settings.motion.is_none());
+        let is_judged = own_now.is_some_and(|own| own.settle(&mut outcome, &settings, &mut notes));
+        let between = request.between(curves, own.as_ref(), is_judged, assumed.as_deref());
+        let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
+        let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
+        notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
+        notes.extend(own.iter().filter_map(|own| own.doubt(outcome.status)));
+        notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
+        notes.extend(own_ellipsoid_m.map(|axes| {
+            format!(
+                "the ellipsoid is the recording's own, with half axes of {:?}, {:?} and {:?} m",
+                axes.x, axes.y, axes.z
+            )
+        }));
+        if own_obstacles.is_none() && own.as_ref().is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
+            let why = if request.obstacles.is_some() {
+                "--obstacles names others"
+            } else {
+                "they have no place among ellipsoids"
+            };
+            notes.push(format!("the obstacles that were flown past are not judged: {why}"));
+        }
+        notes.extend(own_obstacles.map(|own| {
+            let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+            format!("the obstacles are the recording's own: {}", names.join(", "))
+        }));
+        notes.extend(outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
+            let Presence { from_s, to_s } = outcome.presence[vehicle]?;
+            let name = outcome.name(vehicle);
+            Some(format!(
+                "{name}, there from {from_s:?} s to {to_s:?} s, is never there with another: nothing is said of it (--offset \
+                 {name}=SECONDS sets a wrong clock right)"
+            ))
+        }));
+        notes.extend(self.asked_by.clone());
+        for note in &notes {
+            monitor.warn(&format!("note: {note}"));
+        }
+        let source = Source { recording: request.subject.called(), clock, planar: is_planar, notes };
+        let early_end = own.as_ref().and_then(|own| own.early_end.clone());
+        // A window that ends before the recording was flown whole.
+        let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
+        let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
+        let report = RecordedReport::new(&outcome, &settings, source, between);
+        let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
+        let shortened = report.shortened();
+        for note in &shortened {
+            monitor.warn(&format!("note: {note}"));
+        }
+        report.source.notes.extend(shortened);
+
+        // The verdict first: a file that cannot be written does not cost it.
+        monitor.say(&format!("{}\n{}", report.headline(), report.text()));
+        if let Some((html, instants)) = request.html.as_ref().zip(instants) {
+            let (replay, figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;
+            write_atomically(html, report.to_html(&replay, &figures, &request.command).as_bytes())?;
+        }
+        if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
+            let recording = &report.source.recording;
+            let refused = proof::write(file, path, recording, (&settings, &outcome), &report.source.clock, open)?;
+            if let Some(why) = refused {
+                monitor.warn(&format!("note: {why}"));
+            }
+        }
+        Ok(Audited { report, allows_undecided: request.allow_undecided, asked_by: self.asked_by.clone() })
+    }
+
+    /// Reads and judges all items.
+    fn judged(
+        &self,
+        mut auditor: TrackAuditor,
+        settings: &Settings,
+        open: &Open<'_>,
+        monitor: &dyn Monitor,
+        note: &mut dyn FnMut(&[Item], &[String]),
+    ) -> Result<Judged, Failure> {
+        let called = self.request.subject.called();
+        let mut recording = open()?;
+        let is_planar = recording.is_planar();
+        let level = places::refuse_unknown(&self.request, self.asked_by(), settings, recording.as_ref())?;
+        monitor.begin(&called, None);
+        let mut items = Vec::new();
+        let (mut more, mut first, mut curves) = (true, true, true);
+        while more {
+            if monitor.is_interrupted() {
+                return Err(Failure::interrupted());
+            }
+            items.clear();
+            while more && (items.is_empty() || (first && items.len() < OPENING)) {
+                more = recording.read(&mut items)?;
+            }
+            if first && recording.clock().by_steps {
+                self.request.refuse_guessed_seconds(recording.clock().unit, &items)?;
+            }
+            first = false;
+            level.check(&called, recording.vehicles(), &items)?;
+            curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
+            auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+            note(&items, recording.vehicles());
+            monitor.advance(items.len() as u64);
+        }
+        monitor.finish();
+        let clock = recording.clock();
+        let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
+        let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+        let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
+        Ok(Judged { outcome, clock, notes, assumed, curves, is_planar })
+    }
+}
+
+/// A recording after it was judged.
+struct Judged {
+    outcome: Outcome,
+    clock: Clock,
+    notes: Vec<String>,
+    /// What was assumed to know its samples.
+    assumed: Option<String>,
+    /// Whether it has curves and no samples.
+    curves: bool,
+    /// Whether some height is not known.
+    is_planar: bool,
+}
+
+/// The largest speed from sample to sample of a vehicle \[m/s\]; 0 of curves.
+fn fastest_m_s(items: &[Item]) -> f64 {
+    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
+    let samples = items.iter().filter_map(|item| match item {
+        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
+        Item::Piece(_) => None,
+    });
+    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
+        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
+        Some((position_m - before_m).norm() / (time_s - before_s))
+    });
+    speeds.fold(0.0, f64::max)
+}

@@ -1,0 +1,143 @@
+//! `export`: writes a recording in another format.
+
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::audit::{open, own_recording};
+use super::{Failure, Monitor, outputs};
+use crate::report::write_atomically_with;
+use tautline_core::text::counted;
+use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_recordings::export::{self, ExportOptions, WRITTEN};
+use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Recording};
+
+/// A recording and the file to write.
+#[derive(Clone, Debug)]
+pub struct ExportRequest {
+    /// Files or folders; several are one recording with a vehicle in each.
+    pub paths: Vec<PathBuf>,
+    /// How they are read.
+    pub options: ReadOptions,
+    /// The file to write.
+    pub output: PathBuf,
+    /// The format to write; by default that of the extension of the file.
+    pub format: Option<Format>,
+    /// How often curves are sampled \[Hz\]; what is between the samples is lost.
+    pub sample_hz: Option<f64>,
+    /// Whether a file that exists is overwritten.
+    pub force: bool,
+}
+
+/// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
+struct Interruptible {
+    tracks: Recording,
+    path: PathBuf,
+    interrupted: Arc<AtomicBool>,
+}
+
+impl Tracks for Interruptible {
+    type Error = ReadError;
+
+    fn vehicles(&self) -> &[String] {
+        self.tracks.vehicles()
+    }
+
+    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(ReadError::new(&self.path, Fault::System(ErrorKind::Interrupted.into())));
+        }
+        self.tracks.read(items)
+    }
+
+    fn clock(&self) -> &Clock {
+        self.tracks.clock()
+    }
+
+    fn notes(&self) -> &[String] {
+        self.tracks.notes()
+    }
+
+    fn assumed(&self) -> Option<&str> {
+        self.tracks.assumed()
+    }
+
+    fn is_planar(&self) -> bool {
+        self.tracks.is_planar()
+    }
+
+    fn earth_origin(&self) -> Option<&EarthOrigin> {
+        self.tracks.earth_origin()
+    }
+}
+
+impl ExportRequest {
+    /// The format to write, of a file that may be written.
+    fn checked(&self) -> Result<Format, Failure> {
+        let path = &self.output;
+        let by_extension = || {
+            let extension = path.extension()?.to_str()?;
+            WRITTEN.iter().copied().find(|format| format.name().eq_ignore_ascii_case(extension))
+        };
+        let format = self.format.or_else(by_extension).ok_or_else(|| {
+            let message = format!("the name `{}` does not tell a format", path.display());
+            let help = "name the format with --format csv, parquet, npz or mcap";
+            Failure::input("export/unknown-format", message, help)
+        })?;
+        if path.exists() && !self.force {
+            let message = format!("`{}` exists", path.display());
+            return Err(Failure::input("files/exists", message, "overwrite it with --force, or write another file"));
+        }
+        let inputs: Vec<_> = self.paths.iter().map(|path| ("the recording", path.as_path())).collect();
+        outputs::check(&inputs, &[("--output", path)])?;
+        Ok(format)
+    }
+}
+
+/// Writes a recording in another format, the same to the last bit. A file is written whole or not at all.
+///
+/// # Errors
+/// [`Failure`] where the recording cannot be read, or the file cannot be written.
+pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(), Failure> {
+    let format = request.checked()?;
+    let ExportRequest { paths, options, output, sample_hz, .. } = request;
+    let interrupted = monitor.interruption();
+    let tracks = || -> Result<Recording, ReadError> {
+        let path = paths.first().cloned().unwrap_or_default();
+        Ok(Box::new(Interruptible { tracks: open(paths, options)?, path, interrupted: Arc::clone(interrupted) }))
+    };
+    let channels = || match &paths[..] {
+        [path] if options.format.is_none_or(|format| format == Format::Mcap) => read::open_channels(path),
+        _ => Ok(None),
+    };
+    let exported = write_atomically_with(output, |file| {
+        let options = ExportOptions { sample_hz: *sample_hz };
+        export::export_with(&tracks, &channels, format, &options, file).map_err(Failure::from)
+    });
+    let file = output.display();
+    if exported.is_err() && monitor.is_interrupted() {
+        return Err(Failure::machine("interrupted", format!("interrupted: `{file}` was not written")));
+    }
+    let exported = exported?;
+    for note in exported.notes.iter().chain(&lost(request, monitor)) {
+        monitor.warn(&format!("note: {note}"));
+    }
+    let vehicles = counted(exported.vehicles as u64, "vehicle", "vehicles");
+    monitor.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
+    Ok(())
+}
+
+/// What a run saw between its samples is not in the exported file: a note on that.
+fn lost(request: &ExportRequest, monitor: &dyn Monitor) -> Option<String> {
+    let file = request.output.display();
+    match own_recording(&request.paths, &request.options, monitor) {
+        Ok(own) => own.filter(|own| !own.has_every_step).map(|own| {
+            let steps = own.most_steps;
+            format!(
+                "up to {steps} steps were flown between two samples: what the run saw between them is not in {file}"
+            )
+        }),
+        Err(unread) => Some(format!("{}; what the run saw between two samples is not in {file}", unread.message())),
+    }
+}

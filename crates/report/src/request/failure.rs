@@ -1,0 +1,263 @@
+//! Why a request has no answer.
+
+use std::fmt;
+use std::path::Path;
+
+use tautline_audit::recorded::RecordedError;
+use tautline_core::record::RecordError;
+use tautline_laws::law::ParameterError;
+use tautline_recordings::export::ExportError;
+use tautline_recordings::read::ReadError;
+use tautline_sim::scenario::{Place, ScenarioError};
+use tautline_sim::sim::SimError;
+
+use crate::report::ArtefactError;
+
+/// Longest line of a source that a frame around it can show \[bytes\].
+const LONGEST_LINE: usize = 400;
+
+/// Why a request has no answer: the input is wrong, or the machine failed.
+///
+/// [`fmt::Display`] is one line: place, problem and remedy. Control characters of the input are blanked.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    code: &'static str,
+    is_machine: bool,
+    message: String,
+    help: Option<String>,
+    place: Option<Box<Place>>,
+}
+
+impl Failure {
+    /// A failure by wrong input. `code` is stable, such as `audit/no-limit`.
+    #[must_use]
+    pub fn input(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        Self::told(code, false, message).with_help(help)
+    }
+
+    /// A failure of the machine: no space, no permission, no adapter.
+    #[must_use]
+    pub fn machine(code: &'static str, message: impl AsRef<str>) -> Self {
+        Self::told(code, true, message)
+    }
+
+    /// The failure after an interruption.
+    #[must_use]
+    pub fn interrupted() -> Self {
+        Self::machine("interrupted", "interrupted")
+    }
+
+    /// A failure of either kind, without a remedy.
+    #[must_use]
+    pub fn told(code: &'static str, is_machine: bool, message: impl AsRef<str>) -> Self {
+        Self { code, is_machine, message: blanked(message.as_ref()), help: None, place: None }
+    }
+
+    /// Adds the remedy.
+    #[must_use]
+    pub fn with_help(mut self, help: impl AsRef<str>) -> Self {
+        self.help = Some(blanked(help.as_ref()));
+        self
+    }
+
+    /// Puts the situation in front of the message.
+    #[must_use]
+    pub fn under(mut self, situation: &str) -> Self {
+        self.message = blanked(&format!("{situation}: {}", self.message));
+        self
+    }
+
+    /// Puts the file in front of the message.
+    #[must_use]
+    pub fn of(self, file: &Path) -> Self {
+        self.under(&file.display().to_string())
+    }
+
+    /// Replaces the word FOLDER of the remedy.
+    #[must_use]
+    pub fn naming(mut self, folder: &str) -> Self {
+        self.help = self.help.map(|help| blanked(&help.replace("FOLDER", folder)));
+        self
+    }
+
+    /// Says where in a text the problem stands.
+    #[must_use]
+    pub fn at(mut self, place: &Place) -> Self {
+        if place.text.lines().any(|line| line.len() > LONGEST_LINE) {
+            return self.under(&format!("{}:{}:{}", place.source, place.line, place.column));
+        }
+        self.place = Some(Box::new(Place { text: blanked(&place.text), ..place.clone() }));
+        self
+    }
+
+    /// The stable name of the problem, such as `audit/no-limit`.
+    #[must_use]
+    pub fn code(&self) -> &'static str {
+        self.code
+    }
+
+    /// Whether the machine failed (exit code 3) and not the input (exit code 2).
+    #[must_use]
+    pub fn is_machine(&self) -> bool {
+        self.is_machine
+    }
+
+    /// The problem, without place and remedy.
+    #[must_use]
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// The remedy.
+    #[must_use]
+    pub fn help(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// Where in a text the problem stands. Its lines are short enough to be shown.
+    #[must_use]
+    pub fn place(&self) -> Option<&Place> {
+        self.place.as_deref()
+    }
+
+    /// The problem and its remedy in one line.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        self.help.as_ref().map_or_else(|| self.message.clone(), |help| format!("{} ({help})", self.message))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = &self.place {
+            write!(f, "{}, line {}: ", place.source, place.line)?;
+        }
+        f.write_str(&self.in_words())
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// The text with control characters blanked, byte for byte: the content of a file must not steer a terminal.
+#[must_use]
+pub fn blanked(text: &str) -> String {
+    let blank =
+        |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
+    text.chars().map(blank).collect()
+}
+
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        // The error's own text shows a part of a line of any length.
+        if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
+            return Self::told(error.code(), false, error.to_string());
+        }
+        let message = match error.field().filter(|_| error.place().is_none()) {
+            Some(field) => format!("{field}: {}", error.message()),
+            None => error.message().to_owned(),
+        };
+        let mut failure = Self::told(error.code(), false, message);
+        failure.help = error.help().map(str::to_owned);
+        error.place().into_iter().fold(failure, Self::at)
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string()).with_help(
+                "what was recorded before stays readable; free some space or give another folder with --out",
+            ),
+            RecordError::Open { .. } => Self::told("files/cannot-read", false, error.to_string()),
+            RecordError::Read { .. } => Self::told("recording/malformed", false, error.to_string()),
+        }
+    }
+}
+
+impl From<ArtefactError> for Failure {
+    fn from(error: ArtefactError) -> Self {
+        Self::machine("files/cannot-write", error.to_string()).with_help("free some space or write to another folder")
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        Self::told(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        Self::told(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
+    }
+}
+
+impl From<ParameterError> for Failure {
+    fn from(error: ParameterError) -> Self {
+        Self::told("law/parameter", false, error.to_string())
+    }
+}
+
+impl From<SimError> for Failure {
+    fn from(error: SimError) -> Self {
+        match error {
+            SimError::Record(error) => error.into(),
+            SimError::Law(error) => error.into(),
+            SimError::NoLeg | SimError::Obstacle(_) | SimError::Vehicles { .. } | SimError::Commands { .. } => {
+                Self::told("simulation/inconsistent", false, error.to_string())
+            }
+            SimError::Audit(error) => Self::input(
+                "simulation/cannot-judge",
+                error.to_string(),
+                "choose a safety distance and a number of vehicles that can be judged",
+            ),
+        }
+    }
+}
+
+impl From<RecordedError> for Failure {
+    fn from(error: RecordedError) -> Self {
+        let (code, help) = match &error {
+            RecordedError::Interrupted => return Self::interrupted(),
+            RecordedError::OutOfRange { .. } => ("audit/out-of-range", "give another number"),
+            RecordedError::EmptyWindow { .. } => ("audit/empty-window", "give another number"),
+            RecordedError::NoBound { .. } => (
+                "audit/no-acceleration-bound",
+                "give the largest acceleration with --max-accel A or --max-accel NAME=A",
+            ),
+            RecordedError::NoLimit { .. } => {
+                ("audit/no-limit", "give --delta, or --radius NAME=R; or ask --limit and --fence alone")
+            }
+            RecordedError::NoAccelWindow => (
+                "audit/acceleration-window",
+                "add --limit accel=A and leave --motion bounded out, or leave --accel-window out",
+            ),
+            RecordedError::LimitOfJumps { .. } => {
+                ("audit/limit-of-jumps", "give --motion linear, or bounded with --max-accel")
+            }
+            RecordedError::UnknownVehicle { .. } => ("audit/unknown-vehicle", "name vehicles as the recording does"),
+            RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
+            RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
+            RecordedError::RadiusChanges { .. } => {
+                ("audit/radius-changes", "give one radius of the vehicle with --radius NAME=R")
+            }
+            RecordedError::ObstaclesAndEllipsoid => {
+                ("audit/obstacles-and-ellipsoid", "judge obstacles by --delta or --radius, and ellipsoids without them")
+            }
+            RecordedError::Obstacle(_) => ("audit/obstacle", "mend the file of obstacles"),
+            RecordedError::TwoClocks { .. } => (
+                "audit/two-clocks",
+                "set a clock right with --offset NAME=SECONDS, or judge vehicles of one clock with --ids, or a time with \
+                 --from",
+            ),
+            RecordedError::Unnamed { .. }
+            | RecordedError::TimeNotIncreasing { .. }
+            | RecordedError::OutOfOrder { .. }
+            | RecordedError::Item { .. } => (
+                "audit/malformed",
+                "mend the recording there, leave the vehicle out with --ids, or look at --offset and --time-scale",
+            ),
+        };
+        Self::input(code, error.to_string(), help)
+    }
+}

@@ -1,0 +1,36 @@
+//! Requests: everything that `tautline run` and `tautline audit` do, for programs.
+//!
+//! A request is a struct with all options of a command. A function answers it with a typed result, writes the files that
+//! the request names, and hands notes and progress to a [`Monitor`]. The command line parses its arguments into requests,
+//! the Python package its keyword arguments.
+//!
+//! | request | function | answer |
+//! | --- | --- | --- |
+//! | [`RunRequest`] | [`run_into`] | a folder with recording, report, figures and pictures |
+//! | [`AuditRequest`] | [`audit_files`] | a verdict on a recording of any origin |
+//! | [`ExportRequest`] | [`export_file`] | a recording in another format |
+
+pub mod audit;
+mod export;
+mod failure;
+mod folder;
+mod monitor;
+pub mod outputs;
+mod pictures;
+mod range;
+mod run;
+mod scenario;
+mod text_file;
+
+pub use audit::{AuditRequest, Audited, ConfigFile, OwnRecording, Subject, Witness, audit_files};
+pub use export::{ExportRequest, export_file};
+pub use failure::{Failure, blanked};
+pub use folder::{OutFolder, try_to_write_in};
+pub use monitor::{Monitor, Quiet, Silent};
+pub use pictures::{FlightPictures, NamedPicture, Pictures};
+pub use range::in_range;
+pub use run::{
+    RECORDING, RunFiles, RunRequest, flight_page, replay_of_run, run_into, run_verdict, svg_files, threads, write_files,
+};
+pub use scenario::{ScenarioRequest, command_line};
+pub use tautline_recordings::read::ReadOptions;

@@ -1,0 +1,56 @@
+//! Pictures of flights, which are drawn by a crate that this one does not depend on.
+
+use std::path::Path;
+
+use tautline_core::record::Sink;
+use tautline_recordings::mcap::ExtraTopic;
+use tautline_sim::scenario::Scenario;
+
+use super::{Failure, Monitor};
+use crate::report::page::Picture;
+
+/// A picture and its name, such as `closest`.
+pub type NamedPicture = (String, Picture);
+
+/// Draws flights. `()` draws nothing.
+pub trait Pictures: Sync {
+    /// Returns an observer of a flight of the scenario, which draws it afterwards.
+    fn observe(&self, scenario: &Scenario) -> Box<dyn FlightPictures>;
+
+    /// Flies the scenario and draws the instant `at_s` \[s\]: an image as a data URI of about `room_bytes`.
+    ///
+    /// # Errors
+    /// [`Failure`] where the scenario cannot be flown or the machine cannot draw.
+    fn shot(&self, scenario: &Scenario, at_s: f64, room_bytes: usize) -> Result<String, Failure>;
+
+    /// A topic that is recorded beside positions, so that other viewers can show the flight.
+    fn topic(&self, _scenario: &Scenario) -> Option<Box<dyn ExtraTopic>> {
+        None
+    }
+}
+
+/// Observes one flight and draws it.
+pub trait FlightPictures: Sink + Send {
+    /// Writes pictures into the folder of a run and returns them for its page. A machine
+    /// that cannot draw writes none and warns.
+    ///
+    /// # Errors
+    /// [`Failure`] where a file cannot be written.
+    fn write(&self, folder: &Path, monitor: &dyn Monitor) -> Result<Vec<NamedPicture>, Failure>;
+}
+
+impl Pictures for () {
+    fn observe(&self, _scenario: &Scenario) -> Box<dyn FlightPictures> {
+        Box::new(())
+    }
+
+    fn shot(&self, _scenario: &Scenario, _at_s: f64, _room_bytes: usize) -> Result<String, Failure> {
+        Err(Failure::machine("pictures/none", "this build draws nothing"))
+    }
+}
+
+impl FlightPictures for () {
+    fn write(&self, _folder: &Path, _monitor: &dyn Monitor) -> Result<Vec<NamedPicture>, Failure> {
+        Ok(Vec::new())
+    }
+}

@@ -1,0 +1,342 @@
+//! `campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::{
+    ANSWER, Asked, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, again,
+};
+use crate::THREADS;
+use crate::compare::Watch;
+use tautline_report::report::write_atomically;
+use tautline_report::request::{Failure, Monitor, Pictures, RECORDING, command_line, in_range};
+
+/// The page for people.
+const PAGE: &str = "campaign.html";
+/// Most flights that are flown again for the page.
+pub const MOST_WORST: usize = 10;
+
+/// A specification, and what is asked beyond it.
+#[derive(Clone, Debug)]
+pub struct CampaignRequest {
+    /// The file of the specification.
+    pub spec: PathBuf,
+    /// Stop as soon as the interval of each law's share of clear flights is no wider.
+    pub until_width: Option<f64>,
+    /// Stop as soon as each law's share of clear flights is known to be above or below this share.
+    pub until_decided: Option<f64>,
+    /// Folder for everything; by default `out/NAME`, where NAME is the specification's.
+    pub out: Option<PathBuf>,
+    /// Parts to fly it in, by default one for 250 runs; one that is whole is not flown again.
+    pub shards: Option<u64>,
+    /// Threads to use, by default one a core. The result is the same for any number.
+    pub threads: Option<usize>,
+    /// Flights with the least clearance that are flown again for the page: at most [`MOST_WORST`].
+    pub worst: usize,
+}
+
+/// The answer of a campaign.
+#[derive(Clone, Debug)]
+pub struct CampaignAnswer {
+    /// The numbers, as in `campaign.json`.
+    pub summary: Summary,
+    /// Where everything is.
+    pub folder: PathBuf,
+}
+
+/// Which flight of a campaign is flown again, and where its files go.
+#[derive(Clone, Debug)]
+pub struct ReplayRequest {
+    /// Number of the run, from 0.
+    pub run: u64,
+    /// The law; the first by default.
+    pub law: Option<String>,
+    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    pub bad: Option<usize>,
+    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
+    pub out: Option<PathBuf>,
+}
+
+impl CampaignRequest {
+    /// A campaign as its specification says, of which the ten worst flights are flown again.
+    #[must_use]
+    pub fn new(spec: PathBuf) -> Self {
+        Self { spec, until_width: None, until_decided: None, out: None, shards: None, threads: None, worst: MOST_WORST }
+    }
+
+    /// The name of the campaign.
+    fn name(&self) -> String {
+        self.spec.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    }
+
+    /// Text and keys of the specification.
+    fn read(&self) -> Result<(String, Spec), Failure> {
+        let shown = self.spec.display().to_string();
+        let text = fs::read_to_string(&self.spec).map_err(|error| {
+            Failure::input(
+                "campaign/cannot-read",
+                format!("cannot read {shown}: {error}"),
+                "give the path of a specification, as docs/campaigns.md shows one",
+            )
+        })?;
+        let mut spec = Spec::read(&shown, &text)?;
+        if self.until_width.is_some() || self.until_decided.is_some() {
+            let stop = spec.stop.unwrap_or(Stop { of: Asked::Clear, width: None, decided: None });
+            spec.stop = Some(Stop {
+                width: self.until_width.or(stop.width),
+                decided: self.until_decided.or(stop.decided),
+                ..stop
+            });
+        }
+        Ok((text, spec))
+    }
+
+    /// Plans the campaign into its folder, or opens it where it was planned before.
+    ///
+    /// # Errors
+    /// [`Failure`] where the specification is wrong, or the folder is of another campaign.
+    pub fn plan(&self) -> Result<Folder, Failure> {
+        let folder = self.spec.parent().unwrap_or(Path::new(""));
+        let (text, spec) = self.read()?;
+        let campaign =
+            Campaign::plan(&spec, &self.name(), folder, self.shards, Program::running()?).map_err(|error| {
+                let place = error.place(&self.spec.display().to_string(), &text);
+                place.into_iter().fold(Failure::from(error), |failure, place| failure.at(&place))
+            })?;
+        let out = self.out.clone().unwrap_or_else(|| Path::new("out").join(self.name()));
+        Ok(Folder::plan(&out, campaign, self.shards.is_some())?)
+    }
+}
+
+/// Flies a whole campaign on this machine, merges it and writes its answer and page. Started again it goes on where it was.
+/// `None` where the monitor interrupted; what was flown is kept.
+///
+/// # Errors
+/// [`Failure`] where the specification is wrong, or the system refuses.
+pub fn campaign(
+    request: &CampaignRequest,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<Option<CampaignAnswer>, Failure> {
+    in_range("--worst", &request.worst, &(0..=MOST_WORST))?;
+    let threads = request.threads.unwrap_or_else(rayon::current_num_threads);
+    in_range("--threads", &threads, &THREADS)?;
+    let folder = request.plan()?;
+    let campaign = folder.campaign();
+    let manifest = campaign.manifest();
+    monitor.begin(&manifest.name, Some(campaign.steps(manifest.runs)));
+    let began = Instant::now();
+    let mut flights = 0;
+    let mut tally = Tally::new(campaign.laws().len(), campaign.stop());
+    for shard in 0..manifest.shards {
+        if tally.is_enough() {
+            break;
+        }
+        warn_of_damage(&folder, shard, monitor)?;
+        let watch = Watch { flown: &|steps| monitor.advance(steps), interrupted: monitor.interruption().as_ref() };
+        let rows = match folder.fly(shard, threads, watch)? {
+            Shard::Kept(rows) => {
+                monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
+                rows
+            }
+            Shard::Flown { rows, flown } => {
+                flights += flown;
+                rows
+            }
+            Shard::Interrupted => {
+                monitor.finish();
+                monitor.warn("interrupted: what was flown is kept, and the same command goes on from there");
+                return Ok(None);
+            }
+        };
+        for row in &rows {
+            tally.take(row);
+        }
+    }
+    monitor.finish();
+    if flights > 0 {
+        let seconds = began.elapsed().as_secs_f64();
+        let an_hour = 3600.0 * flights as f64 / seconds;
+        let what = if campaign.splitting().is_some() { "estimates" } else { "flights" };
+        let on = if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
+        monitor.say(&format!("{flights} {what} in {seconds:.1} s on {on}: {an_hour:.0} an hour"));
+    }
+    merge(&folder, request.worst, pictures, monitor)
+}
+
+/// Flies shards of a campaign. Returns whether all are flown: `false` where the monitor interrupted.
+///
+/// # Errors
+/// [`Failure`] where the system refuses.
+pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn Monitor) -> Result<bool, Failure> {
+    let manifest = folder.campaign().manifest();
+    let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
+    monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
+    for &shard in shards {
+        warn_of_damage(folder, shard, monitor)?;
+        let watch = Watch { flown: &|steps| monitor.advance(steps), interrupted: monitor.interruption().as_ref() };
+        monitor.say(&match folder.fly(shard, threads, watch)? {
+            Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
+            Shard::Flown { flown, .. } => format!("shard {shard}: {flown} flights flown"),
+            Shard::Interrupted => {
+                monitor.finish();
+                monitor.warn(&format!(
+                    "interrupted in shard {shard}: what was flown is kept, and the same command goes on"
+                ));
+                return Ok(false);
+            }
+        });
+    }
+    monitor.finish();
+    Ok(true)
+}
+
+/// The shards of a campaign that are missing. Warns of damaged ones.
+///
+/// # Errors
+/// [`Failure`] where the system refuses.
+pub fn missing_shards(folder: &Folder, monitor: &dyn Monitor) -> Result<Vec<u64>, Failure> {
+    let missing = folder.missing()?;
+    for &shard in &missing {
+        warn_of_damage(folder, shard, monitor)?;
+    }
+    Ok(missing)
+}
+
+/// Warns that the part of a shard is damaged: the shard is flown again.
+fn warn_of_damage(folder: &Folder, shard: u64, monitor: &dyn Monitor) -> Result<(), Failure> {
+    if let Some(part) = folder.damaged(shard)? {
+        monitor.warn(&format!("{part}; shard {shard} is to be flown again, which replaces it"));
+    }
+    Ok(())
+}
+
+/// Merges all parts of a campaign, and writes its answer and its page. `None` where the monitor interrupted.
+///
+/// # Errors
+/// [`Failure`] where shards are missing, or the system refuses.
+pub fn merge(
+    folder: &Folder,
+    worst: usize,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<Option<CampaignAnswer>, Failure> {
+    let merged = folder.merge().map_err(|error| in_folder(error, folder))?;
+    answer(folder, merged.summary, worst, Some(&merged.sha256), pictures, monitor)
+}
+
+/// Says the answer of a merged campaign again, and writes its page anew. `None` where the monitor interrupted.
+///
+/// # Errors
+/// [`Failure`] where the campaign is not merged, or the system refuses.
+pub fn report(
+    folder: &Folder,
+    worst: usize,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<Option<CampaignAnswer>, Failure> {
+    let summary = folder.summary().map_err(|error| in_folder(error, folder))?;
+    answer(folder, summary, worst, None, pictures, monitor)
+}
+
+fn in_folder(error: CampaignError, folder: &Folder) -> Failure {
+    Failure::from(error).naming(&folder.path().display().to_string())
+}
+
+/// Says the answer and writes its page.
+fn answer(
+    folder: &Folder,
+    summary: Summary,
+    worst: usize,
+    sha256: Option<&str>,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<Option<CampaignAnswer>, Failure> {
+    in_range("--worst", &worst, &(0..=MOST_WORST))?;
+    for note in summary.notes() {
+        monitor.warn(&format!("note: {note}"));
+    }
+    monitor.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
+    let flown = again::flown_again(folder, &summary, worst, pictures, monitor)?;
+    let path = folder.file(PAGE);
+    if monitor.is_interrupted() {
+        monitor.warn("interrupted: no page was written");
+        return Ok(None);
+    }
+    let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
+    let page = flown.page(&command, &folder.campaign().manifest().spec);
+    write_atomically(&path, summary.to_html(&page).as_bytes())?;
+    if let Some(sha256) = sha256 {
+        monitor.say(&format!("{sha256}  {}", folder.file(RESULTS).display()));
+        monitor.say(&format!("wrote {} and {}", folder.file(ANSWER).display(), path.display()));
+    } else {
+        monitor.say(&format!("wrote {}", path.display()));
+    }
+    Ok(Some(CampaignAnswer { summary, folder: folder.path().to_owned() }))
+}
+
+/// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
+/// Returns whether it passes.
+///
+/// # Errors
+/// [`Failure`] where there is no such flight, it has another state hash, or the system refuses.
+pub fn replay(
+    folder: &Folder,
+    request: &ReplayRequest,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<bool, Failure> {
+    let campaign = folder.campaign();
+    let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
+    let law = match &request.law {
+        None => campaign.laws().first(),
+        Some(name) => campaign.laws().iter().find(|law| law.name == *name),
+    };
+    let Some(law) = law else {
+        let said = request.law.as_deref().unwrap_or_default();
+        return Err(Failure::input(
+            "campaign/unknown-law",
+            format!("no law of this campaign is named {said}"),
+            format!("its laws are {}", names.join(", ")),
+        ));
+    };
+    let runs = campaign.manifest().runs;
+    if request.run >= runs {
+        let help = format!("its runs are 0 to {}", runs - 1);
+        return Err(Failure::input("campaign/no-run", format!("the campaign has no run {}", request.run), help));
+    }
+    if campaign.splitting().is_some() {
+        let bad = request.bad.unwrap_or_default();
+        let default = || again::place_of_bad(folder, &law.name, request.run, bad);
+        let place = request.out.clone().unwrap_or_else(default);
+        let hash = again::fly_bad(folder, law, [request.run, bad as u64], &place)?;
+        let recording = place.join(RECORDING);
+        monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", recording.display()));
+        return Ok(false);
+    }
+    if let Some(out) = request.out.as_ref().filter(|out| out.join("report.json").exists()) {
+        let message = format!("{} holds a finished run", out.display());
+        return Err(Failure::input("files/finished", message, "give another folder with --out"));
+    }
+    let out = request.out.clone().unwrap_or_else(|| again::place(folder, &law.name, request.run));
+    again::replay(folder, request.run, law, out, pictures, monitor)
+}
+
+impl From<CampaignError> for Failure {
+    fn from(error: CampaignError) -> Self {
+        match error {
+            CampaignError::Scenario { under, error, .. } => {
+                let failure = Self::from(*error);
+                if under.is_empty() { failure } else { failure.under(under.trim_end_matches(": ")) }
+            }
+            CampaignError::Flight { run, law, error } => {
+                Self::from(*error).under(&format!("run {run} under the law {law}"))
+            }
+            other => {
+                let failure = Self::told(other.code(), other.is_machine(), other.to_string());
+                other.help().into_iter().fold(failure, Self::with_help)
+            }
+        }
+    }
+}

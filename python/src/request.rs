@@ -1,0 +1,198 @@
+//! Keyword arguments of Python as parts of requests.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use tautline::audit::envelope::{Envelope, Limit, Quantity};
+use tautline::audit::recorded::{self, Motion, VehicleSettings};
+use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
+use tautline::request::{AuditRequest, ConfigFile, Subject};
+
+use crate::errors::wrong;
+
+/// The value of this name; an error names all values.
+pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)]) -> PyResult<Option<T>> {
+    let Some(name) = name else { return Ok(None) };
+    let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
+    let known = || all.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
+    found.map(Some).ok_or_else(|| wrong(format!("{what}: unknown value '{name}' [possible values: {}]", known())))
+}
+
+/// Formats by their names.
+pub(crate) fn formats() -> [(&'static str, Format); Format::ALL.len()] {
+    Format::ALL.map(|format| (format.name(), format))
+}
+
+fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) -> PyResult<Option<T>> {
+    text.map(|text| text.parse()).transpose().map_err(|error| wrong(format!("{what}: {error}")))
+}
+
+/// How a recording is read.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct ReadOptions(pub(crate) read::ReadOptions);
+
+#[pymethods]
+impl ReadOptions {
+    #[new]
+    #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "each is one that Python gives")]
+    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions, column,
+                        start, layout, frame, topic, origin, allow_unfinished))]
+    fn new(
+        format: Option<String>,
+        time_unit: Option<String>,
+        fps: Option<f64>,
+        time_scale: Option<f64>,
+        sort: bool,
+        duplicates: Option<String>,
+        one_vehicle: bool,
+        scale: Option<Vec<f64>>,
+        axes: Option<String>,
+        dimensions: Option<String>,
+        column: Vec<(String, String)>,
+        start: Vec<(String, [f64; 3])>,
+        layout: Option<String>,
+        frame: Option<String>,
+        topic: Vec<String>,
+        origin: Option<[f64; 3]>,
+        allow_unfinished: bool,
+    ) -> PyResult<Self> {
+        if [fps.is_some(), time_scale.is_some(), time_unit.is_some()].iter().filter(|is_given| **is_given).count() > 1 {
+            return Err(wrong("time_unit, fps and time_scale: one of them is enough"));
+        }
+        let mut columns = ColumnNames::default();
+        for (role, name) in &column {
+            if !columns.set(role, name) {
+                let roles = ColumnNames::ROLES.join(", ");
+                return Err(wrong(format!("column: `{role}` is no column: the columns are {roles}")));
+            }
+        }
+        let scale = match scale.as_deref() {
+            None => None,
+            Some(&[metres]) => Some(metres.into()),
+            Some(&[x, y, z]) => Some([x, y, z].into()),
+            Some(numbers) => {
+                return Err(wrong(format!("scale: one number or three are needed, not {}", numbers.len())));
+            }
+        };
+        let layout = layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
+        Ok(Self(read::ReadOptions {
+            format: choice("format", format, &formats())?,
+            time_unit: choice("time_unit", time_unit, &TimeUnit::ALL.map(|unit| (unit.name(), unit)))?,
+            times_per_second: fps.or(time_scale.map(f64::recip)),
+            sort,
+            duplicates: choice("duplicates", duplicates, &Duplicates::ALL.map(|which| (which.name(), which)))?,
+            scale,
+            axes: parsed("axes", axes)?,
+            dimensions: choice("dimensions", dimensions, &Dimensions::ALL.map(|of| (of.name(), of)))?,
+            one_vehicle,
+            starts: start.into_iter().collect(),
+            columns,
+            layout: layout.map_err(|error| wrong(format!("layout: {error}")))?,
+            frame,
+            topics: topic,
+            origin,
+            allow_unfinished,
+            ..read::ReadOptions::default()
+        }))
+    }
+}
+
+/// The question of an audit.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct Question {
+    settings: recorded::Settings,
+    obstacles: Option<PathBuf>,
+    fence: Option<PathBuf>,
+    config: ConfigFile,
+    expect_vehicles: Option<usize>,
+    independent: bool,
+}
+
+/// The values of one quantity: of all vehicles, and of vehicles by name.
+type OfVehicles = (Option<f64>, Vec<(String, f64)>);
+
+#[pymethods]
+impl Question {
+    #[new]
+    #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "each is one that Python gives")]
+    #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
+                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence, independent))]
+    fn new(
+        delta: Option<f64>,
+        motion: Option<String>,
+        max_accel: OfVehicles,
+        radius: OfVehicles,
+        ellipsoid: Option<[f64; 3]>,
+        obstacles: Option<PathBuf>,
+        limit: Vec<(String, f64)>,
+        fence: Option<PathBuf>,
+        accel_window: Option<f64>,
+        config: Option<PathBuf>,
+        has_config: bool,
+        from_s: Option<f64>,
+        to_s: Option<f64>,
+        above: Option<f64>,
+        ids: Option<Vec<String>>,
+        offset: Vec<(String, f64)>,
+        expect_vehicles: Option<usize>,
+        max_gap: Option<f64>,
+        require_presence: bool,
+        independent: bool,
+    ) -> PyResult<Self> {
+        let motions = [
+            ("linear", Motion::Linear),
+            ("hold", Motion::Hold),
+            ("polynomial", Motion::Polynomial),
+            ("bounded", Motion::Bounded),
+        ];
+        let mut settings = recorded::Settings {
+            delta_m: delta,
+            motion: choice("motion", motion, &motions)?,
+            max_accel_m_s2: max_accel.0,
+            radius_m: radius.0,
+            ellipsoid_m: ellipsoid.map(Into::into),
+            from_s,
+            to_s,
+            above_m: above,
+            max_gap_s: max_gap,
+            require_presence,
+            accel_window_s: accel_window,
+            only: ids.map(|names| names.into_iter().collect()),
+            ..recorded::Settings::default()
+        };
+        let mut of = |name: String, set: &dyn Fn(&mut VehicleSettings)| set(settings.vehicles.entry(name).or_default());
+        max_accel.1.into_iter().for_each(|(name, value)| of(name, &|of| of.max_accel_m_s2 = Some(value)));
+        radius.1.into_iter().for_each(|(name, value)| of(name, &|of| of.radius_m = Some(value)));
+        offset.into_iter().for_each(|(name, value)| of(name, &|of| of.offset_s = value));
+        let quantities = Quantity::NUMBERS.map(|quantity| (quantity.name(), quantity));
+        let mut limits = Vec::new();
+        for (name, allowed) in limit {
+            let quantity = choice("limit", Some(name), &quantities)?;
+            limits.extend(quantity.map(|quantity| Limit { quantity, allowed }));
+        }
+        settings.envelope = Envelope { limits, fence: None };
+        let config = match (config, has_config) {
+            (Some(path), _) => ConfigFile::File(path),
+            (None, true) => ConfigFile::Nearest,
+            (None, false) => ConfigFile::None,
+        };
+        Ok(Self { settings, obstacles, fence, config, expect_vehicles, independent })
+    }
+}
+
+impl Question {
+    /// The request about a recording, which `command` makes again.
+    pub(crate) fn request<'a>(&self, subject: Subject<'a>, command: &str, html: Option<PathBuf>) -> AuditRequest<'a> {
+        AuditRequest {
+            settings: self.settings.clone(),
+            obstacles: self.obstacles.clone(),
+            fence: self.fence.clone(),
+            expect_vehicles: self.expect_vehicles,
+            independent: self.independent,
+            config: self.config.clone(),
+            command: command.to_owned(),
+            html,
+            ..AuditRequest::new(subject)
+        }
+    }
+}
