@@ -55,7 +55,7 @@ fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
     let every_two = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5,0,0\n2,a,0,0,0\n2,b,1.5,0,0\n4,a,0,0,0\n4,b,1.5,0,0\n";
     let folder = folder(&[("log.csv", every_two)]);
     let bounded = ["log.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "1"];
-    for asked in [&bounded[3..], &["--from", "0"], &["--to", "3"], &["--max-gap", "5"], &["--offset", "a=0"]] {
+    for asked in [&bounded[3..], &["--from", "0"], &["--to", "3"], &["--max-gap", "5"], &["--offset", "a=1"]] {
         let ran = audit(folder.path(), &[&bounded[..3], asked].concat());
         assert_eq!(ran.exit, Some(2), "{ran:?}");
         assert!(ran.err.contains("log.csv") && ran.err.contains("say --time-unit ms, or --time-unit s"), "{ran:?}");

@@ -331,7 +331,7 @@ fn a_window_reads_a_recording_as_it_is_told_to() {
         (&["own.csv"], WRONG_INPUT, "own.csv"),
         (&["own.csv", "--column", "x=east"], MACHINE_FAILED, "no display"),
         (&["own.csv", "--column", "x=east", "--input-format", "npz"], WRONG_INPUT, "own.csv"),
-        (&["own.csv", "--column", "x=east", "--scale", "0"], WRONG_INPUT, "--scale is 0"),
+        (&["own.csv", "--column", "x=east", "--scale", "0"], WRONG_INPUT, "recording/option-out-of-range"),
         (&["pentagon", "--scale", "0.001"], WRONG_INPUT, "a scenario is flown"),
     ];
     for (arguments, exit, message) in cases {

@@ -267,7 +267,7 @@ impl ReadOptions {
             return Err(Fault::coded(
                 "recording/option-out-of-range",
                 problem,
-                "give a positive number of metres per unit of length",
+                "give a positive number of metres per unit of length with --scale",
             ));
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
