@@ -84,7 +84,7 @@ pub(crate) fn audit_files(
     options: &ReadOptions,
     html: Option<PathBuf>,
 ) -> PyResult<Judged> {
-    let subject = Subject::Files { paths, options: options.0.clone() };
+    let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
     let request = question.request(subject, command, html);
     let audited = away(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;

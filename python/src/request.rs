@@ -34,7 +34,7 @@ pub(crate) struct ReadOptions(pub(crate) read::ReadOptions);
 #[pymethods]
 impl ReadOptions {
     #[new]
-    #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "each is one that Python gives")]
+    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
     #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions, column,
                         start, layout, frame, topic, origin, allow_unfinished))]
     fn new(
@@ -114,7 +114,7 @@ type OfVehicles = (Option<f64>, Vec<(String, f64)>);
 #[pymethods]
 impl Question {
     #[new]
-    #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "each is one that Python gives")]
+    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
                         has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence, independent))]
     fn new(
@@ -161,9 +161,15 @@ impl Question {
             ..recorded::Settings::default()
         };
         let mut of = |name: String, set: &dyn Fn(&mut VehicleSettings)| set(settings.vehicles.entry(name).or_default());
-        max_accel.1.into_iter().for_each(|(name, value)| of(name, &|of| of.max_accel_m_s2 = Some(value)));
-        radius.1.into_iter().for_each(|(name, value)| of(name, &|of| of.radius_m = Some(value)));
-        offset.into_iter().for_each(|(name, value)| of(name, &|of| of.offset_s = value));
+        for (name, value) in max_accel.1 {
+            of(name, &|of| of.max_accel_m_s2 = Some(value));
+        }
+        for (name, value) in radius.1 {
+            of(name, &|of| of.radius_m = Some(value));
+        }
+        for (name, value) in offset {
+            of(name, &|of| of.offset_s = value);
+        }
         let quantities = Quantity::NUMBERS.map(|quantity| (quantity.name(), quantity));
         let mut limits = Vec::new();
         for (name, allowed) in limit {

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, TypedValueParser};
 
 use super::Exit;
 use super::console::{Console, Terminal};
+use super::pictures::pictures;
 use super::reading::one_of;
 use super::scenario::ScenarioArguments;
 use tautline_report::request::Failure;
@@ -121,10 +122,6 @@ pub(super) fn attack(arguments: &AttackArguments) -> Result<Exit, Failure> {
     let request = arguments.request()?;
     let data_on_stdout = request.outputs().any(|(_, file)| is_standard_output(file));
     let monitor = Terminal::new(Console { data_on_stdout, quiet: arguments.quiet })?;
-    #[cfg(feature = "viewer")]
-    let pictures = tautline_render::RunPictures::new("best");
-    #[cfg(not(feature = "viewer"))]
-    let pictures = ();
-    let attack = answer(&request, &pictures, &monitor)?;
+    let attack = answer(&request, &*pictures("best", true), &monitor)?;
     Ok(Exit::good_if(attack.is_some_and(|attack| !attack.is_bad() && !attack.interrupted)))
 }

@@ -201,7 +201,7 @@ impl AuditArguments {
             (None, false) => ConfigFile::Nearest,
         };
         Ok(AuditRequest {
-            subject: Subject::Files { paths, options: self.reading.options(self.format) },
+            subject: Subject::Files { paths, options: Box::new(self.reading.options(self.format)) },
             settings: self.settings()?,
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),

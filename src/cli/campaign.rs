@@ -6,6 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
+use super::pictures::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::campaign::{
     self as study, CampaignAnswer, CampaignRequest, Folder, Program, ReplayRequest, listed, parse,
@@ -120,7 +121,6 @@ struct Looks {
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
     /// Take no pictures of them.
-    #[cfg(feature = "viewer")]
     #[arg(long)]
     no_snapshots: bool,
 }
@@ -155,7 +155,6 @@ struct Replay {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take no pictures.
-    #[cfg(feature = "viewer")]
     #[arg(long)]
     no_snapshots: bool,
 }
@@ -213,7 +212,7 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
                 ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
             let folder = replay.folder.open()?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: false })?;
-            Ok(Exit::good_if(study::replay(&folder, &request, &*replay.pictures(), &monitor)?))
+            Ok(Exit::good_if(study::replay(&folder, &request, &*pictures("best", !replay.no_snapshots), &monitor)?))
         }
     }
 }
@@ -251,23 +250,6 @@ impl Says {
 
 impl Looks {
     fn pictures(&self) -> Box<dyn Pictures> {
-        #[cfg(feature = "viewer")]
-        return drawn(!self.no_snapshots);
-        #[cfg(not(feature = "viewer"))]
-        Box::new(())
+        pictures("best", !self.no_snapshots)
     }
-}
-
-impl Replay {
-    fn pictures(&self) -> Box<dyn Pictures> {
-        #[cfg(feature = "viewer")]
-        return drawn(!self.no_snapshots);
-        #[cfg(not(feature = "viewer"))]
-        Box::new(())
-    }
-}
-
-#[cfg(feature = "viewer")]
-fn drawn(takes_snapshots: bool) -> Box<dyn Pictures> {
-    Box::new(tautline_render::RunPictures::new("best").with_snapshots(takes_snapshots))
 }

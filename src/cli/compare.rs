@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::Exit;
 use super::console::{Console, Terminal};
+use super::pictures::pictures;
 use super::scenario::ScenarioArguments;
 use tautline_report::request::Failure;
 use tautline_report::request::outputs::is_standard_output;
@@ -46,7 +47,6 @@ pub(super) struct CompareArguments {
     #[arg(long)]
     force: bool,
     /// What draws pictures: best, hardware, software, or a part of an adapter's name.
-    #[cfg(feature = "viewer")]
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no table and no progress.
@@ -84,10 +84,6 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Exit, Failure> {
     let request = arguments.request()?;
     let data_on_stdout = request.outputs().any(|(_, file)| is_standard_output(file));
     let monitor = Terminal::new(Console { data_on_stdout, quiet: arguments.quiet })?;
-    #[cfg(feature = "viewer")]
-    let pictures = tautline_render::RunPictures::new(&arguments.adapter);
-    #[cfg(not(feature = "viewer"))]
-    let pictures = ();
-    let comparison = answer(&request, &pictures, &monitor)?;
+    let comparison = answer(&request, &*pictures(&arguments.adapter, true), &monitor)?;
     Ok(Exit::good_if(comparison.is_some_and(|comparison| comparison.runs == comparison.runs_asked)))
 }

@@ -21,6 +21,7 @@ mod events;
 mod export;
 mod list;
 mod margin;
+mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;

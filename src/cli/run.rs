@@ -6,6 +6,7 @@ use clap::Parser;
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
+use super::pictures::pictures;
 use super::scenario::ScenarioArguments;
 use tautline_report::request::{Failure, RunRequest, ScenarioRequest, command_line, run_into};
 
@@ -29,11 +30,9 @@ pub(super) struct RunArguments {
     #[arg(long)]
     no_figures: bool,
     /// Take no pictures.
-    #[cfg(feature = "viewer")]
     #[arg(long)]
     no_snapshots: bool,
     /// What draws pictures: best, hardware, software, or a part of an adapter's name.
-    #[cfg(feature = "viewer")]
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Fly again at half the step, and say what that changed.
@@ -56,12 +55,6 @@ impl RunArguments {
     pub(super) fn draws(&self) -> bool {
         !self.no_snapshots
     }
-
-    /// What draws the flight.
-    #[cfg(feature = "viewer")]
-    fn pictures(&self) -> tautline_render::RunPictures {
-        tautline_render::RunPictures::new(&self.adapter).with_snapshots(!self.no_snapshots)
-    }
 }
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
@@ -82,11 +75,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, command_line(words.iter().copied()))
     };
-    #[cfg(feature = "viewer")]
-    let pictures = arguments.pictures();
-    #[cfg(not(feature = "viewer"))]
-    let pictures = ();
-    let left = run_into(&request, &pictures, &Terminal::new(console)?)?;
+    let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
+    let left = run_into(&request, &*pictures, &Terminal::new(console)?)?;
     if arguments.json {
         console::json(&left.report)?;
     }

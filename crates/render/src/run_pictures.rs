@@ -126,7 +126,7 @@ impl FlightPictures for Observer {
         let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
             .map(|(Snapshot { name, description, .. }, [png, small])| {
                 let picture = page::Picture { description, data_uri: data_uri(&small) };
-                ((file(&name), png), (name.to_string(), picture))
+                ((file(&name), png), (name.clone(), picture))
             })
             .unzip();
         write_files(&folder.join("snapshots"), &names, &files)?;

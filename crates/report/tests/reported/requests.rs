@@ -71,10 +71,10 @@ fn held() -> &'static Open<'static> {
 fn file(folder: &Path) -> Subject<'static> {
     let path = folder.join("passing.csv");
     fs::write(&path, TABLE).expect("written");
-    Subject::Files { paths: vec![path], options: ReadOptions::default() }
+    Subject::Files { paths: vec![path], options: Box::default() }
 }
 
-fn asked<'a>(subject: Subject<'a>, settings: Settings) -> AuditRequest<'a> {
+fn asked(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
     AuditRequest { settings, ..AuditRequest::new(subject) }
 }
 
@@ -129,7 +129,7 @@ fn a_wrong_question_has_a_code() {
     assert_eq!(code(delta.clone(), &|of| of.config = ConfigFile::File(none("none.toml"))), "files/cannot-read");
     assert_eq!(code(delta.clone(), &|of| of.html = Some(none("passing.csv"))), "files/overwrites-input");
     let missing = |of: &mut AuditRequest<'static>| {
-        of.subject = Subject::Files { paths: vec![none("none.csv")], options: ReadOptions::default() };
+        of.subject = Subject::Files { paths: vec![none("none.csv")], options: Box::default() };
     };
     assert_eq!(code(delta, &missing), "recording/not-found");
 }

@@ -13,8 +13,8 @@ const EXCERPT_CHARS: usize = 100;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenarioError {
     code: &'static str,
-    message: String,
-    help: Option<String>,
+    message: Box<str>,
+    help: Option<Box<str>>,
     fields: Vec<Field>,
     place: Option<Box<Place>>,
 }
@@ -48,7 +48,7 @@ pub struct Place {
 
 impl ScenarioError {
     pub(super) fn new(message: impl AsRef<str>) -> Self {
-        let message = printable(message.as_ref());
+        let message = printable(message.as_ref()).into();
         Self { code: "scenario/inconsistent", message, help: None, fields: Vec::new(), place: None }
     }
 
@@ -64,7 +64,7 @@ impl ScenarioError {
     }
 
     pub(super) fn with_help(mut self, help: impl AsRef<str>) -> Self {
-        self.help = Some(printable(help.as_ref()));
+        self.help = Some(printable(help.as_ref()).into());
         self
     }
 

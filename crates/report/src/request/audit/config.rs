@@ -197,11 +197,10 @@ impl AuditTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tautline_recordings::read::ReadOptions;
 
     fn request() -> AuditRequest<'static> {
         let paths = vec![PathBuf::from("show/a.csv")];
-        AuditRequest::new(Subject::Files { paths, options: ReadOptions::default() })
+        AuditRequest::new(Subject::Files { paths, options: Box::default() })
     }
 
     fn filled(request: AuditRequest<'static>, text: &str) -> Result<ConfiguredAudit<'static>, String> {

@@ -18,6 +18,7 @@ use nalgebra::Vector3;
 
 pub use own::{OwnRecording, Witness};
 
+use self::own_obstacles::OwnObstacles;
 use super::{Failure, Monitor, outputs};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
@@ -44,7 +45,7 @@ pub enum Subject<'a> {
         /// At least one path.
         paths: Vec<PathBuf>,
         /// How they are read.
-        options: ReadOptions,
+        options: Box<ReadOptions>,
     },
     /// Motion that the caller holds.
     Held {
@@ -232,13 +233,13 @@ pub struct ConfiguredAudit<'a> {
 /// ```
 /// # use std::fs;
 /// use tautline_audit::recorded::Settings;
-/// use tautline_report::request::{AuditRequest, ReadOptions, Silent, Subject, audit_files};
+/// use tautline_report::request::{AuditRequest, Silent, Subject, audit_files};
 ///
 /// # let folder = std::env::temp_dir().join(format!("tautline-audit-files-{}", std::process::id()));
 /// # fs::create_dir_all(&folder)?;
 /// # let path = folder.join("two.csv");
 /// fs::write(&path, "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n")?;
-/// let subject = Subject::Files { paths: vec![path], options: ReadOptions::default() };
+/// let subject = Subject::Files { paths: vec![path], options: Box::default() };
 /// let request = AuditRequest { settings: Settings::delta(2.0), ..AuditRequest::new(subject) };
 /// assert!(audit_files(&request, &Silent::default())?.is_good());
 /// # fs::remove_dir_all(&folder)?;
@@ -436,21 +437,7 @@ impl ConfiguredAudit<'_> {
         let (own, own_limit_m) = request.subject.own(monitor)?;
         let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
-        let is_silent = request.is_silent();
-        let own_delta_m = own.as_ref().map(|own| own.delta_m).or(own_limit_m);
-        let own_ellipsoid_m = own.as_ref().and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
-        let own_delta_m = own_delta_m.filter(|_| is_silent && own_ellipsoid_m.is_none());
-        settings.delta_m = settings.delta_m.or(own_delta_m);
-        settings.ellipsoid_m = settings.ellipsoid_m.or(own_ellipsoid_m);
-        settings.is_own_limit = is_silent && request.obstacles.is_none();
-        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
-        settings.max_gap_s = settings.max_gap_s.or(own.as_ref().filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
-        settings.is_told_scaled = own.as_ref().is_some_and(|own| own.ellipsoid_m.is_some());
-        let own_obstacles = own
-            .as_ref()
-            .map(|own| &own.obstacles)
-            .filter(|own| request.obstacles.is_none() && settings.ellipsoid_m.is_none() && !own.obstacles.is_empty());
-        settings.obstacles.extend(own_obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
+        let taken = Taken::fill(&mut settings, request, own.as_ref(), own_limit_m);
         proof::check(request, &settings)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;
         if request.html.is_some() {
@@ -467,44 +454,15 @@ impl ConfiguredAudit<'_> {
                     instants.note(items, names, &settings);
                 }
             })?;
-        if let Some(own) = own_obstacles {
+        if let Some(own) = taken.obstacles {
             own.bind(&mut outcome, &settings);
         }
         request.check_count(&outcome, &settings)?;
         let own_now = own.as_ref().filter(|_| request.settings.motion.is_none());
         let is_judged = own_now.is_some_and(|own| own.settle(&mut outcome, &settings, &mut notes));
         let between = request.between(curves, own.as_ref(), is_judged, assumed.as_deref());
-        let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
-        let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
-        notes.extend(own.iter().flat_map(|own| own.notes(clocks_agree)));
-        notes.extend(own.iter().filter_map(|own| own.doubt(outcome.status)));
-        notes.extend(own_delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
-        notes.extend(own_ellipsoid_m.map(|axes| {
-            format!(
-                "the ellipsoid is the recording's own, with half axes of {:?}, {:?} and {:?} m",
-                axes.x, axes.y, axes.z
-            )
-        }));
-        if own_obstacles.is_none() && own.as_ref().is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
-            let why = if request.obstacles.is_some() {
-                "--obstacles names others"
-            } else {
-                "they have no place among ellipsoids"
-            };
-            notes.push(format!("the obstacles that were flown past are not judged: {why}"));
-        }
-        notes.extend(own_obstacles.map(|own| {
-            let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
-            format!("the obstacles are the recording's own: {}", names.join(", "))
-        }));
-        notes.extend(outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
-            let Presence { from_s, to_s } = outcome.presence[vehicle]?;
-            let name = outcome.name(vehicle);
-            Some(format!(
-                "{name}, there from {from_s:?} s to {to_s:?} s, is never there with another: nothing is said of it (--offset \
-                 {name}=SECONDS sets a wrong clock right)"
-            ))
-        }));
+        notes.extend(taken.notes(request, &settings, own.as_ref(), &outcome));
+        notes.extend(notes_on_alone(&outcome));
         notes.extend(self.asked_by.clone());
         for note in &notes {
             monitor.warn(&format!("note: {note}"));
@@ -579,6 +537,81 @@ impl ConfiguredAudit<'_> {
         let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
         Ok(Judged { outcome, clock, notes, assumed, curves, is_planar })
     }
+}
+
+/// The limits and obstacles that a recording states itself, as far as the request leaves them open.
+struct Taken<'a> {
+    delta_m: Option<f64>,
+    ellipsoid_m: Option<Vector3<f64>>,
+    obstacles: Option<&'a OwnObstacles>,
+}
+
+impl<'a> Taken<'a> {
+    /// Fills the settings with what the recording states.
+    fn fill(
+        settings: &mut Settings,
+        request: &AuditRequest<'_>,
+        own: Option<&'a OwnRecording>,
+        own_limit_m: Option<f64>,
+    ) -> Self {
+        let is_silent = request.is_silent();
+        let ellipsoid_m = own.and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
+        let delta_m = own.map(|own| own.delta_m).or(own_limit_m).filter(|_| is_silent && ellipsoid_m.is_none());
+        settings.delta_m = settings.delta_m.or(delta_m);
+        settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
+        settings.is_own_limit = is_silent && request.obstacles.is_none();
+        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
+        settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
+        settings.is_told_scaled = own.is_some_and(|own| own.ellipsoid_m.is_some());
+        let is_asked = request.obstacles.is_none() && settings.ellipsoid_m.is_none();
+        let obstacles = own.map(|own| &own.obstacles).filter(|own| is_asked && !own.obstacles.is_empty());
+        settings.obstacles.extend(obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
+        Self { delta_m, ellipsoid_m, obstacles }
+    }
+
+    /// Notes on how a recording of `tautline run` was flown, and on what it states itself.
+    fn notes(
+        &self,
+        request: &AuditRequest<'_>,
+        settings: &Settings,
+        own: Option<&OwnRecording>,
+        outcome: &Outcome,
+    ) -> Vec<String> {
+        let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
+        let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
+        let mut notes: Vec<String> = own.into_iter().flat_map(|own| own.notes(clocks_agree)).collect();
+        notes.extend(own.and_then(|own| own.doubt(outcome.status)));
+        notes.extend(self.delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
+        notes.extend(self.ellipsoid_m.map(|axes| {
+            let (x, y, z) = (axes.x, axes.y, axes.z);
+            format!("the ellipsoid is the recording's own, with half axes of {x:?}, {y:?} and {z:?} m")
+        }));
+        if self.obstacles.is_none() && own.is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
+            let why = if request.obstacles.is_some() {
+                "--obstacles names others"
+            } else {
+                "they have no place among ellipsoids"
+            };
+            notes.push(format!("the obstacles that were flown past are not judged: {why}"));
+        }
+        notes.extend(self.obstacles.map(|own| {
+            let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+            format!("the obstacles are the recording's own: {}", names.join(", "))
+        }));
+        notes
+    }
+}
+
+/// Notes on vehicles that are never there together with another.
+fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
+    outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
+        let Presence { from_s, to_s } = outcome.presence[vehicle]?;
+        let name = outcome.name(vehicle);
+        Some(format!(
+            "{name}, there from {from_s:?} s to {to_s:?} s, is never there with another: nothing is said of it (--offset \
+             {name}=SECONDS sets a wrong clock right)"
+        ))
+    })
 }
 
 /// A recording after it was judged.
