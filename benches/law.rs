@@ -70,7 +70,7 @@ fn laws(criterion: &mut Criterion) {
         let (law, at) = (edge_tension(&complete, &formation), Observation::exact(&swarm, &complete, &formation));
         group.throughput(Throughput::Elements((count * (count - 1)) as u64));
         group.bench_function("energy complete", |bencher| bencher.iter(|| law.energy(black_box(&at))));
-        group.bench_function("certificate complete", |bencher| bencher.iter(|| law.certificate(black_box(&at))));
+        group.bench_function("certificate complete", |bencher| bencher.iter(|| law.certificate(black_box(&at), &[])));
         group.finish();
     }
 }
@@ -89,7 +89,7 @@ fn displacement(criterion: &mut Criterion) {
         for (name, graph) in [("star", Graph::star(count)), ("complete", Graph::complete(count))] {
             let setting = Setting::new(&graph, &formation, DELTA_M, 0.1);
             let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
-            let range_m = law.sensing_range_m().expect("it senses");
+            let range_m = law.capabilities().sensing_range_m.expect("it senses");
             let (mut near, mut control) = (KeptPairs::default(), Rows::zeros(count));
             group.bench_function(name, |bencher| {
                 bencher.iter(|| {

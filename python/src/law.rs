@@ -7,7 +7,7 @@ use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArrayMethods as _, PyUntypedArrayMethods as _};
 use pyo3::intern;
 use pyo3::prelude::*;
-use tautline::law::{Controls, Law, LawError};
+use tautline::law::{Capabilities, Controls, Law, LawError};
 use tautline::observation;
 use tautline::scenario::Scenario;
 use tautline::swarm::Rows;
@@ -108,15 +108,12 @@ impl Law for PythonLaw {
         })
     }
 
-    fn sensing_range_m(&self) -> Option<f64> {
-        self.sensing_range_m
-    }
-
-    fn stays_in_its_thread(&self) -> bool {
-        true
-    }
-
-    fn controls(&self) -> Controls {
-        self.controls
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            sensing_range_m: self.sensing_range_m,
+            requires_calling_thread: true,
+            controls: self.controls,
+            ..Capabilities::default()
+        }
     }
 }

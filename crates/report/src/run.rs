@@ -52,7 +52,7 @@ pub fn run_with(
     sink: &mut (dyn Sink + Send),
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<(Report, Ending), SimError> {
-    let freedom = parts.law.controls().freedom();
+    let freedom = parts.law.capabilities().controls.freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
         .free_by(freedom)
         .carried_by(scenario.reference.as_ref());

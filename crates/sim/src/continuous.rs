@@ -42,7 +42,7 @@ struct Exact<'a> {
 
 impl Feedback for Exact<'_> {
     fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
-        if let Some(range_m) = self.law.sensing_range_m() {
+        if let Some(range_m) = self.law.capabilities().sensing_range_m {
             self.near.update(&truth.positions_m, range_m);
         }
         let near = self.near.pairs();

@@ -60,7 +60,7 @@ type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
     // The certificate does not depend on a22, the motion of the centre of mass does.
     let scenario = Scenario { a22_per_s: 0.1, ..start.clone() };
-    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
+    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start), &[]);
     let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
     let mut law = make_law(&scenario)?;
@@ -240,7 +240,7 @@ mod tests {
         let certified_m = scenario
             .law()
             .expect("a law")
-            .certificate(&scenario.observation(&scenario.start))
+            .certificate(&scenario.observation(&scenario.start), &[])
             .certified_m
             .expect("a promise");
         let trial = |dt_s: f64| {

@@ -36,7 +36,7 @@ pub(super) struct Flights {
 
 fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, Untried> {
     let scenario = builtin(name)?;
-    let freedom = scenario.law()?.controls().freedom();
+    let freedom = scenario.law()?.capabilities().controls.freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
         .free_by(freedom)
         .carried_by(scenario.reference.as_ref());

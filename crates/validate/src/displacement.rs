@@ -7,7 +7,7 @@ use super::flights::{builtin, certified_m, continuous, larger, reached_at_s, sep
 use super::interface::{Judged, Progress, Untried, stated, try_each};
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::{Graph, Pinning};
-use tautline_laws::law::{DisplacementKeys, Law, LawError, LawSpec};
+use tautline_laws::law::{Capabilities, DisplacementKeys, Law, LawError, LawSpec};
 use tautline_laws::observation::Observation;
 use tautline_laws::target::{Guidance, ReferenceMotion};
 use tautline_sim::continuous::{self, Tolerances};
@@ -190,8 +190,8 @@ impl Law for Flipped {
         Ok(())
     }
 
-    fn sensing_range_m(&self) -> Option<f64> {
-        self.0.sensing_range_m()
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { sensing_range_m: self.0.capabilities().sensing_range_m, ..Capabilities::default() }
     }
 }
 

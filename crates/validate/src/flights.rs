@@ -38,7 +38,7 @@ pub(super) fn end(scenario: &Scenario, tolerances: Tolerances) -> Result<Swarm, 
 
 /// The separation certified before the first step \[m\]; NaN where there is none.
 pub(super) fn certified_m(scenario: &Scenario) -> Result<f64, Untried> {
-    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start));
+    let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start), &[]);
     Ok(certificate.certified_m.unwrap_or(f64::NAN))
 }
 

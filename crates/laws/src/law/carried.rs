@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::error::ParameterError;
-use super::interface::Controls;
+use super::interface::{Capabilities, Controls};
 use super::setting::Setting;
 use crate::graph::Pinning;
 use crate::target::Reference;
@@ -30,22 +30,20 @@ impl Carried {
         }
     }
 
-    pub(super) fn controls(self) -> Controls {
-        if self.is_guided { Controls::Places } else { Controls::Displacements }
-    }
-
     /// r'' as far as it is told \[m/s^2\].
     pub(super) fn fed_m_s2(self, reference: &Reference) -> Vector3<f64> {
         if self.is_fed { reference.acceleration_m_s2 } else { Vector3::zeros() }
     }
 
-    /// What vehicles need beside states over links.
-    pub(super) fn needs(self) -> &'static [&'static str] {
+    /// What a law with such a reference controls and needs.
+    pub(super) fn capabilities(self) -> Capabilities {
         const SEES: &str = "each sees who is near and how fast it moves";
-        if self.is_guided {
+        let needs: &[&str] = if self.is_guided {
             &["all share a compass, know where they are and know the reference", SEES]
         } else {
             &["all share a compass and know where they are", SEES]
-        }
+        };
+        let controls = if self.is_guided { Controls::Places } else { Controls::Displacements };
+        Capabilities { needs, controls, ..Capabilities::default() }
     }
 }

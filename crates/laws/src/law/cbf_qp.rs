@@ -9,9 +9,10 @@ use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
-use super::interface::{Controls, Law};
+use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::near_lists::NearLists;
 use super::setting::{Gain, Setting};
+use crate::formation::Formation;
 use crate::observation::Observation;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
@@ -197,36 +198,24 @@ impl Law for CbfQpLaw {
         check_range(command)
     }
 
-    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
-        Certificate::void(Void::CommandLimited)
+    fn certificate(&self, _start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        Certificate::void(Void::CommandLimited).void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
-    fn needs(&self) -> &'static [&'static str] {
-        self.carried.needs()
-    }
-
-    fn controls(&self) -> Controls {
-        self.carried.controls()
-    }
-
-    fn max_command_m_s2(&self) -> Option<f64> {
-        Some(self.keys.max_accel_m_s2)
-    }
-
-    fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.range_m)
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            max_command_m_s2: Some(self.keys.max_accel_m_s2),
+            sensing_range_m: Some(self.range_m),
+            ..self.carried.capabilities()
+        }
     }
 
     /// A vehicle alone follows x'' = -c x' - k x. Nothing is known where others are within the range: of several half-spaces a
-    /// corner may run as fast as two of their planes close.
-    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
-        nearest_m.filter(|nearest_m| *nearest_m > self.range_m)?;
-        Some(self.keys.c_per_s.max(self.keys.k_per_s2.sqrt()))
-    }
-
-    /// Vehicles are held to places, and a22 is made up for.
-    fn common_mode_rate_per_s(&self, _a22_per_s: f64) -> f64 {
-        0.0
+    /// corner may run as fast as two of their planes close. Vehicles are held to places, and a22 is made up for.
+    fn rates(&self, at: &RateQuery) -> Rates {
+        let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt());
+        let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
+        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(at) }
     }
 }
 

@@ -16,6 +16,9 @@ pub struct Certificate {
     pub certified_room_m: Option<f64>,
     /// Energy E(0) of the start \[m^2/s^2\], where the law has one, whether or not it certifies anything.
     pub energy_initial: Option<f64>,
+    /// No pair joined by a link comes closer than this \[m\] for as long as the energy does not exceed that of the start. On a
+    /// graph that is not complete it is no certificate: other pairs may come closer.
+    pub linked_m: Option<f64>,
     /// Every reason why nothing is certified.
     pub void: Vec<Void>,
     /// The same for each of several formations that are gone through, in their order: `certified_m` is the least of them.
@@ -97,6 +100,7 @@ impl Certificate {
             certified_until_s: None,
             certified_room_m: None,
             energy_initial: None,
+            linked_m: None,
             void: vec![reason],
             legs: Vec::new(),
         }
@@ -243,6 +247,7 @@ mod tests {
             certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(1.0),
+            linked_m: None,
             void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
             legs: Vec::new(),
         };

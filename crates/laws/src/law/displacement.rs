@@ -14,7 +14,7 @@ use super::consensus::{add_pushes, check_count, check_range, check_state, check_
 use super::contact::in_contact;
 use super::error::{LawError, ParameterError};
 use super::growth::Growth;
-use super::interface::{Controls, Law, VelocityMargin};
+use super::interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin};
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
 use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
@@ -311,6 +311,33 @@ fn tension_between(
     EdgeTension::new(keys.alpha, delta_m, rest_m).map_err(|source| ParameterError::Tension { pair, source })
 }
 
+impl DisplacementLaw {
+    /// With mu, the largest eigenvalue of the graph's Laplacian: a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the
+    /// links sigma k mu. Damping is followed while sigma c mu dt is at most 0.5, which `max_rate_dt` = 0.3 keeps. In a crowd
+    /// several near pairs may add up to 3.6 times as much to omega^2, which the step still follows.
+    fn fastest_per_s(&self, nearest_m: f64) -> f64 {
+        const DAMPED: f64 = 0.3 / 0.5;
+        let contact = if nearest_m < self.tension.rest_m() {
+            2.0 * self.tension.second_derivative(nearest_m) / self.metric.shortest_m(1.0).powi(2)
+        } else {
+            0.0
+        };
+        let links = self.scale() * self.largest;
+        let omega = (contact + links * self.keys.k_per_s2).sqrt();
+        omega.max(DAMPED * links * self.damping_per_s())
+    }
+
+    /// A mode of the graph with the eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1
+    /// or, towards k/c, for m without bound.
+    fn settling(&self) -> Settling {
+        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
+        let half = 0.5 * (c - self.a22_per_s);
+        let first_per_s = if half * half > k { k / (half + (half * half - k).sqrt()) } else { half };
+        let rate_per_s = if c > 0.0 { first_per_s.min(k / c) } else { first_per_s };
+        Settling { rate_per_s, response_s: rate_per_s / k }
+    }
+}
+
 impl Law for DisplacementLaw {
     fn name(&self) -> &'static str {
         "displacement"
@@ -342,14 +369,6 @@ impl Law for DisplacementLaw {
         self.try_energy(at).ok()
     }
 
-    fn certificate(&self, start: &Observation<'_>) -> Certificate {
-        self.certificate_through(start, &[])
-    }
-
-    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        self.promise_through(start, ahead)
-    }
-
     /// In contact on the complete graph without a reference.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
@@ -361,79 +380,43 @@ impl Law for DisplacementLaw {
         Some(linear)
     }
 
-    fn controls(&self) -> Controls {
-        if self.is_guided() { Controls::Places } else { Controls::Displacements }
-    }
-
-    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
-        if self.is_guided() { a22_per_s - self.damping_per_s() } else { a22_per_s }
-    }
-
-    fn barrier_m(&self) -> Option<f64> {
-        Some(self.delta_m)
-    }
-
-    fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.metric.longest_m(self.tension.rest_m()))
-    }
-
-    fn needs(&self) -> &'static [&'static str] {
-        if self.clearance.is_some() {
-            return &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"];
-        }
-        &["all share a compass", "each sees who is nearer than slots are"]
-    }
-
-    fn keeps_ellipsoids(&self) -> bool {
-        true
-    }
-
-    fn reckons_with_wind(&self) -> bool {
-        true
-    }
-
-    fn keeps_clear_of_obstacles(&self) -> bool {
-        self.clearance.is_some()
-    }
-
-    fn obstacle_rate_squared(&self, room_m: f64) -> f64 {
-        self.clearance.map_or(0.0, |clearance| clearance.rate_squared(room_m))
-    }
-
-    /// With mu, the largest eigenvalue of the graph's Laplacian: a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the
-    /// links sigma k mu. Damping is followed while sigma c mu dt is at most 0.5, which `max_rate_dt` = 0.3 keeps. In a crowd
-    /// several near pairs may add up to 3.6 times as much to omega^2, which the step still follows.
-    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
-        const DAMPED: f64 = 0.3 / 0.5;
-        let contact = match nearest_m? {
-            nearest_m if nearest_m < self.tension.rest_m() => {
-                2.0 * self.tension.second_derivative(nearest_m) / self.metric.shortest_m(1.0).powi(2)
-            }
-            _ => 0.0,
+    fn capabilities(&self) -> Capabilities {
+        let sees: &[&str] = if self.clearance.is_some() {
+            &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"]
+        } else {
+            &["all share a compass", "each sees who is nearer than slots are"]
         };
-        let links = self.scale() * self.largest;
-        let omega = (contact + links * self.keys.k_per_s2).sqrt();
-        Some(omega.max(DAMPED * links * self.damping_per_s()))
+        Capabilities {
+            needs: sees,
+            controls: if self.is_guided() { Controls::Places } else { Controls::Displacements },
+            barrier_m: Some(self.delta_m),
+            sensing_range_m: Some(self.metric.longest_m(self.tension.rest_m())),
+            uses_ellipsoid_metric: true,
+            certifies_under_wind: true,
+            avoids_obstacles: self.clearance.is_some(),
+            settling: Some(self.settling()),
+            ..Capabilities::default()
+        }
     }
 
-    /// A mode of the graph with the eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1
-    /// or, towards k/c, for m without bound.
-    fn settling(&self) -> Option<Settling> {
-        let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
-        let half = 0.5 * (c - self.a22_per_s);
-        let first_per_s = if half * half > k { k / (half + (half * half - k).sqrt()) } else { half };
-        let rate_per_s = if c > 0.0 { first_per_s.min(k / c) } else { first_per_s };
-        Some(Settling { rate_per_s, response_s: rate_per_s / k })
+    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        self.promise_through(start, ahead)
     }
 
-    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
-        let of_graph = if self.is_guided() { 1.0 } else { connectivity / self.connectivity };
+    fn rates(&self, at: &RateQuery) -> Rates {
+        let of_graph = if self.is_guided() { 1.0 } else { at.connectivity / self.connectivity };
         let damping_per_s = self.damping_per_s() * of_graph;
-        Some(VelocityMargin {
-            per_s: damping_per_s - a22_per_s,
-            terms_per_s: damping_per_s + a22_per_s.abs(),
-            remedy: "Raise law.zeta_per_s.",
-        })
+        Rates {
+            fastest_per_s: at.nearest_m.map(|nearest_m| self.fastest_per_s(nearest_m)),
+            obstacles_per_s2: (self.clearance.zip(at.obstacle_room_m))
+                .map_or(0.0, |(clearance, room_m)| clearance.rate_squared(room_m)),
+            velocity_margin: Some(VelocityMargin {
+                per_s: damping_per_s - at.a22_per_s,
+                terms_per_s: damping_per_s + at.a22_per_s.abs(),
+                remedy: "Raise law.zeta_per_s.",
+            }),
+            common_mode_per_s: if self.is_guided() { at.a22_per_s - self.damping_per_s() } else { at.a22_per_s },
+        }
     }
 }
 

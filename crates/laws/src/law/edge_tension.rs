@@ -11,7 +11,7 @@ use super::consensus::{
 };
 use super::error::{LawError, ParameterError};
 use super::growth::{Frame, Grown, Growth};
-use super::interface::{Controls, Law, VelocityMargin};
+use super::interface::{Capabilities, Controls, Law, RateQuery, Rates};
 use super::kernel::Kernel;
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
@@ -273,31 +273,6 @@ impl Law for EdgeTensionLaw {
         self.try_energy(at.own).ok()
     }
 
-    fn promise(&self) -> &'static str {
-        "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on the control, no \
-         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, so no \
-         pair's tension exceeds N times all of it."
-    }
-
-    fn barrier_m(&self) -> Option<f64> {
-        Some(self.parameters.delta_m)
-    }
-
-    fn controls(&self) -> Controls {
-        Controls::Distances
-    }
-
-    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
-    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
-    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at `nearest_m` of the pair with
-    /// the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
-    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
-    /// largest eigenvalue is at most V''max: omega^2 <= V''max. On the complete graph relative velocities decay at the
-    /// rate 1/s, so the fastest rate is max(omega, 1/s).
-    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
-        Some(self.tightest?.second_derivative(nearest_m?).sqrt().max(1.0))
-    }
-
     /// On the complete graph relative velocities are all damped by 1 + a22, and the stiffnesses are the eigenvalues of 1/N times
     /// the sum over edges of V'' in their directions: V' is 0 at the desired distance. 0 for rotations.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
@@ -324,16 +299,6 @@ impl Law for EdgeTensionLaw {
         Some(Linear { free: stiffnesses.iter().map(mode).collect(), in_contact: None, heard: None })
     }
 
-    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
-        let gain_per_s = 1.0 + self.parameters.a22_per_s;
-        Some(consensus_margin(self.graph.count(), gain_per_s, connectivity, a22_per_s))
-    }
-
-    fn linked_separation_m(&self, start: &Observation<'_>) -> Option<f64> {
-        let energy = self.try_energy(start.own).ok()?;
-        Some(self.tightest?.push_side_root(start.own.count() as f64 * energy))
-    }
-
     /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
     /// the same function, so the pair that may come closest is the one with the smallest K, and one root
     /// ([`EdgeTension::push_side_root`]) answers for all pairs.
@@ -343,7 +308,7 @@ impl Law for EdgeTensionLaw {
     ///
     /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.
-    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         let energy = self.try_energy(start.own);
         let mut void = Vec::new();
         if !self.graph.is_complete() {
@@ -370,13 +335,41 @@ impl Law for EdgeTensionLaw {
             certified_until_s: grown.and_then(|grown| grown.until_s),
             certified_room_m: None,
             energy_initial,
+            linked_m: energy_initial.zip(self.tightest).map(|(energy, of)| of.push_side_root(count * energy)),
             void,
             legs: Vec::new(),
         }
+        .void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
-    fn reckons_with_wind(&self) -> bool {
-        true
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            controls: Controls::Distances,
+            barrier_m: Some(self.parameters.delta_m),
+            certifies_under_wind: true,
+            assumptions: "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on \
+                          the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows by \
+                          no more than that wind can add, so no pair's tension exceeds N times all of it.",
+            ..Capabilities::default()
+        }
+    }
+
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
+    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
+    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at `nearest_m` of the pair with
+    /// the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
+    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
+    /// largest eigenvalue is at most V''max: omega^2 <= V''max. On the complete graph relative velocities decay at the
+    /// rate 1/s, so the fastest rate is max(omega, 1/s).
+    fn rates(&self, at: &RateQuery) -> Rates {
+        let fastest = |(of, nearest_m): (EdgeTension, f64)| of.second_derivative(nearest_m).sqrt().max(1.0);
+        let gain_per_s = 1.0 + self.parameters.a22_per_s;
+        let margin = consensus_margin(self.graph.count(), gain_per_s, at.connectivity, at.a22_per_s);
+        Rates {
+            fastest_per_s: self.tightest.zip(at.nearest_m).map(fastest),
+            velocity_margin: Some(margin),
+            ..Rates::unknown(at)
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
-use super::interface::{Controls, Law};
+use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::setting::{Gain, Setting};
 use crate::formation::Formation;
 use crate::observation::Observation;
@@ -202,43 +202,38 @@ impl Law for FlockingLaw {
         Ok(())
     }
 
-    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
-        Certificate::void(Void::CommandLimited)
+    fn certificate(&self, _start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        Certificate::void(Void::CommandLimited).void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
-    fn needs(&self) -> &'static [&'static str] {
-        self.carried.needs()
-    }
-
-    fn controls(&self) -> Controls {
-        self.carried.controls()
-    }
-
-    fn max_command_m_s2(&self) -> Option<f64> {
-        Some(self.keys.max_accel_m_s2)
-    }
-
-    fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.range_m())
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            max_command_m_s2: Some(self.keys.max_accel_m_s2),
+            sensing_range_m: Some(self.range_m()),
+            ..self.carried.capabilities()
+        }
     }
 
     /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to the damping,
     /// a vehicle has at most as many near ones as balls of that diameter fit around it, and the eigenvalues of a sum over pairs
     /// are at most twice the sum at a vehicle. While velocities differ, what they are matched with changes with distance too.
-    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
-        let (nearest_m, range_m) = (nearest_m?, self.range_m());
+    /// The objective brakes the mean velocity, and a22 is made up for.
+    fn rates(&self, at: &RateQuery) -> Rates {
         let (alpha, gamma) = (self.keys.c1_alpha_per_s2, self.keys.c1_gamma_per_s2);
-        let packed = if nearest_m > range_m { 0.0 } else { (1.0 + 2.0 * range_m / nearest_m).powi(3) - 1.0 };
-        let near = packed.min(self.count.saturating_sub(1) as f64);
-        let steep = 1.0 + PI / (2.0 * (1.0 - BUMP) * sigma_norm(range_m));
-        let of_pair = alpha * ACTION * (steep * range_m * range_m / (1.0 + EPSILON * range_m * range_m) + 1.0);
-        let half = gamma.sqrt() + 2.0 * near * alpha.sqrt();
-        Some(half + (half * half + gamma + 2.0 * near * of_pair).sqrt())
-    }
-
-    /// The objective brakes, and a22 is made up for.
-    fn common_mode_rate_per_s(&self, _a22_per_s: f64) -> f64 {
-        -2.0 * self.keys.c1_gamma_per_s2.sqrt()
+        let fastest_per_s = |nearest_m: f64| {
+            let range_m = self.range_m();
+            let packed = if nearest_m > range_m { 0.0 } else { (1.0 + 2.0 * range_m / nearest_m).powi(3) - 1.0 };
+            let near = packed.min(self.count.saturating_sub(1) as f64);
+            let steep = 1.0 + PI / (2.0 * (1.0 - BUMP) * sigma_norm(range_m));
+            let of_pair = alpha * ACTION * (steep * range_m * range_m / (1.0 + EPSILON * range_m * range_m) + 1.0);
+            let half = gamma.sqrt() + 2.0 * near * alpha.sqrt();
+            half + (half * half + gamma + 2.0 * near * of_pair).sqrt()
+        };
+        Rates {
+            fastest_per_s: at.nearest_m.map(fastest_per_s),
+            common_mode_per_s: -2.0 * gamma.sqrt(),
+            ..Rates::unknown(at)
+        }
     }
 }
 

@@ -12,14 +12,15 @@ use tautline_core::swarm::Rows;
 
 /// A control law: a function from what the vehicles know to an acceleration for each.
 ///
-/// A law of your own implements [`Law::name`] and [`Law::command`] and is flown like the built-in ones. Its memory, if it
-/// has any, is saved with a simulation, so it must be [`Clone`].
+/// A law of your own implements [`Law::name`] and [`Law::command`] and is flown like the built-in ones. The other methods have
+/// defaults: [`Law::capabilities`] states what the law senses and controls, [`Law::certificate`] and [`Law::energy`] what it
+/// proves, [`Law::rates`] and [`Law::linear`] how fast its closed loop is. Its memory, if it has any, is saved with a
+/// simulation, so it must be [`Clone`].
 pub trait Law: DynClone + Send {
     /// Short name for reports, such as `edge-tension`.
     fn name(&self) -> &str;
 
-    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i is to rest on nothing but what
-    /// vehicle i knows.
+    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on what vehicle i knows.
     ///
     /// Called once a step; implementations keep their scratch memory so that nothing is allocated here.
     ///
@@ -27,7 +28,7 @@ pub trait Law: DynClone + Send {
     /// [`LawError`] where the law is not defined, such as a pair at or inside the keep-out distance of a barrier.
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
 
-    /// Takes note of a target whose slots have changed, before it is asked about it.
+    /// Takes over a target whose slots have changed, before the next command.
     ///
     /// # Errors
     /// [`LawError`] where the law is not defined for that target; it then goes on for the one before.
@@ -35,124 +36,132 @@ pub trait Law: DynClone + Send {
         Ok(())
     }
 
+    /// Restarts the random numbers of the law.
+    fn reseed(&mut self, _seed: u64) {}
+
+    /// What the law senses, limits, controls and assumes. May change with the target.
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::default()
+    }
+
     /// The law's Lyapunov function E \[m^2/s^2\] where it has one.
     fn energy(&self, _at: &Observation<'_>) -> Option<f64> {
         None
     }
 
-    /// What the law promises about separation from this start on, before the first step.
-    fn certificate(&self, _start: &Observation<'_>) -> Certificate {
-        Certificate::void(Void::NoBarrier)
+    /// Separation that the law guarantees from a start on, if its target then goes through the formations `ahead`, each taken
+    /// up at once or along the straight lines between slots, at any time.
+    fn certificate(&self, _start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        Certificate::void(Void::NoBarrier).void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
-    /// What the law promises from this state on if its target then goes through these formations, each taken up at once or
-    /// along the straight lines between slots, at any time.
-    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        self.certificate(start).void_where(!ahead.is_empty(), Void::TargetChanges)
-    }
-
-    /// What the certified distance rests on, a sentence.
-    fn promise(&self) -> &'static str {
-        "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit on the control, no \
-         disturbance but the wind of the scenario and continuous time: the law's energy grows by no more than that wind can add, and \
-         no pair can hold more than all of it."
-    }
-
-    /// Distance below which no pair joined by a link comes for as long as the energy does not exceed that of this start
-    /// \[m\], where the law knows one. On a graph that is not complete it is no certificate: other pairs may come closer.
-    fn linked_separation_m(&self, _start: &Observation<'_>) -> Option<f64> {
-        None
-    }
-
-    /// Distance at which the law's barrier is infinite \[m\], where it has a barrier. The loop refuses a step that
-    /// takes more than half of the clearance above it from a linked pair, or from any pair where the law has a
-    /// [sensing range](Law::sensing_range_m).
-    fn barrier_m(&self) -> Option<f64> {
-        None
-    }
-
-    /// How near of each other vehicles must be for the law to ask what they *see* of each other \[m\]; a law that lives
-    /// on links alone asks nothing.
-    fn sensing_range_m(&self) -> Option<f64> {
-        None
-    }
-
-    /// Whether it is asked by the thread that flies and by no other. A large swarm's law is asked beside the audit unless this
-    /// is `true`.
-    fn stays_in_its_thread(&self) -> bool {
-        false
-    }
-
-    /// Begins its random numbers anew.
-    fn reseed(&mut self, _seed: u64) {}
-
-    /// What the law needs beside states over the links, in a few words each: a common compass, a sensor.
-    fn needs(&self) -> &'static [&'static str] {
-        &[]
-    }
-
-    /// What the law holds vehicles to.
-    fn controls(&self) -> Controls {
-        Controls::Displacements
-    }
-
-    /// Upper bound on the rates of the closed loop \[1/s\] while no pair is nearer than `nearest_m`, for vehicles with
-    /// velocity coefficient a22. `None` where none is known, or where it depends on a distance that is not given.
-    fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, _a22_per_s: f64) -> Option<f64> {
-        None
-    }
-
-    /// Largest acceleration that the law commands of a vehicle \[m/s^2\], where it has a limit.
-    fn max_command_m_s2(&self) -> Option<f64> {
-        None
-    }
-
-    /// Whether the law keeps vehicles apart in the lengths of its [`Setting`](super::Setting), of which distances between them are then
-    /// told, and not in metres alone.
-    fn keeps_ellipsoids(&self) -> bool {
-        false
-    }
-
-    /// Whether what the law certifies counts a wind in. What any other certifies is void where one blows.
-    fn reckons_with_wind(&self) -> bool {
-        false
-    }
-
-    /// Whether the law keeps vehicles clear of the obstacles that it is told of. What any other certifies is void where there
-    /// are some: it is certified of vehicles that hit nothing.
-    fn keeps_clear_of_obstacles(&self) -> bool {
-        false
-    }
-
-    /// What obstacles add to the square of [`Law::fastest_rate_per_s`] \[1/s^2\] while no vehicle has less than `room_m` from
-    /// any of them beyond its clearance.
-    fn obstacle_rate_squared(&self, _room_m: f64) -> f64 {
-        0.0
-    }
-
-    /// How errors of position settle where nothing stands in their way, for a law that may be given slots that are spread for a
-    /// while ([`crate::target::Breathing`]) and renews its promise then. `None` for any other.
-    fn settling(&self) -> Option<Settling> {
-        None
-    }
-
-    /// How fast relative velocities are damped at least, on a graph of this algebraic connectivity.
-    fn velocity_margin(&self, _connectivity: f64, _a22_per_s: f64) -> Option<VelocityMargin> {
-        None
+    /// Bounds on the rates of the closed loop.
+    fn rates(&self, at: &RateQuery) -> Rates {
+        Rates::unknown(at)
     }
 
     /// Linear motion about the slots of a formation, where it is known.
     fn linear(&self, _formation: &Formation) -> Option<Linear> {
         None
     }
-
-    /// Rate at which the swarm's mean velocity grows by itself \[1/s\]; negative where it decays.
-    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
-        a22_per_s
-    }
 }
 
 dyn_clone::clone_trait_object!(Law);
+
+/// What a law senses, limits, controls and assumes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
+pub struct Capabilities {
+    /// What a vehicle needs beside states over the links, in a few words each: a common compass, a sensor.
+    pub needs: &'static [&'static str],
+    /// What the law holds vehicles to.
+    pub controls: Controls,
+    /// Distance at which the law's barrier is infinite \[m\]. The loop refuses a step that takes more than half of the
+    /// clearance above it from a linked pair, or from any pair where the law has a sensing range.
+    pub barrier_m: Option<f64>,
+    /// Distance from which on vehicles see each other \[m\]; `None` for a law that uses links alone.
+    pub sensing_range_m: Option<f64>,
+    /// Largest acceleration that the law commands of a vehicle \[m/s^2\].
+    pub max_command_m_s2: Option<f64>,
+    /// Whether the law measures distances between vehicles in the ellipsoid of its [`Setting`](super::Setting).
+    pub uses_ellipsoid_metric: bool,
+    /// Whether the certificate of the law accounts for wind. Any other certificate is void in wind.
+    pub certifies_under_wind: bool,
+    /// Whether the law keeps vehicles clear of obstacles. Any other certificate is void among obstacles.
+    pub avoids_obstacles: bool,
+    /// Whether the law runs on the calling thread alone. The law of a large swarm runs beside the audit otherwise.
+    pub requires_calling_thread: bool,
+    /// How errors of position settle where nothing stands in their way, for a law that can follow slots that are spread for
+    /// a while ([`crate::target::Breathing`]) and certifies anew then.
+    pub settling: Option<Settling>,
+    /// The assumptions of the certified distance, a sentence.
+    pub assumptions: &'static str,
+}
+
+impl Default for Capabilities {
+    /// A law on links alone, without a barrier, that controls displacements.
+    fn default() -> Self {
+        Self {
+            needs: &[],
+            controls: Controls::Displacements,
+            barrier_m: None,
+            sensing_range_m: None,
+            max_command_m_s2: None,
+            uses_ellipsoid_metric: false,
+            certifies_under_wind: false,
+            avoids_obstacles: false,
+            requires_calling_thread: false,
+            settling: None,
+            assumptions: "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit \
+                          on the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows \
+                          by no more than that wind can add, and no pair can hold more than all of it.",
+        }
+    }
+}
+
+/// The situation for which rates are bounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RateQuery {
+    /// Velocity coefficient of the vehicles \[1/s\].
+    pub a22_per_s: f64,
+    /// No pair is nearer than this \[m\]; `None` where no bound is known.
+    pub nearest_m: Option<f64>,
+    /// No vehicle has less than this from an obstacle beyond its clearance \[m\]; `None` without obstacles.
+    pub obstacle_room_m: Option<f64>,
+    /// Algebraic connectivity of the graph.
+    pub connectivity: f64,
+}
+
+impl RateQuery {
+    /// Vehicles with velocity coefficient a22 \[1/s\] that come no nearer to each other than `nearest_m`, without obstacles, on a
+    /// graph that is not connected.
+    #[must_use]
+    pub fn new(a22_per_s: f64, nearest_m: Option<f64>) -> Self {
+        Self { a22_per_s, nearest_m, obstacle_room_m: None, connectivity: 0.0 }
+    }
+}
+
+/// Bounds on the rates of the closed loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    /// Upper bound on the rates \[1/s\] without obstacles. `None` where none is known, or where it depends on a distance that
+    /// is not given.
+    pub fastest_per_s: Option<f64>,
+    /// What obstacles add to the square of the fastest rate \[1/s^2\].
+    pub obstacles_per_s2: f64,
+    /// How fast relative velocities are damped at least.
+    pub velocity_margin: Option<VelocityMargin>,
+    /// Rate at which the mean velocity of the swarm grows by itself \[1/s\]; negative where it decays.
+    pub common_mode_per_s: f64,
+}
+
+impl Rates {
+    /// No bound; the mean velocity of the swarm grows with a22.
+    #[must_use]
+    pub fn unknown(at: &RateQuery) -> Self {
+        Self { fastest_per_s: None, obstacles_per_s2: 0.0, velocity_margin: None, common_mode_per_s: at.a22_per_s }
+    }
+}
 
 /// What a law holds vehicles to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

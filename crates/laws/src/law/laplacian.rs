@@ -8,7 +8,7 @@ use super::consensus::{
     of_table, relative_kinetic_energy, sum_of_squares_about_mean,
 };
 use super::error::{LawError, ParameterError};
-use super::interface::{Law, VelocityMargin};
+use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::modes::{Linear, Mode};
 use super::pinned::PinnedConsensus;
 use super::setting::{Gain, Setting};
@@ -101,10 +101,6 @@ impl Law for LaplacianLaw {
         "laplacian"
     }
 
-    fn needs(&self) -> &'static [&'static str] {
-        &["all share a compass"]
-    }
-
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         check_observation(self.graph.count(), at, command)?;
         command.fill(0.0);
@@ -134,14 +130,9 @@ impl Law for LaplacianLaw {
         energy.is_finite().then_some(energy)
     }
 
-    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         Certificate { energy_initial: self.energy(start), ..Certificate::void(Void::NoBarrier) }
-    }
-
-    /// The law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues 0 <= mu <= N of the
-    /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
-    fn fastest_rate_per_s(&self, _nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
-        Some(self.f1_per_s2.sqrt().max((self.f2_per_s - a22_per_s).abs()).max(a22_per_s.abs()))
+            .void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
     fn linear(&self, _formation: &Formation) -> Option<Linear> {
@@ -150,8 +141,19 @@ impl Law for LaplacianLaw {
         Some(PinnedConsensus::new(&self.graph, Pinning::Nobody).linear(gain, gain))
     }
 
-    fn velocity_margin(&self, connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
-        Some(consensus_margin(self.graph.count(), self.f2_per_s, connectivity, a22_per_s))
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { needs: &["all share a compass"], ..Capabilities::default() }
+    }
+
+    /// The law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues 0 <= mu <= N of the
+    /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    fn rates(&self, at: &RateQuery) -> Rates {
+        let fastest = self.f1_per_s2.sqrt().max((self.f2_per_s - at.a22_per_s).abs()).max(at.a22_per_s.abs());
+        Rates {
+            fastest_per_s: Some(fastest),
+            velocity_margin: Some(consensus_margin(self.graph.count(), self.f2_per_s, at.connectivity, at.a22_per_s)),
+            ..Rates::unknown(at)
+        }
     }
 }
 

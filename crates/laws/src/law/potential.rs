@@ -8,7 +8,7 @@ use super::consensus::{
     add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
 };
 use super::error::{LawError, ParameterError};
-use super::interface::{Law, VelocityMargin};
+use super::interface::{Capabilities, Law, RateQuery, Rates, VelocityMargin};
 use super::memo::Memo;
 use super::setting::{Gain, Setting};
 use super::tension::TensionError;
@@ -175,6 +175,24 @@ fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
     }
 }
 
+impl PotentialLaw {
+    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
+    /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
+    /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
+    /// vehicle.
+    fn fastest_per_s(&self, nearest_m: f64, a22_per_s: f64) -> Option<f64> {
+        let nearest_m = nearest_m.min(self.range_m);
+        let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;
+        let curvature = self.keys.eta_m4_per_s2 * inverse.powi(3) * (2.0 * steep + inverse);
+        let packed = (1.0 + 2.0 * self.range_m / nearest_m).powi(3) - 1.0;
+        let near = packed.min(self.graph.count().saturating_sub(1) as f64);
+        let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
+        let half = 0.5 * (self.keys.c_per_s - a22_per_s).abs();
+        // A mode that the repulsion pushes apart grows at up to this rate, and no other is faster.
+        Some(half + half.hypot(omega))
+    }
+}
+
 impl Law for PotentialLaw {
     fn name(&self) -> &'static str {
         "potential"
@@ -221,7 +239,7 @@ impl Law for PotentialLaw {
         self.try_energy(at).ok()
     }
 
-    fn certificate(&self, start: &Observation<'_>) -> Certificate {
+    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         let mut void = Vec::new();
         if self.keys.c_per_s < self.a22_per_s {
             void.push(Void::VelocityUndamped);
@@ -240,51 +258,35 @@ impl Law for PotentialLaw {
             certified_until_s: None,
             certified_room_m: None,
             energy_initial: energy,
+            linked_m: None,
             void,
             legs: Vec::new(),
         }
+        .void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
-    fn needs(&self) -> &'static [&'static str] {
-        &["all share a compass", "each sees who is nearer than slots are", "each knows its own velocity"]
+    fn capabilities(&self) -> Capabilities {
+        Capabilities {
+            needs: &["all share a compass", "each sees who is nearer than slots are", "each knows its own velocity"],
+            barrier_m: Some(self.delta_m),
+            sensing_range_m: Some(self.range_m),
+            max_command_m_s2: self.keys.max_accel_m_s2,
+            ..Capabilities::default()
+        }
     }
 
-    fn barrier_m(&self) -> Option<f64> {
-        Some(self.delta_m)
-    }
-
-    fn max_command_m_s2(&self) -> Option<f64> {
-        self.keys.max_accel_m_s2
-    }
-
-    fn sensing_range_m(&self) -> Option<f64> {
-        Some(self.range_m)
-    }
-
-    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
-    /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
-    /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
-    /// vehicle.
-    fn fastest_rate_per_s(&self, nearest_m: Option<f64>, a22_per_s: f64) -> Option<f64> {
-        let nearest_m = nearest_m?.min(self.range_m);
-        let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;
-        let curvature = self.keys.eta_m4_per_s2 * inverse.powi(3) * (2.0 * steep + inverse);
-        let packed = (1.0 + 2.0 * self.range_m / nearest_m).powi(3) - 1.0;
-        let near = packed.min(self.graph.count().saturating_sub(1) as f64);
-        let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
-        let half = 0.5 * (self.keys.c_per_s - a22_per_s).abs();
-        // A mode that the repulsion pushes apart grows at up to this rate, and no other is faster.
-        Some(half + half.hypot(omega))
-    }
-
-    fn velocity_margin(&self, _connectivity: f64, a22_per_s: f64) -> Option<VelocityMargin> {
-        let terms_per_s = self.keys.c_per_s + a22_per_s.abs();
-        let remedy = "Raise law.c_per_s, or reduce swarm.a22_per_s.";
-        Some(VelocityMargin { per_s: self.keys.c_per_s - a22_per_s, terms_per_s, remedy })
-    }
-
-    fn common_mode_rate_per_s(&self, a22_per_s: f64) -> f64 {
-        a22_per_s - self.keys.c_per_s
+    fn rates(&self, at: &RateQuery) -> Rates {
+        let a22_per_s = at.a22_per_s;
+        Rates {
+            fastest_per_s: at.nearest_m.and_then(|nearest_m| self.fastest_per_s(nearest_m, a22_per_s)),
+            velocity_margin: Some(VelocityMargin {
+                per_s: self.keys.c_per_s - a22_per_s,
+                terms_per_s: self.keys.c_per_s + a22_per_s.abs(),
+                remedy: "Raise law.c_per_s, or reduce swarm.a22_per_s.",
+            }),
+            common_mode_per_s: a22_per_s - self.keys.c_per_s,
+            ..Rates::unknown(at)
+        }
     }
 }
 

@@ -27,7 +27,7 @@ fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
 
 fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
     let mut near = NearPairs::default();
-    near.update(&at.own.positions_m, law.sensing_range_m().unwrap_or(0.0));
+    near.update(&at.own.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
     let mut command = Rows::zeros(COUNT);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");
     command
@@ -108,7 +108,11 @@ fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
         let at = Observation { target: target.view(), ..Observation::exact(&swarm, &links, &next) };
         let anew = command(built(&spec, &links, &next).as_mut(), &at);
         assert_eq!(command(law.as_mut(), &at), anew, "{spec:?}");
-        assert_eq!(law.sensing_range_m(), built(&spec, &links, &next).sensing_range_m(), "{spec:?}");
+        assert_eq!(
+            law.capabilities().sensing_range_m,
+            built(&spec, &links, &next).capabilities().sensing_range_m,
+            "{spec:?}"
+        );
     }
 }
 
@@ -116,11 +120,14 @@ fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
 fn who_compares_directions_needs_a_compass_and_who_senses_needs_a_sensor() {
     for spec in LawSpec::all() {
         let law = built(&spec, &Graph::complete(COUNT), &Formation::grid(COUNT, 2.0));
-        let needs = |what: &str| law.needs().iter().any(|need| need.contains(what));
-        assert_eq!(needs("compass"), law.controls() == Controls::Displacements, "{spec:?}");
-        assert_eq!(needs("sees"), law.sensing_range_m().is_some(), "{spec:?}");
-        assert!(law.needs().iter().all(|need| !need.is_empty()), "{spec:?}");
-        assert!(law.promise().starts_with("The certified distance holds for ") && law.promise().ends_with('.'));
+        let needs = |what: &str| law.capabilities().needs.iter().any(|need| need.contains(what));
+        assert_eq!(needs("compass"), law.capabilities().controls == Controls::Displacements, "{spec:?}");
+        assert_eq!(needs("sees"), law.capabilities().sensing_range_m.is_some(), "{spec:?}");
+        assert!(law.capabilities().needs.iter().all(|need| !need.is_empty()), "{spec:?}");
+        assert!(
+            law.capabilities().assumptions.starts_with("The certified distance holds for ")
+                && law.capabilities().assumptions.ends_with('.')
+        );
     }
 }
 

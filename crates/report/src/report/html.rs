@@ -177,11 +177,11 @@ impl Report {
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
         let certificate = if self.separation.certified_m.is_some() {
-            scenario.law().map_or_else(|error| error.to_string(), |law| law.promise().to_owned())
+            scenario.law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
-        let moved = match scenario.law().map(|law| law.controls().freedom()) {
+        let moved = match scenario.law().map(|law| law.capabilities().controls.freedom()) {
             Ok(Freedom::Fixed) => "where the reference has carried it",
             Ok(Freedom::Translation) => "wherever it is",
             _ => "wherever it is, turned and perhaps mirrored",

@@ -51,6 +51,7 @@ fn a_certificate_is_broken_by_a_share_of_its_clearance() {
             certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(3.656),
+            linked_m: None,
             void: vec![],
             legs: vec![],
         };

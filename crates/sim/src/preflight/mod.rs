@@ -18,7 +18,7 @@ use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
 use tautline_laws::formation::affine_dimension;
-use tautline_laws::law::{Controls, Law, LegBound, ParameterError, Void};
+use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, VelocityMargin, Void};
 use tautline_laws::space::{closest_pair, least_room};
 
 pub use margins::{Bound, Near, PredictedMargin};
@@ -163,11 +163,17 @@ impl Preflight {
     /// As [`Preflight::of`], under another law than the scenario's.
     #[must_use]
     pub fn under(scenario: &Scenario, law: &dyn Law) -> Self {
-        let start = scenario.observation(&scenario.start);
         let certificate = scenario.certificate(law);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
-        let drift = scenario.drift(law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()));
+        let capabilities = law.capabilities();
+        let rates = law.rates(&RateQuery {
+            a22_per_s: scenario.velocity_coefficient_per_s(),
+            nearest_m: certificate.certified_m,
+            obstacle_room_m: certificate.certified_room_m,
+            connectivity,
+        });
+        let drift = scenario.drift(rates.common_mode_per_s);
         let scaled = |rows: &Rows| closest_pair(&scenario.metric().scaled_rows(rows));
         let margin = |rows: &Rows| scaled(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
@@ -178,10 +184,8 @@ impl Preflight {
             half_axes_m: scenario.half_axes_m(),
             algebraic_connectivity: connectivity,
             connectivity_is: Connectivity::Solved,
-            velocity_margin_per_s: law
-                .velocity_margin(connectivity, scenario.velocity_coefficient_per_s())
-                .map(|margin| margin.per_s),
-            common_mode_rate_per_s: law.common_mode_rate_per_s(scenario.velocity_coefficient_per_s()),
+            velocity_margin_per_s: rates.velocity_margin.map(|margin| margin.per_s),
+            common_mode_rate_per_s: rates.common_mode_per_s,
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certified_until_s: certificate.certified_until_s,
@@ -192,22 +196,19 @@ impl Preflight {
                 .iter()
                 .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
                 .collect(),
-            breathes: law.settling().is_some() && scenario.breathing.is_on(),
-            reassigns: law.settling().is_some()
+            breathes: capabilities.settling.is_some() && scenario.breathing.is_on(),
+            reassigns: capabilities.settling.is_some()
                 && scenario.breathing.is_on()
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
-            needs: law.needs().to_vec(),
+            needs: capabilities.needs.to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
             certified_edges_m: None,
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
             dt_s: scenario.time.dt_s,
-            dt_max_s: law.fastest_rate_per_s(certificate.certified_m, scenario.velocity_coefficient_per_s()).map(
-                |rate_per_s| {
-                    let beside = certificate.certified_room_m.map_or(0.0, |room_m| law.obstacle_rate_squared(room_m));
-                    scenario.time.honest_rate_dt() / rate_per_s.hypot(beside.sqrt())
-                },
-            ),
+            dt_max_s: rates
+                .fastest_per_s
+                .map(|rate_per_s| scenario.time.honest_rate_dt() / rate_per_s.hypot(rates.obstacles_per_s2.sqrt())),
             dt_links_s: scenario.links_step_s(law),
             margins: margins::margins(law, scenario),
             samples: scenario.time.samples(),
@@ -219,22 +220,22 @@ impl Preflight {
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
             warnings: Vec::new(),
             vehicle: scenario.airframe.quadrotor().cloned(),
-            controls: law.controls(),
+            controls: capabilities.controls,
             links_all: scenario.graph.is_complete(),
-            barrier_m: law.barrier_m(),
+            barrier_m: capabilities.barrier_m,
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
         // The law has a copy of the graph, and has asked it for the eigenvalues behind its rates by now.
         if scenario.graph.connectivity_is_bound() {
             found.connectivity_is = Connectivity::Bound;
         }
-        let undamped = found.relative_velocity_unstable(law, scenario);
+        let undamped = relative_velocity_unstable(rates.velocity_margin);
         if scenario.wind.is_still()
             && certificate.void == [Void::GraphNotComplete]
             && found.velocity_margin_per_s.is_some()
             && undamped.is_none()
         {
-            found.certified_edges_m = law.linked_separation_m(&start);
+            found.certified_edges_m = certificate.linked_m;
         }
         let trap = if found.trap_dimension() == Some(2) { Code::StartInPlane } else { Code::StartOnLine };
         let warnings = [
@@ -263,17 +264,6 @@ impl Preflight {
     #[must_use]
     pub fn refuses(&self) -> bool {
         !self.refusing().is_empty()
-    }
-
-    fn relative_velocity_unstable(&self, law: &dyn Law, scenario: &Scenario) -> Option<String> {
-        let margin = law.velocity_margin(self.algebraic_connectivity, scenario.velocity_coefficient_per_s())?;
-        (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
-            let rate = numbers::rate(margin.per_s);
-            format!(
-                "Relative velocities are not damped: their margin is {rate} 1/s and must be positive. {}",
-                margin.remedy
-            )
-        })
     }
 
     fn controls_distances(&self) -> bool {
@@ -374,6 +364,18 @@ fn motion_dimension(start: &Swarm) -> usize {
         }
     }
     affine_dimension(&directions, FLATNESS)
+}
+
+/// A warning where relative velocities are not damped.
+fn relative_velocity_unstable(margin: Option<VelocityMargin>) -> Option<String> {
+    let margin = margin?;
+    (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
+        let rate = numbers::rate(margin.per_s);
+        format!(
+            "Relative velocities are not damped: their margin is {rate} 1/s and must be positive. {}",
+            margin.remedy
+        )
+    })
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ impl Scenario {
         }
         if self.breathing.mode == BreathingMode::Start
             && let Ok(law) = self.law()
-            && law.settling().is_none()
+            && law.capabilities().settling.is_none()
         {
             return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
                 .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")

@@ -59,7 +59,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     let Ok(law) = scenario.law() else { return Ok(None) };
     let leads = scenario.reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
     // Wherever a leader is, slots are moved there.
-    let freedom = if leads { Freedom::Translation } else { law.controls().freedom() };
+    let freedom = if leads { Freedom::Translation } else { law.capabilities().controls.freedom() };
     let most = most_assigned(freedom);
     if scenario.count() > most {
         return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
@@ -77,7 +77,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
         return Ok(false);
     }
     let Ok(law) = scenario.law() else { return Ok(false) };
-    let why = match (law.settling(), scenario.breathing.is_on()) {
+    let why = match (law.capabilities().settling, scenario.breathing.is_on()) {
         (Some(_), true) => return Ok(true),
         (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
         (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),

@@ -60,8 +60,8 @@ impl Scenario {
     /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
-        let ignored = !self.obstacles.is_empty() && !law.keeps_clear_of_obstacles();
-        let is_uncounted = !self.wind.is_still() && !law.reckons_with_wind();
+        let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
+        let is_uncounted = !self.wind.is_still() && !law.capabilities().certifies_under_wind;
         self.as_far_as_told(self.promised(law))
             .void_where(ignored, Void::ObstaclesUnknown)
             .void_where(is_uncounted, Void::Windblown)
@@ -70,14 +70,14 @@ impl Scenario {
     /// Of every leg, with the breath that it begins with where it does.
     fn promised(&self, law: &dyn Law) -> Certificate {
         let start = self.observation(&self.start);
-        if self.breathing.mode != BreathingMode::Start || law.settling().is_none() {
+        if self.breathing.mode != BreathingMode::Start || law.capabilities().settling.is_none() {
             let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
-            return law.certificate_through(&start, &ahead);
+            return law.certificate(&start, &ahead);
         }
         let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
         let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
         let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
-        let mut promised = law.certificate_through(&start, &ahead);
+        let mut promised = law.certificate(&start, &ahead);
         // What holds on a leg is what holds once its slots have come together.
         promised.legs = promised.legs.into_iter().skip(2).step_by(2).collect();
         if self.legs.len() < 2 {

@@ -10,7 +10,7 @@ impl Scenario {
         let Safety::Ellipsoid { half_height_m } = self.safety else { return Ok(()) };
         positive("safety.half_axes_m", "half of the height of the ellipsoid", half_height_m)?;
         let Ok(law) = self.law() else { return Ok(()) };
-        if law.keeps_ellipsoids() {
+        if law.capabilities().uses_ellipsoid_metric {
             return Ok(());
         }
         Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))

@@ -3,8 +3,7 @@
 use super::limits::{MAX_HALVINGS, MAX_STEPS};
 use super::spec::Scenario;
 use super::time::TimeSpec;
-use tautline_laws::law::Law;
-use tautline_laws::law::LawSpec;
+use tautline_laws::law::{Law, LawSpec, RateQuery};
 
 impl TimeSpec {
     /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
@@ -25,7 +24,8 @@ impl Scenario {
     /// Longest step that a law's links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
     #[must_use]
     pub fn links_step_s(&self, law: &dyn Law) -> Option<f64> {
-        let rate_per_s = law.fastest_rate_per_s(Some(f64::INFINITY), self.velocity_coefficient_per_s())?;
+        let rate_per_s =
+            law.rates(&RateQuery::new(self.velocity_coefficient_per_s(), Some(f64::INFINITY))).fastest_per_s?;
         (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.honest_rate_dt() / rate_per_s)
     }
 
@@ -56,7 +56,8 @@ impl Scenario {
         let LawSpec::Potential(_) = self.law else { return };
         let Ok(law) = self.law() else { return };
         let certified_m = self.certificate(law.as_ref()).certified_m;
-        let Some(rate_per_s) = law.fastest_rate_per_s(certified_m, self.velocity_coefficient_per_s()) else { return };
+        let query = RateQuery::new(self.velocity_coefficient_per_s(), certified_m);
+        let Some(rate_per_s) = law.rates(&query).fastest_per_s else { return };
         while self.time.max_halvings < MAX_HALVINGS
             && self.time.shortest_step_s() * rate_per_s > self.time.honest_rate_dt()
         {

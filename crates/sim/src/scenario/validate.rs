@@ -170,11 +170,18 @@ impl Scenario {
             Err(ScenarioError::new(said).with_help(help).at(key).at("law.kind"))
         };
         match self.law() {
-            Ok(law) if law.controls() != Controls::Places => {
+            Ok(law) if law.capabilities().controls != Controls::Places => {
                 let follows = |spec: &LawSpec| {
                     let guidance = Guidance { known_by: Pinning::All, ..guidance.clone() };
                     let other = Self { law: spec.clone(), reference: Some(guidance), ..self.clone() };
-                    Some(other.law().ok().filter(|law| law.controls() == Controls::Places)?.name().to_owned())
+                    Some(
+                        other
+                            .law()
+                            .ok()
+                            .filter(|law| law.capabilities().controls == Controls::Places)?
+                            .name()
+                            .to_owned(),
+                    )
                 };
                 let laws: Vec<_> = LawSpec::all().iter().filter_map(follows).collect();
                 let help = format!("set law.kind to one that does ({}), or leave out [reference]", laws.join(", "));

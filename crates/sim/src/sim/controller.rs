@@ -65,7 +65,7 @@ impl Controller {
             self.law.follow(&self.target.view())?;
         }
         let Some(command) = command else { return Ok(()) };
-        if let Some(range_m) = self.law.sensing_range_m() {
+        if let Some(range_m) = self.law.capabilities().sensing_range_m {
             let from = match sensed.others {
                 Others::Shared => None,
                 Others::Held(picture) => picture.near_from(),
@@ -105,7 +105,7 @@ impl Controller {
             ahead.insert(0, target.formation);
         }
         let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
-        Some((change, self.law.certificate_through(&start, &ahead)))
+        Some((change, self.law.certificate(&start, &ahead)))
     }
 
     /// All random numbers begin anew.

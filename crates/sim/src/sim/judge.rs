@@ -210,10 +210,13 @@ impl Judge {
         (start, path, end): (&Swarm, &Path, &Swarm),
         moved_m: f64,
     ) -> bool {
-        let Some(barrier_m) = law.barrier_m() else { return false };
+        let Some(barrier_m) = law.capabilities().barrier_m else { return false };
         let start = &start.positions_m;
         let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
-        if moved_m > 0.5 * self.room_m && law.keeps_clear_of_obstacles() && self.nears_an_obstacle(start, path, end) {
+        if moved_m > 0.5 * self.room_m
+            && law.capabilities().avoids_obstacles
+            && self.nears_an_obstacle(start, path, end)
+        {
             return true;
         }
         // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
@@ -227,7 +230,7 @@ impl Judge {
             let least_m = barrier_m + 0.5 * (from.norm() - barrier_m);
             instants().map(apart).any(|to| swept_separation_m(std::mem::replace(&mut from, to), to) < least_m)
         };
-        if law.sensing_range_m().is_none() {
+        if law.capabilities().sensing_range_m.is_none() {
             return links.edges().any(loses_half);
         }
         // A pair that begins farther apart keeps half of its clearance.
@@ -238,7 +241,7 @@ impl Judge {
     /// Lower bound of the present separations of the pairs that the law acts on, in the judge's lengths: all pairs where the
     /// law senses, else those with a link. It costs a look at every edge of a graph that is not complete.
     pub(super) fn nearest_acted_on_m(&self, law: &dyn Law, links: &Graph, state: &Swarm) -> f64 {
-        if law.sensing_range_m().is_some() || links.is_complete() {
+        if law.capabilities().sensing_range_m.is_some() || links.is_complete() {
             return self.nearest_m;
         }
         let apart = |(i, j)| self.metric.scaled(row(&state.positions_m, j) - row(&state.positions_m, i)).norm();
@@ -267,7 +270,7 @@ impl Judge {
             let passes = instants().map(apart).map(|to| swept_separation_m(std::mem::replace(&mut from, to), to));
             passes.fold(f64::INFINITY, f64::min)
         };
-        if law.sensing_range_m().is_none() {
+        if law.capabilities().sensing_range_m.is_none() {
             links.edges().map(swept_m).fold(f64::INFINITY, f64::min)
         } else {
             let ratio = metric.ratio().max(1.0 / metric.ratio());

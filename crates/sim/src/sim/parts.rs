@@ -31,10 +31,10 @@ impl Parts {
     /// What the scenario asks for, under another law.
     #[must_use]
     pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
-        let link = link::of(scenario, law.sensing_range_m().is_some());
-        let supervisor =
-            Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(law.controls().freedom());
-        let supervisor = match law.settling() {
+        let link = link::of(scenario, law.capabilities().sensing_range_m.is_some());
+        let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival)
+            .free_by(law.capabilities().controls.freedom());
+        let supervisor = match law.capabilities().settling {
             Some(settling) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
                 supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())

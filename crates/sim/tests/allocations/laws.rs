@@ -52,7 +52,7 @@ pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
         let setting = Setting::new(&links, &formation, 0.8, 0.1);
         let mut law = spec.complete(0.1).build(&setting).expect("a law");
         let mut near = NearPairs::default();
-        near.update(&crowd.positions_m, law.sensing_range_m().unwrap_or(0.0));
+        near.update(&crowd.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
         let at = Observation { near: near.pairs(), ..Observation::exact(&crowd, &links, &formation) };
         law.command(&at, &mut control).expect("a state clear of delta");
         let region = Region::new(ALLOCATOR);

@@ -173,7 +173,7 @@ fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
 fn a_hard_throw_stays_above_its_certificate_although_trial_steps_leave_the_law() {
     let (mut law, start) = thrown(40.0);
     let certified_m =
-        law.certificate(&from(start.clone(), 0.0).observation(&start)).certified_m.expect("a certificate");
+        law.certificate(&from(start.clone(), 0.0).observation(&start), &[]).certified_m.expect("a certificate");
     let solved = solve_under(&mut law, &start, 0.0, &[5.0], Tolerances::default()).expect("a solution");
     let closest = solved.closest.expect("a closest approach");
     assert!(certified_m < 2.01, "the throw is hard: {certified_m}");

@@ -327,7 +327,7 @@ proptest! {
     #[test]
     fn the_certified_separation_lies_between_delta_and_the_start(case in cases()) {
         let law = case.edge_tension(&Graph::complete(case.swarm.count()))?;
-        let certificate = law.certificate(&exact(&case.swarm, &case.formation));
+        let certificate = law.certificate(&exact(&case.swarm, &case.formation), &[]);
         prop_assert!(certificate.void.is_empty());
         let certified_m = certificate.certified_m.ok_or_else(|| fail("nothing certified"))?;
         let closest_m = closest_pair(&case.swarm.positions_m).map_or(f64::NAN, |(_, distance_m)| distance_m);

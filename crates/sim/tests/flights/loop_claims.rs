@@ -10,7 +10,7 @@ use tautline_audit::Status;
 use tautline_core::record::{Event, OwnedSample};
 use tautline_core::swarm::{Pair, Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
-use tautline_laws::law::{LaplacianKeys, Law, LawError, LawSpec};
+use tautline_laws::law::{Capabilities, LaplacianKeys, Law, LawError, LawSpec};
 use tautline_laws::observation::Observation;
 use tautline_sim::plant::{Path, Plant, PlantError, rapier};
 use tautline_sim::scenario::Scenario;
@@ -51,8 +51,8 @@ impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Clone + Send> La
         self.inner.energy(at)
     }
 
-    fn barrier_m(&self) -> Option<f64> {
-        self.inner.barrier_m()
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { barrier_m: self.inner.capabilities().barrier_m, ..Capabilities::default() }
     }
 }
 
@@ -334,8 +334,8 @@ impl Law for Asked {
         Ok(())
     }
 
-    fn stays_in_its_thread(&self) -> bool {
-        self.stays
+    fn capabilities(&self) -> Capabilities {
+        Capabilities { requires_calling_thread: self.stays, ..Capabilities::default() }
     }
 }
 

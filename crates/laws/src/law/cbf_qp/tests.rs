@@ -103,9 +103,9 @@ fn who_is_alone_flies_as_the_nominal_controller_says() {
 #[test]
 fn how_fast_the_law_is_is_known_of_vehicles_that_are_alone() {
     let law = law(&Formation::grid(2, 9.0));
-    let rate_per_s = |nearest_m: f64| law.fastest_rate_per_s(Some(nearest_m), 0.1);
+    let rate_per_s = |nearest_m: f64| law.rates(&RateQuery::new(0.1, Some(nearest_m))).fastest_per_s;
     assert_eq!(rate_per_s(law.range_m.next_up()), Some(law.keys.c_per_s.max(law.keys.k_per_s2.sqrt())));
-    assert_eq!((rate_per_s(law.range_m), law.fastest_rate_per_s(None, 0.1)), (None, None));
+    assert_eq!((rate_per_s(law.range_m), law.rates(&RateQuery::new(0.1, None)).fastest_per_s), (None, None));
 }
 
 #[test]

@@ -148,7 +148,7 @@ proptest! {
                 let later = [next.clone()];
                 let law = law(&links, &formation, &later, &guidance(&known_by));
                 let before = observation(&swarm, &links, &formation, moving());
-                let certificate = law.certificate_through(&before, &[&next.formation]);
+                let certificate = law.certificate(&before, &[&next.formation]);
                 let after = law.energy(&observation(&swarm, &links, &next.formation, moving())).expect("an energy");
                 let [first, second] = certificate.legs[..] else { panic!("{certificate:?}") };
                 // A leader's own slot is not to move: errors are counted from it.
@@ -225,7 +225,7 @@ fn a_reference_that_nobody_is_told_of_certifies_nothing_unless_it_rests() {
     for (motion, holds) in [(at_rest, true), (guidance(&Pinning::All).motion, false)] {
         let untold = Guidance { motion, feed_forward: false, known_by: Pinning::All };
         let law = law(&links, &formation, &[], &untold);
-        let certificate = law.certificate(&observation(&swarm, &links, &formation, untold.motion.at(0.0)));
+        let certificate = law.certificate(&observation(&swarm, &links, &formation, untold.motion.at(0.0)), &[]);
         assert_eq!(certificate.certified_m.is_some(), holds);
         assert_eq!(certificate.void.contains(&Void::ReferenceNotFed), !holds);
     }

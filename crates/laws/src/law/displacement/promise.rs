@@ -26,6 +26,7 @@ impl DisplacementLaw {
             certified_until_s: until_s,
             certified_room_m,
             energy_initial: Some(energy),
+            linked_m: None,
             void: Vec::new(),
             legs,
         }

@@ -19,7 +19,7 @@ fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
 
 fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
     let mut near = NearPairs::default();
-    near.update(&at.own.positions_m, law.sensing_range_m().expect("a range"));
+    near.update(&at.own.positions_m, law.capabilities().sensing_range_m.expect("a range"));
     let mut command = Rows::from_element(at.own.count(), f64::NAN);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
 }
@@ -173,7 +173,7 @@ proptest! {
             let formation = Formation::grid(7, 2.0);
             let law = law(&links, &formation);
             let Certificate { certified_m, energy_initial, void, .. } =
-                law.certificate(&Observation::exact(&swarm, &links, &formation));
+                law.certificate(&Observation::exact(&swarm, &links, &formation), &[]);
             let (certified_m, energy) = (certified_m.expect("certified"), energy_initial.expect("an energy"));
             prop_assert!(void.is_empty() && certified_m > DELTA_M && certified_m <= 2.0);
             prop_assert!((law.tension.value(certified_m) - energy).abs() < 1e-9 * energy);
@@ -208,7 +208,7 @@ fn what_has_no_law_is_refused() {
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
     let at = Observation::exact(&touching, &links, &formation);
     assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
-    assert!(matches!(law(&links, &formation).certificate(&at).void[..], [Void::StartRefused(_)]));
+    assert!(matches!(law(&links, &formation).certificate(&at, &[]).void[..], [Void::StartRefused(_)]));
 
     let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
     let line = Formation::line(4, 2.0);
@@ -224,11 +224,11 @@ fn what_has_no_law_is_refused() {
 #[test]
 fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
     let law = law(&Graph::complete(7), &Formation::grid(7, 2.0));
-    let rate = |nearest_m| law.fastest_rate_per_s(Some(nearest_m), A22_PER_S).expect("a rate");
-    let rest_m = law.sensing_range_m().expect("a range");
+    let rate = |nearest_m| law.rates(&RateQuery::new(A22_PER_S, Some(nearest_m))).fastest_per_s.expect("a rate");
+    let rest_m = law.capabilities().sensing_range_m.expect("a range");
     assert_eq!(rate(rest_m), rate(50.0 * rest_m));
     assert!(rate(rest_m.next_down()) > rate(rest_m) && rate(1.01 * DELTA_M) > rate(rest_m.next_down()));
-    assert_eq!(law.fastest_rate_per_s(None, A22_PER_S), None);
+    assert_eq!(law.rates(&RateQuery::new(A22_PER_S, None)).fastest_per_s, None);
 }
 
 /// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how far that

@@ -43,7 +43,7 @@ fn pentagon_law() -> EdgeTensionLaw {
 #[test]
 fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference() -> Result<(), LawError> {
     let (mut law, start) = (pentagon_law(), pentagon_start());
-    let certificate = law.certificate(&exact(&start));
+    let certificate = law.certificate(&exact(&start), &[]);
     assert_eq!(certificate.void, []);
     assert!((certificate.energy_initial.unwrap_or(f64::NAN) - 3.656_742_96).abs() < ENERGY_TOLERANCE);
     assert!((certificate.certified_m.unwrap_or(f64::NAN) - 2.055_307).abs() < CERTIFIED_TOLERANCE_M);
@@ -58,8 +58,8 @@ fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference(
 #[test]
 fn the_circle_starts_with_the_energy_and_certificate_of_the_reference() {
     let positions_m = Rows::from_fn(6, |i, axis| [2.0 * i as f64, if i == 0 { 0.05 } else { 0.0 }, 0.0][axis]);
-    let certificate =
-        law(&Graph::complete(6), &Formation::circle(6, 1.5), 1.0).certificate(&exact(&Swarm::at_rest(positions_m)));
+    let certificate = law(&Graph::complete(6), &Formation::circle(6, 1.5), 1.0)
+        .certificate(&exact(&Swarm::at_rest(positions_m)), &[]);
     assert_eq!(certificate.void, []);
     assert!((certificate.energy_initial.unwrap_or(f64::NAN) - 4.479_772_16).abs() < ENERGY_TOLERANCE);
     assert!((certificate.certified_m.unwrap_or(f64::NAN) - 1.019_476).abs() < CERTIFIED_TOLERANCE_M);
@@ -69,7 +69,7 @@ fn the_circle_starts_with_the_energy_and_certificate_of_the_reference() {
 fn the_certificate_is_the_smallest_root_over_all_pairs() {
     let (law, mut start, formation) = (pentagon_law(), pentagon_start(), Formation::pentagon(3.0));
     start.velocities_m_s[(2, 1)] = 1.5;
-    let certificate = law.certificate(&exact(&start));
+    let certificate = law.certificate(&exact(&start), &[]);
     let bound = 5.0 * certificate.energy_initial.unwrap_or(f64::NAN);
     let smallest = Graph::complete(5)
         .edges()
@@ -77,22 +77,22 @@ fn the_certificate_is_the_smallest_root_over_all_pairs() {
         .map(|tension| tension.push_side_root(bound))
         .fold(f64::INFINITY, f64::min);
     assert_eq!(certificate.certified_m, Some(smallest));
-    let at_rest = law.certificate(&exact(&pentagon_start()));
+    let at_rest = law.certificate(&exact(&pentagon_start()), &[]);
     assert!(certificate.certified_m < at_rest.certified_m);
 }
 
 #[test]
 fn the_certificate_says_why_it_is_void() {
     let (graph, formation) = (Graph::ring(5), Formation::pentagon(3.0));
-    let on_ring = law(&graph, &formation, 2.0).certificate(&exact(&pentagon_start()));
+    let on_ring = law(&graph, &formation, 2.0).certificate(&exact(&pentagon_start()), &[]);
     assert_eq!((on_ring.certified_m, on_ring.void), (None, vec![Void::GraphNotComplete]));
     assert!(on_ring.energy_initial.is_some());
 
     let mut touching = pentagon_start();
     touching.positions_m[(1, 0)] -= 1.5;
-    let certificate = law(&graph, &formation, 2.0).certificate(&exact(&touching));
+    let certificate = law(&graph, &formation, 2.0).certificate(&exact(&touching), &[]);
     assert_eq!(certificate.void.len(), 2);
-    let certificate = pentagon_law().certificate(&exact(&touching));
+    let certificate = pentagon_law().certificate(&exact(&touching), &[]);
     assert_eq!((certificate.certified_m, certificate.energy_initial), (None, None));
     assert!(matches!(certificate.void[..], [Void::StartRefused(LawError::Collision { .. })]));
 }
@@ -149,7 +149,7 @@ fn states_that_are_not_finite_or_of_another_swarm_are_refused() {
                     assert_eq!(law.matrix_form(&swarm), Err(LawError::NotFinite { vehicle }));
                     assert_eq!(law.energy(&exact(&swarm)), None);
                     assert_eq!(
-                        law.certificate(&exact(&swarm)).void,
+                        law.certificate(&exact(&swarm), &[]).void,
                         [Void::StartRefused(LawError::NotFinite { vehicle })]
                     );
                 }
@@ -215,10 +215,11 @@ fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
             certified_until_s: None,
             certified_room_m: None,
             energy_initial: Some(0.0),
+            linked_m: None,
             void: vec![],
             legs: vec![],
         };
-        assert_eq!(law.certificate(&exact(&swarm)), expected);
+        assert_eq!(law.certificate(&exact(&swarm), &[]), expected);
     }
     Ok(())
 }

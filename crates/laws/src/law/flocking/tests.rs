@@ -76,7 +76,7 @@ proptest! {
         let pull = |along: Vector3<f64>| law.pull_m_s2(Vector3::new(length_m, 0.0, 0.0) + along, Vector3::zeros());
         let slope = |along: Vector3<f64>| (pull(along * STEP_M) - pull(-along * STEP_M)).norm() / (2.0 * STEP_M);
         // Two vehicles: the rate is a bound on the roots of x'' + 2 c2 x' + 2 K x.
-        let rate = law.fastest_rate_per_s(Some(length_m), 0.0).expect("a rate");
+        let rate = law.rates(&RateQuery::new(0.0, Some(length_m))).fastest_per_s.expect("a rate");
         for stiff in [slope(Vector3::x()), slope(Vector3::y())] {
             prop_assert!(2.0 + (4.0 + 2.0 * stiff).sqrt() <= rate + 1e-6, "{stiff} {rate}");
         }

@@ -59,12 +59,12 @@ fn at_the_slots_moving_together_nothing_is_asked_for() -> Result<(), Box<dyn std
 fn nothing_is_certified_and_an_energy_is_given_only_where_it_is_one() -> Result<(), ParameterError> {
     let (formation, swarm) = (Formation::grid(6, 2.0), swarm(6));
     let law = |graph: &Graph, f1| LaplacianLaw::new(graph, &formation, f1, 1.1);
-    let certificate = law(&Graph::complete(6), 1.0)?.certificate(&exact(&swarm, &formation));
+    let certificate = law(&Graph::complete(6), 1.0)?.certificate(&exact(&swarm, &formation), &[]);
     assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::NoBarrier]));
     assert!(certificate.energy_initial.is_some_and(|energy| energy > 0.0));
     assert_eq!(law(&Graph::complete(6), -1.0)?.energy(&exact(&swarm, &formation)), None);
     assert_eq!(law(&Graph::ring(6), 1.0)?.energy(&exact(&swarm, &formation)), None);
-    assert_eq!(law(&Graph::complete(6), 1.0)?.barrier_m(), None);
+    assert_eq!(law(&Graph::complete(6), 1.0)?.capabilities().barrier_m, None);
     Ok(())
 }
 

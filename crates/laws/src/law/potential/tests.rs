@@ -56,7 +56,7 @@ proptest! {
     fn nobody_nearer_than_certified_has_more_repulsion_than_there_is_energy(swarm in swarms()) {
         let (links, formation) = (Graph::star(7), Formation::grid(7, 2.0));
         let law = law(&links, &formation);
-        let certificate = law.certificate(&Observation::exact(&swarm, &links, &formation));
+        let certificate = law.certificate(&Observation::exact(&swarm, &links, &formation), &[]);
         let (certified_m, energy) = (certificate.certified_m.expect("certified"), certificate.energy_initial.expect("energy"));
         let (steep, _) = law.steepness(Pair::new(0, 1), certified_m).expect("above delta");
         prop_assert!((0.5 * 0.4 * steep * steep - energy).abs() < 1e-9 * energy);
@@ -76,12 +76,12 @@ fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_not
     let fed = PotentialLaw::new(&setting, PotentialKeys::default()).expect("finite gains");
     let apart = Swarm::at_rest(formation.slots_m.clone());
     let at = Observation::exact(&apart, &links, &formation);
-    assert_eq!(fed.certificate(&at).void, [Void::VelocityUndamped]);
+    assert_eq!(fed.certificate(&at, &[]).void, [Void::VelocityUndamped]);
 
     let keys = PotentialKeys { max_accel_m_s2: Some(0.5), ..PotentialKeys::default() };
     let setting = Setting { a22_per_s: 0.0, ..setting };
     let mut limited = PotentialLaw::new(&setting, keys).expect("finite gains");
-    assert_eq!(limited.certificate(&at).void, [Void::CommandLimited]);
+    assert_eq!(limited.certificate(&at, &[]).void, [Void::CommandLimited]);
     let near = Swarm::at_rest(Formation::line(2, 1.1 * DELTA_M).slots_m);
     let pushed = command(&mut limited, &Observation::exact(&near, &links, &formation)).expect("a command");
     assert!((pushed[(0, 0)] + 0.5).abs() < 1e-12 && (pushed[(1, 0)] - 0.5).abs() < 1e-12, "{pushed}");
@@ -95,20 +95,21 @@ fn rates_are_those_of_the_potential_s_second_derivative_and_of_the_braking() {
     for l_m in [1.1, 1.4, 1.8] {
         let curved = potential(l_m + STEP_M) - 2.0 * potential(l_m) + potential(l_m - STEP_M);
         let omega_squared = 0.7 + 2.0 * curved / (STEP_M * STEP_M);
-        let (rate, half) = (law.fastest_rate_per_s(Some(l_m), A22_PER_S).expect("a rate"), 0.5 * (1.1 - A22_PER_S));
+        let (rate, half) =
+            (law.rates(&RateQuery::new(A22_PER_S, Some(l_m))).fastest_per_s.expect("a rate"), 0.5 * (1.1 - A22_PER_S));
         let expected = half + (half * half + omega_squared).sqrt();
         assert!((rate - expected).abs() < 1e-5 * expected, "{l_m}: {rate} {expected}");
     }
-    let margin = law.velocity_margin(0.0, A22_PER_S).expect("it brakes");
+    let margin = law.rates(&RateQuery::new(A22_PER_S, None)).velocity_margin.expect("it brakes");
     assert_eq!([margin.per_s, margin.terms_per_s], [1.1 - A22_PER_S, 1.1 + A22_PER_S]);
-    assert_eq!(law.common_mode_rate_per_s(A22_PER_S), A22_PER_S - 1.1);
+    assert_eq!(law.rates(&RateQuery::new(A22_PER_S, None)).common_mode_per_s, A22_PER_S - 1.1);
 }
 
 #[test]
 fn no_more_push_a_vehicle_than_balls_fit_around_it() {
     let rate_per_s = |count: usize| {
         let law = law(&Graph::star(count), &Formation::grid(count, 2.0));
-        law.fastest_rate_per_s(Some(0.75 * law.range_m), A22_PER_S).expect("a rate")
+        law.rates(&RateQuery::new(A22_PER_S, Some(0.75 * law.range_m))).fastest_per_s.expect("a rate")
     };
     // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by their volume, one of them
     // the vehicle's own.

@@ -11,7 +11,7 @@ use crate::feedback::Feedback as _;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
 use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
-use tautline_laws::law::{Law, LawError, Void};
+use tautline_laws::law::{Law, LawError, RateQuery, Void};
 
 /// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
 /// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
@@ -127,7 +127,7 @@ impl Simulation {
             return;
         }
         let moved_m = longest_move_m(&self.state, &self.path, &self.next);
-        let limits_m_s2 = [self.controller.law.max_command_m_s2(), self.scenario.actuation.max_accel_m_s2];
+        let limits_m_s2 = [self.controller.law.capabilities().max_command_m_s2, self.scenario.actuation.max_accel_m_s2];
         let limit_m_s2 = limits_m_s2.into_iter().flatten().fold(f64::INFINITY, f64::min);
         let part = Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
         let error = self.error.unwrap_or_default().after(part);
@@ -165,7 +165,9 @@ impl Simulation {
             ..
         } = self;
         let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
-        let Some(barrier_m) = law.barrier_m().filter(|_| !*overruled) else { return (false, at_start_per_s) };
+        let Some(barrier_m) = law.capabilities().barrier_m.filter(|_| !*overruled) else {
+            return (false, at_start_per_s);
+        };
         let moved_m = longest_move_m(state, path, next);
         if !motion.holds_commands() {
             return (judge.refuses(of, moves, moved_m), at_start_per_s);
@@ -203,7 +205,7 @@ impl Simulation {
             self.motion.apply(&self.control, &mut self.state);
         }
         let Self { judge, controller, state, control, time_s, events, .. } = self;
-        let may_move = !controller.law.stays_in_its_thread();
+        let may_move = !controller.law.capabilities().requires_calling_thread;
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
         let mut audit = || {
             let began = Instant::now();
@@ -267,8 +269,10 @@ impl Simulation {
 
 /// The fastest rate of a law \[1/s\] where no two are nearer and no obstacle leaves less room \[m\].
 fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, room_m): (f64, f64)) -> f64 {
-    let of_pairs = law.fastest_rate_per_s(Some(nearest_m), scenario.velocity_coefficient_per_s()).unwrap_or(0.0);
-    match law.obstacle_rate_squared(room_m) {
+    let query = RateQuery::new(scenario.velocity_coefficient_per_s(), Some(nearest_m));
+    let rates = law.rates(&RateQuery { obstacle_room_m: Some(room_m), ..query });
+    let of_pairs = rates.fastest_per_s.unwrap_or(0.0);
+    match rates.obstacles_per_s2 {
         0.0 => of_pairs,
         squared => (of_pairs.powi(2) + squared).sqrt(),
     }
