@@ -34,7 +34,7 @@ thread_local! {
 
 /// Does work that may ask laws, in this thread, and returns the exception that one of them raised beside what was done.
 ///
-/// A law is asked in the thread that flies ([`Law::stays_in_its_thread`]), so an exception belongs to the work of its own thread, and no
+/// The law runs on the calling thread ([`Capabilities::requires_calling_thread`]), so an exception belongs to the work of its own thread, and no
 /// other simulation finds it. Calls may lie within each other: a law may step another simulation.
 pub(crate) fn catching<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
     let outer = RAISED.take();

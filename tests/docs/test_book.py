@@ -19,6 +19,9 @@ OF_ANOTHER = ("thrust_n_per_rpm2",)
 
 ITEM = re.compile(r"^- \[([^\]]+)\]\(([\w-]+\.md)\)(: .+)?$", re.MULTILINE)
 
+AREAS = "scenario recording audit export request compare margin attack campaign render pictures files usage machine law simulation"
+CODE = re.compile(rf'"((?:{"|".join(AREAS.split())})/[a-z0-9-]+)"')
+
 sys.path.insert(0, str(DOCS))
 import scenario_reference  # noqa: E402
 
@@ -50,6 +53,13 @@ class Book(unittest.TestCase):
 
     def test_contents_and_index_name_every_page_and_links_stay_in_the_book(self) -> None:
         self.assertEqual(faults(DOCS), [])
+
+    def test_every_code_of_an_error_is_explained_and_no_other(self) -> None:
+        sources = [path for folder in ("src", "crates", "python/src") for path in (ROOT / folder).rglob("*.rs")]
+        written = {code for path in sources if "tests" not in path.parts for code in CODE.findall(path.read_text(encoding="utf-8"))}
+        explained = set(re.findall(r"`([a-z]+/[a-z0-9-]+)`", (DOCS / "errors.md").read_text(encoding="utf-8")))
+        self.assertGreater(len(written), 50)
+        self.assertEqual(written, explained)
 
     def test_what_is_wrong_with_a_book_is_found(self) -> None:
         right = {

@@ -27,7 +27,7 @@ pub struct Observation<'a> {
     pub target: Target<'a>,
     /// Who talks to whom.
     pub links: &'a Graph,
-    /// Pairs i < j within the law's sensing range ([`crate::law::Law::sensing_range_m`]) of each other, and perhaps some a
+    /// Pairs i < j within the law's sensing range ([`crate::law::Capabilities::sensing_range_m`]) of each other, and perhaps some a
     /// little farther apart, in index order; none for a law that senses nobody.
     pub near: &'a [(usize, usize)],
     /// What stands in the way.

@@ -152,7 +152,7 @@ impl Preflight {
     ///
     /// # The shortest part of a step
     /// [`crate::scenario::TimeSpec::max_rate_dt`] of the inverse of the fastest rate that the law can have while no pair comes nearer than its
-    /// certificate says, see [`Law::fastest_rate_per_s`].
+    /// certificate says, see [`Rates::fastest_per_s`](tautline_laws::law::Rates::fastest_per_s).
     ///
     /// # Errors
     /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.

@@ -340,7 +340,7 @@ impl Law for Asked {
 }
 
 #[test]
-fn a_law_that_stays_in_its_thread_is_asked_by_no_other_and_that_of_a_large_swarm_may_be() {
+fn a_law_that_requires_the_calling_thread_runs_on_no_other() {
     let grid = Formation::grid(600, 4.0);
     let scenario = Scenario::new("grid", Swarm::at_rest(grid.slots_m.clone()), grid, 2.0, 60.0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
