@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut timeline = Timeline::of(&scenario);
     sim::fly(&scenario, Parts::of(&scenario)?, &mut timeline, &mut |_step| ControlFlow::Continue(()))?;
 
-    let path = Path::new("circle.mp4");
+    let path = Path::new("circle.gif");
     let view = View { size_px: [960, 540], ..View::default() };
     let (extent, [start_s, end_s]) = (Extent::of(&timeline), timeline.range_s());
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;

@@ -49,7 +49,7 @@ pub(super) struct RenderArguments {
     /// A picture every so many seconds of the flight.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     every: Option<f64>,
-    /// A film: H.264 for .mp4, or .gif, or an animated .png.
+    /// A film: .mp4 (H.264; needs ffmpeg, or a build with --features film), .gif, or an animated .png.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
     /// A contact sheet of so many columns and rows.
@@ -121,7 +121,11 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     outputs::check(&[("the recording", recording)], &outputs)?;
     let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
-    if let Some((_, format)) = film {
+    if let Some((path, format)) = film {
+        if path.is_dir() {
+            let message = format!("{} is a folder, not a film", path.display());
+            return Err(Failure::input("files/is-directory", message, "name a file with --film"));
+        }
         format.check(view.size_px, fps)?;
     }
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
@@ -134,10 +138,6 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         writable(&folder)?;
     }
     if let Some((path, _)) = film {
-        if path.is_dir() {
-            let message = format!("{} is a folder, not a film", path.display());
-            return Err(Failure::input("usage/no-effect", message, "name a file with --film"));
-        }
         writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
     }
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());

@@ -119,7 +119,8 @@ fn every_kind_of_picture_is_written_where_it_is_asked_for() {
     assert_eq!(names(&at("b")), (1..=5).map(|k| format!("frame-0000{k}.png")).collect::<Vec<_>>());
     render(&["--sheet", "3x2", "--out", "c"]);
     assert_eq!(size_of(&at("c/sheet.png")), [159, 90]);
-    for film in ["d.mp4", "d.gif", "d.png"] {
+    let films: &[_] = if cfg!(feature = "film") { &["d.mp4", "d.gif", "d.png"] } else { &["d.gif", "d.png"] };
+    for film in films {
         render(&["--film", film, "--fps", "5"]);
         assert!(fs::metadata(at(film)).expect(film).len() > 1000, "{film}");
     }
@@ -205,6 +206,24 @@ fn places_beyond_all_measure_are_refused_with_vehicle_value_and_time() {
         assert!(text.contains("vehicle a has a coordinate of 1e300 m at 1 s; what is beyond 1e9 m"), "{text}");
     }
     assert_eq!(names(folder.path()), ["far.csv"]);
+}
+
+#[cfg(not(feature = "film"))]
+#[test]
+fn an_mp4_film_without_ffmpeg_is_refused_with_the_ways_to_get_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n")
+        .expect("written");
+    let done = std::process::Command::new(TAUTLINE)
+        .args(["render", "two.csv", "--film", "two.mp4"])
+        .current_dir(folder.path())
+        .env("PATH", "")
+        .output()
+        .expect("the program runs");
+    let err = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), MACHINE_FAILED, "{err}");
+    assert!(err.contains("render/no-ffmpeg") && err.contains("--features film") && err.contains(".gif"), "{err}");
+    assert!(!folder.path().join("two.mp4").exists());
 }
 
 #[test]

@@ -52,6 +52,9 @@ pub enum RenderError {
     /// The film was not given the pictures that it was made for, or its encoder failed.
     #[error("{0}")]
     Film(String),
+    /// Nothing here encodes MP4.
+    #[error("this build encodes MP4 films with ffmpeg, and there is no ffmpeg on PATH")]
+    NoFfmpeg,
     /// The film cannot be written.
     #[error("the film cannot be written: {0}")]
     Write(#[from] std::io::Error),
@@ -82,6 +85,7 @@ impl RenderError {
             Self::FilmRate(_) => "render/film-rate",
             Self::FilmSize(_) => "render/film-size",
             Self::Film(_) => "render/film",
+            Self::NoFfmpeg => "render/no-ffmpeg",
             Self::Write(_) => "files/cannot-write",
             Self::NoDisplay(_) => "render/no-display",
             Self::NoWindow(_) => "render/no-window",
@@ -93,7 +97,7 @@ impl RenderError {
     pub fn is_machine(&self) -> bool {
         use RenderError as E;
         let of_machine = matches!(self, E::NoAdapter | E::Driver(_) | E::NoDisplay(_) | E::NoWindow(_));
-        of_machine || matches!(self, E::Picture(_) | E::Film(_) | E::Write(_))
+        of_machine || matches!(self, E::Picture(_) | E::Film(_) | E::NoFfmpeg | E::Write(_))
     }
 
     /// What helps, where something does.
@@ -119,6 +123,7 @@ impl RenderError {
             E::FilmRate(_) => "give another rate with --fps",
             E::FilmSize(_) => "give another size with --size, or another format",
             E::Write(_) => "free some space or write to another folder",
+            E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif or .png film",
             E::NoDisplay(_) => "run it on a machine with a screen, or draw without one: tautline render RECORDING",
             E::Record(_) | E::Picture(_) | E::Film(_) | E::NoWindow(_) => return None,
         })

@@ -18,7 +18,6 @@
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 mod error;
-#[cfg(feature = "film")]
 mod film;
 mod foxglove_parts;
 mod foxglove_scene;
@@ -32,7 +31,6 @@ mod timeline;
 mod window;
 
 pub use error::{FARTHEST_M, RenderError};
-#[cfg(feature = "film")]
 pub use film::{Film, FilmFormat};
 pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, Renderer};

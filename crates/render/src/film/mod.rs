@@ -2,7 +2,10 @@
 
 mod apng;
 mod encoder;
+#[cfg(not(feature = "mp4"))]
+mod ffmpeg;
 mod gif;
+#[cfg(feature = "mp4")]
 mod mp4;
 
 use std::io::Write;
@@ -18,7 +21,7 @@ const MOST_FPS: u32 = 240;
 /// What a film is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilmFormat {
-    /// H.264 in MP4.
+    /// H.264 in MP4, by the encoder of the feature `mp4`, or else by `ffmpeg` on PATH.
     Mp4,
     /// GIF: 256 colours a picture, at most 50 pictures a second.
     Gif,
@@ -44,7 +47,8 @@ impl FilmFormat {
     /// Whether a film can have pictures of this size, so many a second.
     ///
     /// # Errors
-    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot.
+    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot, and [`RenderError::NoFfmpeg`] when nothing
+    /// here encodes MP4.
     pub fn check(self, size_px: [u32; 2], fps: u32) -> Result<(), RenderError> {
         let (name, most) = match self {
             Self::Mp4 => ("MP4", MOST_FPS),
@@ -61,6 +65,8 @@ impl FilmFormat {
             Self::Mp4 if width % 2 == 1 || height % 2 == 1 => "H.264 needs even sides",
             Self::Mp4 if shorter < 16 || longer > 3840 || shorter > 2160 => "from 16 x 16 to 3840 x 2160",
             Self::Gif if shorter == 0 || longer > u32::from(u16::MAX) => "a side has from 1 to 65535",
+            #[cfg(not(feature = "mp4"))]
+            Self::Mp4 => return ffmpeg::check(),
             _ => return Ok(()),
         };
         let what = format!("a {name} film cannot have pictures of {width} x {height} pixels: {why}");
@@ -96,7 +102,10 @@ impl<'a> Film<'a> {
             return Err(RenderError::Film("a film needs at least one picture".to_owned()));
         }
         let encoder: Box<dyn FilmEncoder + 'a> = match format {
+            #[cfg(feature = "mp4")]
             FilmFormat::Mp4 => Box::new(mp4::Mp4::new(out, size_px, fps)?),
+            #[cfg(not(feature = "mp4"))]
+            FilmFormat::Mp4 => Box::new(ffmpeg::Ffmpeg::new(out, size_px, fps)?),
             FilmFormat::Gif => Box::new(gif::Gif::new(out, size_px, fps)?),
             FilmFormat::Png => Box::new(apng::Apng::new(out, size_px, fps, pictures)?),
         };
