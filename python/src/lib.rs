@@ -52,6 +52,8 @@ mod _native {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyAnyMethods as _;
         crate::work::at_home();
+        // Errors of Python's own checks have no code.
+        module.getattr("Error")?.setattr("code", module.py().None())?;
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;
         tautline::campaign::Program::is_in(origin);
         Ok(())

@@ -32,8 +32,8 @@ __all__ = [
 class Error(ValueError):
     """The input is wrong: the message names the place, the value and the remedy, as the command line does."""
 
-    #: The stable name of the problem, such as ``audit/no-limit``, where the library found it.
-    code: str
+    #: The stable name of the problem, such as ``audit/no-limit`` (docs/errors.md); None where an argument has the wrong form.
+    code: str | None
 
 @final
 class Observation:

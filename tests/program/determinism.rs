@@ -6,11 +6,10 @@ use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// `state_hash` of the built-in scenarios. They may change with the engine's version, with what a built-in says, with
+/// `state_hash` of built-in scenarios; that of `pentagon` is in `crates/sim/tests/bits.rs`. They may change with the engine's version, with what a built-in says, with
 /// the law's arithmetic, and with what [`tautline::record::StateHash`] covers: each time for a reason that the changelog
 /// gives. They may not change with the machine, the build, the time or the number of threads.
-const GOLDEN: [(&str, &str); 4] = [
-    ("pentagon", "1ef867d816a4b35d28b03a15974b51e54e41794d8fda8a7d4904816baed91ae3"),
+const GOLDEN: [(&str, &str); 3] = [
     ("circle", "7c996884f60a7c94d0282adaf8ab57a7a999fca017b5c76aac033b7687045a96"),
     ("pentagon-laplacian", "d119c0b8f6301a5a56b0466c6b04bfdd9155c0979d3f37768febca5c68b40dbd"),
     ("pentagon-collinear", "153897ed935659071f997f590ec2f84e2fbaef17be8299cdfadaa78a84462762"),

@@ -85,6 +85,20 @@ class Arrays(Case):
         self.refuses(TypeError, "says how a file is read", lambda: tl.audit(t, p, delta=1, fps=30))
         self.refuses(TypeError, "unexpected keyword", lambda: tl.audit("a.csv", delta=1, bogus=1))
 
+    def test_an_error_has_the_code_of_its_problem(self) -> None:
+        t, p = passing()
+        for code, do in (
+            ("audit/no-limit", lambda: tl.audit(t, p)),
+            ("audit/limit-of-jumps", lambda: tl.audit(t, p, delta=1, motion="hold", limit={"speed": 5})),
+            ("audit/radius-and-ellipsoid", lambda: tl.audit(t, p, radius=0.1, ellipsoid=[1, 1, 2])),
+            ("scenario/unknown-key", lambda: tl.Scenario(set={"law.nope": 1})),
+            ("request/out-of-range", lambda: tl.compare("pentagon", runs=0)),
+            (None, lambda: tl.audit(t, p, delta=10**400)),
+        ):
+            with self.subTest(code), self.assertRaises(tl.Error) as caught:
+                do()
+            self.assertEqual(caught.exception.code, code)
+
     def test_many_vehicles_are_judged_and_not_refused(self) -> None:
         side = 300
         p = np.zeros((2, side * side, 2))
