@@ -14,6 +14,7 @@
 use std::error::Error;
 use std::ops::RangeInclusive;
 
+pub use tautline_report::request;
 use tautline_report::request::outputs::{Called, is_standard_output};
 use tautline_report::request::{Failure, Monitor};
 

@@ -1,13 +1,21 @@
-//! Flies a scenario to its report.
+//! Flies a scenario into a folder, as `tautline run` does, and audits the recording, as `tautline audit` does.
 
 use std::error::Error;
 
-use tautline_report::run::run;
-use tautline_report::scenario::{Scenario, Source};
+use tautline_report::request::{AuditRequest, RunRequest, ScenarioRequest, Silent, Subject, audit_files, run_into};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let report = run(&scenario, &mut ())?;
-    println!("{}", report.headline());
+    let folder = std::env::temp_dir().join("tautline-example-report");
+    let asked = ScenarioRequest::named("pentagon", &["time.duration_s=60".to_owned()])?;
+    let scenario = asked.read()?;
+    let command = asked.command("run", [], []);
+    let run = RunRequest { out: Some(folder.clone()), force: true, ..RunRequest::new(&scenario, command) };
+    // The second argument draws pictures; `tautline_render::RunPictures` does.
+    let flown = run_into(&run, &(), &Silent::default())?;
+    println!("{}", flown.report.headline());
+
+    let subject = Subject::Files { paths: vec![folder.join("run.mcap")], options: Box::default() };
+    let audited = audit_files(&AuditRequest::new(subject), &Silent::default())?;
+    println!("{}", audited.report.headline());
     Ok(())
 }
