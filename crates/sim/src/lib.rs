@@ -2,7 +2,7 @@
 //!
 //! [`Scenario`] is a validated flight, read from TOML or made in code; [`Simulation`] is stepped, saved and loaded. A law of
 //! your own implements [`Law`], a vehicle [`Plant`], an imperfection between the world and the law
-//! [`Link`]. Data flows one way:
+//! [`Imperfections`]. Data flows one way:
 //!
 //! ```text
 //! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples and events
@@ -34,7 +34,7 @@ pub mod scenario;
 pub mod sim;
 pub mod vehicle;
 
-pub use link::Link;
+pub use link::Imperfections;
 pub use plant::Plant;
 pub use scenario::Scenario;
 pub use sim::Simulation;

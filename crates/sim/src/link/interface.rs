@@ -1,4 +1,4 @@
-//! What a link is, and the one that does nothing.
+//! Imperfections between the true world and the law, and their absence.
 
 use dyn_clone::DynClone;
 
@@ -6,13 +6,14 @@ use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::observation::Others;
 
-/// What lies between truth and law.
+/// Turns the true state into what the vehicles know, and the commands of the law into accelerations: noise, delay, loss and
+/// limits.
 ///
 /// All of its memory (filters, messages under way, random numbers) is saved with a simulation, so it must be [`Clone`].
-pub trait Link: DynClone + Send {
+pub trait Imperfections: DynClone + Send {
     /// What the vehicles know at a time \[s\] at which the true state is `truth`.
     ///
-    /// In continuous time this is asked about trial states too, in any order of time; only what [`Link::accept`] is told
+    /// In continuous time this is asked about trial states too, in any order of time; only what [`Imperfections::accept`] is told
     /// has happened.
     fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a>;
 
@@ -45,7 +46,7 @@ pub trait Link: DynClone + Send {
         Vec::new()
     }
 
-    /// Writes the present values into channels of [`Link::channels`], in their order.
+    /// Writes the present values into channels of [`Imperfections::channels`], in their order.
     fn write_channels(&self, _channels: &mut [Channel]) {}
 
     /// What was sent over its network, where messages are sent one by one.
@@ -57,7 +58,7 @@ pub trait Link: DynClone + Send {
     fn reseed(&mut self, _seed: u64) {}
 }
 
-dyn_clone::clone_trait_object!(Link);
+dyn_clone::clone_trait_object!(Imperfections);
 
 /// What the vehicles know at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +85,7 @@ pub struct Traffic {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Direct;
 
-impl Link for Direct {
+impl Imperfections for Direct {
     fn sense<'a>(&'a mut self, _time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
         Sensed { own: truth, others: Others::Shared }
     }

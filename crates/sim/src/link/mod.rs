@@ -1,10 +1,10 @@
 //! What lies between the true world and the laws: sensors and radio on the way in, actuators on the way out.
 //!
-//! An imperfection is a file here, and [`of`] puts those of a scenario together into one [`Link`]. [`Direct`] is the link
-//! without any: laws see the true state itself, and nothing is copied. docs/imperfections.md has the equations.
+//! An imperfection is a file here, and [`of`] puts those of a scenario together into one [`Imperfections`]. [`Direct`] has
+//! none: laws see the true state itself, and nothing is copied. docs/imperfections.md has the equations.
 //!
 //! Whatever happens at instants of its own (measurements, messages) happens when the flight has come to them
-//! ([`Link::settle`]) and depends on the seed, on who it happens to and on its number alone: not on steps, on how often a
+//! ([`Imperfections::settle`]) and depends on the seed, on who it happens to and on its number alone: not on steps, on how often a
 //! trial state is asked about, or on threads.
 
 mod actuation;
@@ -20,5 +20,5 @@ mod sensing;
 mod world;
 
 pub use history::History;
-pub use interface::{Direct, Link, Sensed, Traffic};
+pub use interface::{Direct, Imperfections, Sensed, Traffic};
 pub use world::of;

@@ -3,7 +3,7 @@
 use super::actuation::Actuation;
 use super::failing::Failing;
 use super::history::History;
-use super::interface::{Direct, Link, Sensed, Traffic};
+use super::interface::{Direct, Imperfections, Sensed, Traffic};
 use super::messages::Messages;
 use super::sensing::{Sensing, Sight};
 use crate::scenario::{Failure, Missing, NearBy, Scenario};
@@ -16,7 +16,7 @@ const STEPS_PER_DELAY: f64 = 8.0;
 
 /// What lies between truth and law in a scenario, [`Direct`] where nothing does. A law may sense who is near, or not.
 #[must_use]
-pub fn of(scenario: &Scenario, senses: bool) -> Box<dyn Link> {
+pub fn of(scenario: &Scenario, senses: bool) -> Box<dyn Imperfections> {
     if scenario.is_exact() { Box::new(Direct) } else { Box::new(World::new(scenario, senses)) }
 }
 
@@ -148,7 +148,7 @@ impl Picture for World {
     }
 }
 
-impl Link for World {
+impl Imperfections for World {
     fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
         self.time_s = time_s;
         if self.is_shared {

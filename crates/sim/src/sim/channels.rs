@@ -1,7 +1,7 @@
 //! What is recorded of vehicles and link beside states and commands.
 
 use super::motion::Motion;
-use crate::link::Link;
+use crate::link::Imperfections;
 use tautline_core::record::Channel;
 
 /// The channels of a flight, vehicles' before link's, in memory that is used again for each sample.
@@ -13,7 +13,7 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    pub(super) fn of(motion: &Motion, link: &dyn Link) -> Self {
+    pub(super) fn of(motion: &Motion, link: &dyn Imperfections) -> Self {
         let mut all = motion.channels();
         let vehicles = all.len();
         all.extend(link.channels());
@@ -21,7 +21,7 @@ impl Channels {
     }
 
     /// Takes the present values.
-    pub(super) fn write(&mut self, motion: &Motion, link: &dyn Link) {
+    pub(super) fn write(&mut self, motion: &Motion, link: &dyn Imperfections) {
         let (vehicles, links) = self.all.split_at_mut(self.vehicles);
         motion.write_channels(vehicles);
         link.write_channels(links);

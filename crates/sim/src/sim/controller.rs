@@ -2,7 +2,7 @@
 
 use super::ending::SimError;
 use crate::feedback::Feedback;
-use crate::link::Link;
+use crate::link::Imperfections;
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
@@ -15,7 +15,7 @@ use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 #[derive(Clone)]
 pub(super) struct Controller {
     pub(super) law: Box<dyn Law>,
-    pub(super) link: Box<dyn Link>,
+    pub(super) link: Box<dyn Imperfections>,
     pub(super) supervisor: Box<dyn Supervisor>,
     pub(super) target: CurrentTarget,
     guidance: Option<Guidance>,
@@ -32,7 +32,7 @@ impl Controller {
     pub(super) fn new(
         scenario: &Scenario,
         law: Box<dyn Law>,
-        link: Box<dyn Link>,
+        link: Box<dyn Imperfections>,
         supervisor: Box<dyn Supervisor>,
     ) -> Result<Self, SimError> {
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;

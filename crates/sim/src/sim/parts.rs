@@ -2,7 +2,7 @@
 
 use super::ending::SimError;
 use super::motion::Motion;
-use crate::link::{self, Link};
+use crate::link::{self, Imperfections};
 use crate::scenario::Scenario;
 use tautline_laws::law::Law;
 use tautline_laws::target::{Schedule, Supervisor};
@@ -14,7 +14,7 @@ pub struct Parts {
     /// What moves the vehicles.
     pub motion: Motion,
     /// What lies between truth and law.
-    pub link: Box<dyn Link>,
+    pub link: Box<dyn Imperfections>,
     /// Who changes the target.
     pub supervisor: Box<dyn Supervisor>,
 }

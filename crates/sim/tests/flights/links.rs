@@ -4,7 +4,7 @@ use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
 use tautline_laws::observation::{Neighbour, Others, Picture};
-use tautline_sim::link::{Link, Sensed, of};
+use tautline_sim::link::{Imperfections, Sensed, of};
 use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy, Scenario};
 
 const DT_S: f64 = 0.01;
@@ -30,7 +30,7 @@ fn scenario() -> Scenario {
 }
 
 /// The link after so many steps, and what it shows then.
-fn after(link: &mut dyn Link, steps: std::ops::RangeInclusive<u32>, mut show: impl FnMut(f64, Sensed<'_>)) {
+fn after(link: &mut dyn Imperfections, steps: std::ops::RangeInclusive<u32>, mut show: impl FnMut(f64, Sensed<'_>)) {
     for step in steps {
         let time_s = f64::from(step) * DT_S;
         let now = truth(time_s);
@@ -198,7 +198,7 @@ fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
     scenario.sensing.position_noise_m = 0.1;
     (scenario.network.latency_s, scenario.network.jitter_s) = (0.03, 0.05);
     (scenario.network.loss, scenario.network.loss_burst) = (0.3, Some(4.0));
-    let heard = |link: &mut dyn Link, disturb: bool| {
+    let heard = |link: &mut dyn Imperfections, disturb: bool| {
         let mut all = Vec::new();
         for step in 0..=200 {
             let time_s = f64::from(step) * DT_S;

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use crate::flight::{Log, builtin, duel, fly, fly_with};
 use tautline_audit::Status;
 use tautline_core::record::{Event, OwnedSample};
-use tautline_core::swarm::{Pair, Rows, Swarm, row, separation};
+use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::{Capabilities, LaplacianKeys, Law, LawError, LawSpec};
 use tautline_laws::observation::Observation;

@@ -13,7 +13,7 @@ use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys,
 use tautline_laws::observation::{Held, Others};
 use tautline_laws::target::{Begins, CurrentTarget, Leg, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::link::{Link, Sensed};
+use tautline_sim::link::{Imperfections, Sensed};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::{self, Ending, Parts, SimError, Simulation};
@@ -373,7 +373,7 @@ fn a_leg_that_nobody_knows_is_never_reached() {
 #[derive(Clone)]
 struct Copied(Option<Held>);
 
-impl Link for Copied {
+impl Imperfections for Copied {
     fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> Sensed<'a> {
         let count = truth.count();
         let held = Held {
