@@ -39,8 +39,13 @@ pub(crate) trait Raised {
 impl Raised for Failure {
     fn raised(self) -> PyErr {
         let text = self.to_string();
-        if self.is_machine() { PyOSError::new_err(text) } else { coded(wrong(text), self.code()) }
+        coded(if self.is_machine() { PyOSError::new_err(text) } else { wrong(text) }, self.code())
     }
+}
+
+/// The input is wrong, with a code.
+pub(crate) fn wrong_by(code: &str, message: impl Into<String>) -> PyErr {
+    coded(wrong(message), code)
 }
 
 /// The exception with the stable name of the problem as its attribute `code`.
@@ -58,10 +63,7 @@ impl Raised for ScenarioError {
 
 impl Raised for SimError {
     fn raised(self) -> PyErr {
-        match self {
-            Self::Record(error) => PyOSError::new_err(error.to_string()),
-            error => wrong(error.to_string()),
-        }
+        Failure::from(self).raised()
     }
 }
 

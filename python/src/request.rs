@@ -8,14 +8,15 @@ use tautline::audit::recorded::{self, Motion, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
-use crate::errors::wrong;
+use crate::errors::{wrong, wrong_by};
 
 /// The value of this name; an error names all values.
 pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)]) -> PyResult<Option<T>> {
     let Some(name) = name else { return Ok(None) };
     let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     let known = || all.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-    found.map(Some).ok_or_else(|| wrong(format!("{what}: unknown value '{name}' [possible values: {}]", known())))
+    let message = || format!("{what}: unknown value '{name}' [possible values: {}]", known());
+    found.map(Some).ok_or_else(|| wrong_by("request/unknown-choice", message()))
 }
 
 /// Formats by their names.

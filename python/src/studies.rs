@@ -12,7 +12,7 @@ use tautline::request::{ExportRequest, Failure, Monitor as _, Silent, export_fil
 use tautline::scenario::builtin;
 use tautline::validate::{ValidateRequest, validate_into};
 
-use crate::errors::{Raised as _, broken, wrong};
+use crate::errors::{Raised as _, broken, wrong_by};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
 use crate::work::away_with_threads;
@@ -101,7 +101,7 @@ pub(crate) fn margin(
     seed: u64,
     verdict: String,
     scan: usize,
-    halvings: u32,
+    halvings: u64,
     logarithmic: bool,
     csv: Option<PathBuf>,
     html: Option<PathBuf>,
@@ -111,7 +111,13 @@ pub(crate) fn margin(
     let questions = Question::ALL.map(|question| (question.name(), question));
     let question = choice("verdict", Some(verdict), &questions)?.unwrap_or(Question::Pass);
     let request = MarginRequest {
-        range: Range { from: start, to: stop, scan, halvings, logarithmic },
+        range: Range {
+            from: start,
+            to: stop,
+            scan,
+            halvings: u32::try_from(halvings).unwrap_or(u32::MAX),
+            logarithmic,
+        },
         asked: tautline::margin::Asked { question, runs, seed },
         csv,
         html,
@@ -146,7 +152,7 @@ pub(crate) fn attack(
     let methods = Method::ALL.map(|method| (method.name(), method));
     let vary = vary.iter().map(|(key, low, high)| Variation::new(key, *low, *high)).collect::<Result<Vec<_>, _>>();
     let asked = tautline::attack::Asked {
-        vary: vary.map_err(|error| wrong(format!("vary: {error}")))?,
+        vary: vary.map_err(|error| wrong_by("attack/variation", format!("vary: {error}")))?,
         start_m: start,
         velocity_m_s: velocity,
         apart_m: apart,

@@ -262,11 +262,12 @@ def audit(
     Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
     wrong with the input. docs/audit.md says what each verdict means.
     """
+    ids = None if ids is None else listed(ids, "ids")
     asked = shown(locals()) | read_as
     if unknown := [word for word in read_as if word not in inspect.signature(reading).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
-    if ids is not None and not listed(ids, "ids"):
-        raise Error("ids: nobody is named; leave it out to judge everybody")
+    if ids is not None and not ids:
+        raise Error("ids: no vehicle is named; leave it out to judge all")
     # Beside arrays there is no folder to find a file of settings in.
     looks_for_config = config is None and positions is None
     question = _native.Question(
@@ -284,7 +285,7 @@ def audit(
         from_s=maybe(from_s, "from_s"),
         to_s=maybe(to_s, "to_s"),
         above=maybe(above, "above"),
-        ids=None if ids is None else listed(ids, "ids"),
+        ids=ids,
         offset=by_vehicle(offset, "offset"),
         expect_vehicles=maybe_count(expect_vehicles, "expect_vehicles"),
         max_gap=maybe(max_gap, "max_gap"),

@@ -13,6 +13,8 @@ from . import _native
 from ._native import Error
 
 T = TypeVar("T")
+#: Codes of errors about a file that cannot be opened.
+MISSING = ("recording/not-found", "scenario/not-found", "scenario/cannot-read", "campaign/cannot-read", "files/cannot-read")
 PathLike = str | os.PathLike[str]
 
 
@@ -126,13 +128,15 @@ def paths(given: object, what: str) -> list[str]:
 
 
 def with_files(files: Iterable[PathLike], do: Callable[[], T]) -> T:
-    """Does something that reads files; where that fails and one is missing, it is a ``FileNotFoundError``."""
+    """Does something that reads files; where that fails because one is missing, it is a ``FileNotFoundError``."""
     try:
         return do()
     except Error as error:
-        if all(Path(file).exists() for file in files):
+        if error.code not in MISSING or all(Path(file).exists() for file in files):
             raise
-        raise FileNotFoundError(str(error)) from None
+        missing = FileNotFoundError(str(error))
+        missing.code = error.code  # type: ignore[attr-defined]
+        raise missing from None
 
 
 def reading(

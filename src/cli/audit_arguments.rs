@@ -193,16 +193,18 @@ fn limit(text: &str) -> Result<Limit, String> {
 }
 
 impl AuditArguments {
-    /// The request about the recording in these files, which `command` makes again.
-    pub(super) fn request(&self, paths: Vec<PathBuf>, command: &str) -> Result<AuditRequest<'static>, Failure> {
+    /// The request about the recording in these files, which `command` makes again, and its settings.
+    pub(super) fn request(
+        &self,
+        paths: Vec<PathBuf>,
+        command: &str,
+    ) -> (AuditRequest<'static>, Result<Settings, Failure>) {
         let config = match (&self.config, self.no_config) {
             (Some(path), _) => ConfigFile::File(path.clone()),
             (None, true) => ConfigFile::None,
             (None, false) => ConfigFile::Nearest,
         };
-        Ok(AuditRequest {
-            subject: Subject::Files { paths, options: Box::new(self.reading.options(self.format)) },
-            settings: self.settings()?,
+        let request = AuditRequest {
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),
             expect_vehicles: self.expect_vehicles,
@@ -212,7 +214,9 @@ impl AuditArguments {
             command: command.to_owned(),
             html: self.html.clone(),
             proof: self.proof.clone(),
-        })
+            ..AuditRequest::new(Subject::Files { paths, options: Box::new(self.reading.options(self.format)) })
+        };
+        (request, self.settings())
     }
 
     fn settings(&self) -> Result<Settings, Failure> {

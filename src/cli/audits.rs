@@ -8,7 +8,7 @@ use super::console::{self, Console, Terminal};
 use super::{events, summary};
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::report::write_atomically;
-use tautline_report::request::{Audited, Failure, Monitor as _};
+use tautline_report::request::{AuditRequest, Audited, Failure, Monitor as _};
 
 /// Recordings that could not be judged, and why.
 type Failures = [(String, Failure)];
@@ -28,12 +28,14 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     }
     let mut asked = Vec::new();
     for paths in recordings {
-        let request = arguments.request(paths, command)?;
-        asked.push((request.subject.called(), request.configured()));
+        let (request, settings) = arguments.request(paths, command);
+        // No output replaces an input of any recording, whether its settings can be read or not.
+        request.check_outputs(&arguments.outputs())?;
+        let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
+        asked.push((request.subject.called(), configured));
     }
-    // Nothing is written where something would be written over what is read, of whichever recording.
-    let complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
-    complete.clone().try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
+    let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
+    complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
     // A log in which a system looks for its own lines has none of ours, which hold foreign names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
     let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });

@@ -12,7 +12,7 @@ use tautline_recordings::read::{
 };
 #[cfg(feature = "viewer")]
 use tautline_report::request::Failure;
-use tautline_report::request::RECORDING;
+use tautline_report::request::audit::recording_in;
 
 /// How a recording is read.
 #[derive(Clone, Debug, Args)]
@@ -131,10 +131,7 @@ fn duplicates() -> impl TypedValueParser<Value = Duplicates> {
 
 /// A path; of the folder of a run, that of what was recorded.
 fn recording() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().map(|path| {
-        let recorded = path.join(RECORDING);
-        if recorded.is_file() { recorded } else { path }
-    })
+    PathBufValueParser::new().map(|path| recording_in(&path))
 }
 
 fn column(text: &str) -> Result<(String, String), String> {

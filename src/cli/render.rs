@@ -127,6 +127,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
             return Err(Failure::input("files/is-directory", message, "name a file with --film"));
         }
         format.check(view.size_px, fps)?;
+        format.check_encoder()?;
     }
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;

@@ -383,3 +383,33 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     assert_eq!((exit, &every["audit"]["proved"]), (Some(0), &true.into()), "{every}");
     assert_eq!(every["audit"]["assumes"], serde_json::Value::Null);
 }
+
+#[test]
+fn no_output_replaces_an_input_even_where_the_question_is_wrong() {
+    for (settings, asked) in [
+        ("", &["--config", "missing.toml", "--junit", "in.csv"][..]),
+        ("[audit]\ndelta = 1", &["--events", "tautline.toml"]),
+        ("[audit]\ndelta = 1", &["--summary", "tautline.toml"]),
+        ("[audit]\ndelta = 1", &["--config", "tautline.toml", "--junit", "tautline.toml"]),
+        ("", &["--html", "in.csv", "--junit", "in.csv"]),
+        ("", &["--radius", "1", "--radius", "2", "--summary", "in.csv"]),
+    ] {
+        let folder = folder(&[("in.csv", PASS)]);
+        let file = folder.path().join("tautline.toml");
+        if !settings.is_empty() {
+            fs::write(&file, settings).expect("written");
+        }
+        let ran = audit(folder.path(), &[&["in.csv", "--delta", "1"], asked].concat());
+        assert_eq!(ran.exit, Some(2), "{asked:?}: {ran:?}");
+        assert_eq!(fs::read_to_string(folder.path().join("in.csv")).expect("there"), PASS, "{asked:?}");
+        assert_eq!(fs::read_to_string(&file).unwrap_or_default(), settings, "{asked:?}");
+    }
+}
+
+#[test]
+fn a_question_that_is_wrong_is_in_the_files_for_machines() {
+    let folder = folder(&[("in.csv", PASS)]);
+    let ran = audit(folder.path(), &["in.csv", "--radius", "1", "--radius", "2", "--junit", "j.xml"]);
+    assert_eq!(ran.exit, Some(2), "{ran:?}");
+    assert!(fs::read_to_string(folder.path().join("j.xml")).expect("a file").contains("two values"));
+}

@@ -80,7 +80,7 @@ class Words(Case):
             ("unexpected keyword argument 'detla'", {"detla": 1.0}),
         ):
             self.refuses(TypeError, says, lambda asked=asked: tl.audit(t, p, **{"delta": 0.1, **asked}))
-        self.refuses(tl.Error, "nobody is named", lambda: tl.audit(t, p, delta=0.1, ids=[]))
+        self.refuses(tl.Error, "no vehicle is named", lambda: tl.audit(t, p, delta=0.1, ids=iter([])))
         self.refuses(tl.Error, "too large", lambda: tl.audit(t, p, delta=10**400))
         self.assertEqual(tl.audit(t, p, delta=0.1, expect_vehicles=np.int64(4)).vehicles, ["1", "2", "3", "4"])
         self.refuses(TypeError, "laws: a list of names", lambda: tl.compare("pentagon", laws="laplacian"))

@@ -22,7 +22,6 @@ use tautline_sim::scenario::Scenario;
 const PAGE_BYTES: usize = 900 << 10;
 
 /// Draws runs with the graphics adapter of the machine.
-#[derive(Default)]
 pub struct RunPictures {
     adapter: String,
     /// Whether snapshots are taken. The scene is recorded in any case.

@@ -16,7 +16,7 @@ use std::ops::RangeInclusive;
 
 pub use tautline_report::request;
 use tautline_report::request::outputs::{Called, is_standard_output};
-use tautline_report::request::{Failure, Monitor};
+use tautline_report::request::{Failure, Monitor, in_range};
 
 pub mod attack;
 pub mod campaign;
@@ -31,6 +31,14 @@ pub const MOST_RUNS: u64 = 1_000_000;
 pub const SEEDS: RangeInclusive<u64> = 0..=i64::MAX as u64 - MOST_RUNS;
 /// Threads that a study may use.
 pub const THREADS: RangeInclusive<usize> = 1..=256;
+
+/// The number of threads that is given, or one a core.
+fn threads(given: Option<usize>) -> Result<usize, Failure> {
+    match given {
+        Some(number) => in_range("--threads", &number, &THREADS).map(|()| number),
+        None => Ok(rayon::current_num_threads().min(*THREADS.end())),
+    }
+}
 
 /// The failure where a result cannot be put into a file.
 fn not_written(error: &dyn Error) -> Failure {

@@ -198,8 +198,8 @@ impl Law for CbfQpLaw {
         check_range(command)
     }
 
-    fn certificate(&self, _start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        Certificate::void(Void::CommandLimited).void_where(!ahead.is_empty(), Void::TargetChanges)
+    fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
+        Certificate::void(Void::CommandLimited)
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -393,6 +393,7 @@ impl Law for DisplacementLaw {
             sensing_range_m: Some(self.metric.longest_m(self.tension.rest_m())),
             uses_ellipsoid_metric: true,
             certifies_under_wind: true,
+            certifies_target_changes: true,
             avoids_obstacles: self.clearance.is_some(),
             settling: Some(self.settling()),
             ..Capabilities::default()

@@ -308,7 +308,7 @@ impl Law for EdgeTensionLaw {
     ///
     /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
     /// Without pairs there is nothing to promise, and nothing void either.
-    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+    fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         let energy = self.try_energy(start.own);
         let mut void = Vec::new();
         if !self.graph.is_complete() {
@@ -339,7 +339,6 @@ impl Law for EdgeTensionLaw {
             void,
             legs: Vec::new(),
         }
-        .void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
     fn capabilities(&self) -> Capabilities {

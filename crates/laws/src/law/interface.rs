@@ -49,10 +49,11 @@ pub trait Law: DynClone + Send {
         None
     }
 
-    /// Separation that the law guarantees from a start on, if its target then goes through the formations `ahead`, each taken
-    /// up at once or along the straight lines between slots, at any time.
-    fn certificate(&self, _start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        Certificate::void(Void::NoBarrier).void_where(!ahead.is_empty(), Void::TargetChanges)
+    /// Separation that the law guarantees from a start on. A law with [`Capabilities::certifies_target_changes`] accounts for
+    /// a target that then goes through the formations `ahead`, each taken up at once or along the straight lines between
+    /// slots, at any time. Any other law may ignore them: [`certificate_through`] voids its certificate.
+    fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
+        Certificate::void(Void::NoBarrier)
     }
 
     /// Bounds on the rates of the closed loop.
@@ -67,6 +68,13 @@ pub trait Law: DynClone + Send {
 }
 
 dyn_clone::clone_trait_object!(Law);
+
+/// The certificate of a law from a start on through the formations `ahead`, void where the law does not account for them.
+#[must_use]
+pub fn certificate_through(law: &dyn Law, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+    let is_ignored = !ahead.is_empty() && !law.capabilities().certifies_target_changes;
+    law.certificate(start, ahead).void_where(is_ignored, Void::TargetChanges)
+}
 
 /// What a law senses, limits, controls and assumes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,6 +95,8 @@ pub struct Capabilities {
     pub uses_ellipsoid_metric: bool,
     /// Whether the certificate of the law accounts for wind. Any other certificate is void in wind.
     pub certifies_under_wind: bool,
+    /// Whether the certificate of the law accounts for formations ahead. Any other certificate is void where slots change.
+    pub certifies_target_changes: bool,
     /// Whether the law keeps vehicles clear of obstacles. Any other certificate is void among obstacles.
     pub avoids_obstacles: bool,
     /// Whether the law runs on the calling thread alone. The law of a large swarm runs beside the audit otherwise.
@@ -109,6 +119,7 @@ impl Default for Capabilities {
             max_command_m_s2: None,
             uses_ellipsoid_metric: false,
             certifies_under_wind: false,
+            certifies_target_changes: false,
             avoids_obstacles: false,
             requires_calling_thread: false,
             settling: None,

@@ -36,7 +36,7 @@ pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw, EdgeTensionParameters};
 pub use error::{LawError, ParameterError};
 pub use flocking::{FlockingKeys, FlockingLaw};
-pub use interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin};
+pub use interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin, certificate_through};
 pub use laplacian::{LaplacianKeys, LaplacianLaw};
 pub use modes::{Heard, HeardLinks, Linear, Mode};
 pub use orca::{OrcaKeys, OrcaLaw};

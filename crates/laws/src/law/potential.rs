@@ -239,7 +239,7 @@ impl Law for PotentialLaw {
         self.try_energy(at).ok()
     }
 
-    fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+    fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         let mut void = Vec::new();
         if self.keys.c_per_s < self.a22_per_s {
             void.push(Void::VelocityUndamped);
@@ -262,7 +262,6 @@ impl Law for PotentialLaw {
             void,
             legs: Vec::new(),
         }
-        .void_where(!ahead.is_empty(), Void::TargetChanges)
     }
 
     fn capabilities(&self) -> Capabilities {

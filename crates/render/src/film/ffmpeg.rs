@@ -1,35 +1,32 @@
 //! H.264 in MP4 by `ffmpeg` on PATH.
 
-use std::fs;
+use std::env;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU64, Ordering};
+
+use tempfile::TempDir;
 
 use super::encoder::{self, FilmEncoder};
 use crate::error::RenderError;
 use crate::picture::Picture;
-
-/// Films that this process began: a part of the names of their temporary files.
-static BEGUN: AtomicU64 = AtomicU64::new(0);
 
 /// Pictures go to the standard input of `ffmpeg`. It writes a temporary file, since an MP4 file begins with a table of what
 /// follows; the film is copied from there.
 pub(super) struct Ffmpeg<W> {
     out: W,
     child: Child,
-    file: PathBuf,
+    /// Holds the film and what ffmpeg prints.
+    folder: TempDir,
 }
 
-/// Looks for `ffmpeg`.
+/// Looks for `ffmpeg` on PATH.
 pub(super) fn check() -> Result<(), RenderError> {
-    let mut command = Command::new("ffmpeg");
-    command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    match command.status() {
-        Ok(_) => Ok(()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(RenderError::NoFfmpeg),
-        Err(error) => Err(failed(error)),
-    }
+    let name = format!("ffmpeg{}", env::consts::EXE_SUFFIX);
+    let path = env::var_os("PATH").unwrap_or_default();
+    let is_there = env::split_paths(&path).any(|folder| folder.join(&name).is_file());
+    if is_there { Ok(()) } else { Err(RenderError::NoFfmpeg) }
 }
 
 fn failed(error: impl std::fmt::Display) -> RenderError {
@@ -42,40 +39,51 @@ impl<W: Write> Ffmpeg<W> {
     }
 
     fn start(program: &Path, out: W, [width, height]: [u32; 2], fps: u32) -> Result<Self, RenderError> {
-        let number = BEGUN.fetch_add(1, Ordering::Relaxed);
-        let file = std::env::temp_dir().join(format!("tautline-{}-{number}.mp4", std::process::id()));
+        let folder = tempfile::tempdir()?;
+        let printed = File::create(folder.path().join("printed"))?;
         let mut command = Command::new(program);
         command
             .args(["-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"])
             .args(["-s", &format!("{width}x{height}"), "-r", &fps.to_string(), "-i", "pipe:0"])
-            .args(["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"])
-            .arg(&file)
+            .args(["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"])
+            .arg(folder.path().join("film.mp4"))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
-            .stderr(Stdio::piped());
+            .stderr(printed);
         let child = command.spawn().map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => RenderError::NoFfmpeg,
-            _ => failed(error),
+            _ => failed(format!("cannot start ffmpeg: {error}")),
         })?;
-        Ok(Self { out, child, file })
+        Ok(Self { out, child, folder })
     }
 
-    /// The error that ffmpeg printed, or the one that writing to it met.
-    fn complaint(&mut self, met: &dyn std::fmt::Display) -> RenderError {
-        drop(self.child.stdin.take());
-        let printed = self.child.stderr.take().and_then(|stderr| io::read_to_string(stderr).ok()).unwrap_or_default();
-        match printed.lines().next_back() {
+    fn film(&self) -> PathBuf {
+        self.folder.path().join("film.mp4")
+    }
+
+    /// The last line that ffmpeg printed, or else another error.
+    fn complaint(&mut self, other: &dyn std::fmt::Display) -> RenderError {
+        self.end();
+        let printed = fs::read(self.folder.path().join("printed")).unwrap_or_default();
+        let printed = String::from_utf8_lossy(&printed);
+        match printed.lines().rfind(|line| !line.trim().is_empty()) {
             Some(line) => failed(line),
-            None => failed(met),
+            None => failed(other),
         }
+    }
+
+    /// Ends ffmpeg where it still runs.
+    fn end(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
 impl<W: Write + Send> FilmEncoder for Ffmpeg<W> {
     fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
-        let Some(input) = &mut self.child.stdin else { return Err(failed("it has ended")) };
+        let Some(input) = &mut self.child.stdin else { return Err(failed("ffmpeg has ended")) };
         let written = pictures.iter().try_for_each(|picture| input.write_all(&picture.rgba));
-        written.map_err(|error| self.complaint(&error))
+        written.map_err(|error| self.complaint(&format!("ffmpeg takes no more pictures: {error}")))
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), RenderError> {
@@ -84,17 +92,18 @@ impl<W: Write + Send> FilmEncoder for Ffmpeg<W> {
         if !status.success() {
             return Err(self.complaint(&status));
         }
-        io::copy(&mut fs::File::open(&self.file)?, &mut self.out)?;
+        match File::open(self.film()) {
+            Ok(mut film) if film.metadata()?.len() > 0 => io::copy(&mut film, &mut self.out)?,
+            _ => return Err(self.complaint(&"ffmpeg wrote no film")),
+        };
         Ok(())
     }
 }
 
 impl<W> Drop for Ffmpeg<W> {
-    /// Ends ffmpeg where it still runs, and removes its file.
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
-        let _ = fs::remove_file(&self.file);
     }
 }
 
@@ -116,6 +125,7 @@ mod tests {
         let mut film = Ffmpeg::start(program, out, [2, 4], 25)?;
         let pictures = [1, 2].map(|k| Picture { size_px: [2, 4], rgba: vec![k; 32] });
         film.add(&pictures)?;
+
         Box::new(film).finish()
     }
 
@@ -140,6 +150,18 @@ mod tests {
         let program = script(folder.path(), "cat > /dev/null; echo no such encoder >&2; exit 1");
         let failed = film(&program, &mut Vec::new()).expect_err("it failed");
         assert_eq!(failed.to_string(), "the MP4 encoder failed: no such encoder");
+        for (text, expected) in [
+            ("yes error | head -c 300000 >&2; cat > /dev/null; exit 1", "error"),
+            ("exec 0<&-; sleep 60; exit 1", "ffmpeg takes no more pictures"),
+            ("cat > /dev/null; for last; do :; done; : > \"$last\"", "ffmpeg wrote no film"),
+            ("cat > /dev/null", "ffmpeg wrote no film"),
+        ] {
+            let mut film = Ffmpeg::start(&script(folder.path(), text), Vec::new(), [2, 4], 25).expect("it starts");
+            // More than a pipe holds: a program that has closed its input is noticed.
+            let added = film.add(&[Picture { size_px: [2, 4], rgba: vec![3; 1 << 20] }]);
+            let failed = added.and_then(|()| Box::new(film).finish()).expect_err(text).to_string();
+            assert!(failed.contains(expected), "{text}: {failed}");
+        }
         let none = film(&folder.path().join("none"), &mut Vec::new()).expect_err("there is none");
         assert!(
             matches!(none, RenderError::NoFfmpeg) && none.help().is_some_and(|help| help.contains("install ffmpeg"))

@@ -44,11 +44,22 @@ impl FilmFormat {
         }
     }
 
+    /// Whether something here encodes the format.
+    ///
+    /// # Errors
+    /// [`RenderError::NoFfmpeg`] for MP4 without the feature `mp4` and without `ffmpeg` on PATH.
+    pub fn check_encoder(self) -> Result<(), RenderError> {
+        #[cfg(not(feature = "mp4"))]
+        if self == Self::Mp4 {
+            return ffmpeg::check();
+        }
+        Ok(())
+    }
+
     /// Whether a film can have pictures of this size, so many a second.
     ///
     /// # Errors
-    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot, and [`RenderError::NoFfmpeg`] when nothing
-    /// here encodes MP4.
+    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot.
     pub fn check(self, size_px: [u32; 2], fps: u32) -> Result<(), RenderError> {
         let (name, most) = match self {
             Self::Mp4 => ("MP4", MOST_FPS),
@@ -65,8 +76,6 @@ impl FilmFormat {
             Self::Mp4 if width % 2 == 1 || height % 2 == 1 => "H.264 needs even sides",
             Self::Mp4 if shorter < 16 || longer > 3840 || shorter > 2160 => "from 16 x 16 to 3840 x 2160",
             Self::Gif if shorter == 0 || longer > u32::from(u16::MAX) => "a side has from 1 to 65535",
-            #[cfg(not(feature = "mp4"))]
-            Self::Mp4 => return ffmpeg::check(),
             _ => return Ok(()),
         };
         let what = format!("a {name} film cannot have pictures of {width} x {height} pixels: {why}");

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::audit::{open, own_recording};
+use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
 use crate::report::write_atomically_with;
 use tautline_core::text::counted;
@@ -100,6 +100,8 @@ impl ExportRequest {
 /// # Errors
 /// [`Failure`] where the recording cannot be read, or the file cannot be written.
 pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(), Failure> {
+    let request =
+        &ExportRequest { paths: request.paths.iter().map(|path| recording_in(path)).collect(), ..request.clone() };
     let format = request.checked()?;
     let ExportRequest { paths, options, output, sample_hz, .. } = request;
     let interrupted = monitor.interruption();

@@ -88,6 +88,7 @@ impl Override {
                 let base = parsed.value.start;
                 let span = error.span().map_or(parsed.value.clone(), |span| base + span.start..base + span.end);
                 Err(ScenarioError::new(format!("the value is not TOML: {}", error.message()))
+                    .coded("scenario/override")
                     .with_help("numbers, true, false, [lists], {tables} and \"strings\" are; a bare word is a string")
                     .with_place(place(span)))
             }

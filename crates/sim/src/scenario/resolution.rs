@@ -7,7 +7,7 @@ use super::actuation::ActuationSpec;
 use super::failure::Failure;
 use super::spec::{PlantSpec, Scenario};
 use tautline_core::swarm::{Rows, mean_row, row};
-use tautline_laws::law::{Certificate, Law, Void};
+use tautline_laws::law::{Certificate, Law, Void, certificate_through};
 use tautline_laws::target::BreathingMode;
 
 /// How far the swarm as a whole is carried.
@@ -72,12 +72,12 @@ impl Scenario {
         let start = self.observation(&self.start);
         if self.breathing.mode != BreathingMode::Start || law.capabilities().settling.is_none() {
             let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
-            return law.certificate(&start, &ahead);
+            return certificate_through(law, &start, &ahead);
         }
         let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
         let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
         let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
-        let mut promised = law.certificate(&start, &ahead);
+        let mut promised = certificate_through(law, &start, &ahead);
         // What holds on a leg is what holds once its slots have come together.
         promised.legs = promised.legs.into_iter().skip(2).step_by(2).collect();
         if self.legs.len() < 2 {

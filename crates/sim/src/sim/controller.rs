@@ -6,7 +6,7 @@ use crate::link::Imperfections;
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{Certificate, Law, LawError};
+use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
 use tautline_laws::observation::{Observation, Others};
 use tautline_laws::space::{KeptPairs, Metric, Obstacle};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
@@ -105,7 +105,7 @@ impl Controller {
             ahead.insert(0, target.formation);
         }
         let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
-        Some((change, self.law.certificate(&start, &ahead)))
+        Some((change, certificate_through(self.law.as_ref(), &start, &ahead)))
     }
 
     /// All random numbers begin anew.

@@ -10,7 +10,7 @@ use tautline_audit::Status;
 use tautline_core::record::{Event, OwnedSample};
 use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
-use tautline_laws::law::{Capabilities, LaplacianKeys, Law, LawError, LawSpec};
+use tautline_laws::law::{Capabilities, Certificate, LaplacianKeys, Law, LawError, LawSpec, Void};
 use tautline_laws::observation::Observation;
 use tautline_sim::plant::{Path, Plant, PlantError, rapier};
 use tautline_sim::scenario::Scenario;
@@ -400,4 +400,33 @@ fn the_closest_approach_of_a_sample_is_that_of_all_steps_since_the_sample_before
         assert_eq!(sample.separation, least, "at {} s", sample.time_s);
         from = sample.step + 1;
     }
+}
+
+/// Certifies 3 m, whatever formations lie ahead.
+#[derive(Clone)]
+struct Careless;
+
+impl Law for Careless {
+    fn name(&self) -> &'static str {
+        "careless"
+    }
+
+    fn command(&mut self, _: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
+        Ok(())
+    }
+
+    fn certificate(&self, _: &Observation<'_>, _: &[&Formation]) -> Certificate {
+        Certificate { certified_m: Some(3.0), void: Vec::new(), ..Certificate::void(Void::NoBarrier) }
+    }
+}
+
+#[test]
+fn a_law_that_does_not_account_for_the_formations_ahead_certifies_nothing_through_them() {
+    let still = builtin("pentagon", &["time.duration_s=1"]);
+    assert_eq!(still.certificate(&Careless).certified_m, Some(3.0));
+    let mut legs = still.clone();
+    legs.legs.push(legs.legs[0].clone());
+    let certificate = legs.certificate(&Careless);
+    assert_eq!((certificate.certified_m, &certificate.void[..]), (None, &[Void::TargetChanges][..]));
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Asked, Attack, AttackError, AttackPage, Plan};
 use crate::compare::Watch;
-use crate::{THREADS, not_written, wrote};
+use crate::{not_written, threads, wrote};
 use tautline_report::request::outputs::{self, Called, write};
 use tautline_report::request::{
     Failure, Monitor, OutFolder, Pictures, Quiet, RECORDING, RunRequest, ScenarioRequest, in_range, run_into,
@@ -85,8 +85,7 @@ pub fn attack(
 ) -> Result<Option<Attack>, Failure> {
     in_range("--flights", &request.asked.flights, &FLIGHTS)?;
     in_range("--seeds", &request.asked.seeds, &SEEDS_OF_A_CANDIDATE)?;
-    let threads = request.threads.unwrap_or_else(rayon::current_num_threads);
-    in_range("--threads", &threads, &THREADS)?;
+    let threads = threads(request.threads)?;
     let scenario = &request.scenario;
     outputs::check_new(&scenario.argument, request.outputs(), request.force)?;
     let plan = Plan::new(scenario.source.clone(), &scenario.parsed_overrides()?, request.asked.clone())?;

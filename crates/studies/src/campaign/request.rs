@@ -7,8 +7,8 @@ use std::time::Instant;
 use super::{
     ANSWER, Asked, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, again,
 };
-use crate::THREADS;
 use crate::compare::Watch;
+use crate::threads;
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, Pictures, RECORDING, command_line, in_range};
 
@@ -120,8 +120,7 @@ pub fn campaign(
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
     in_range("--worst", &request.worst, &(0..=MOST_WORST))?;
-    let threads = request.threads.unwrap_or_else(rayon::current_num_threads);
-    in_range("--threads", &threads, &THREADS)?;
+    let threads = threads(request.threads)?;
     let folder = request.plan()?;
     let campaign = folder.campaign();
     let manifest = campaign.manifest();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{CompareError, ComparePage, Comparison, LawRow, Plan, Watch};
-use crate::{MOST_RUNS, SEEDS, THREADS, not_written, wrote};
+use crate::{MOST_RUNS, SEEDS, not_written, threads, wrote};
 use tautline_core::text::at_least;
 use tautline_report::report::page::Picture;
 use tautline_report::request::outputs::{self, Called, write};
@@ -96,8 +96,7 @@ pub fn compare(
 ) -> Result<Option<Comparison>, Failure> {
     in_range("--runs", &request.runs, &(1..=MOST_RUNS))?;
     in_range("--seed", &request.seed, &SEEDS)?;
-    let threads = request.threads.unwrap_or_else(rayon::current_num_threads);
-    in_range("--threads", &threads, &THREADS)?;
+    let threads = threads(request.threads)?;
     outputs::check_new(&request.scenario.argument, request.outputs(), request.force)?;
     let template = request.scenario.template()?;
     let names = request.laws.clone().unwrap_or_else(|| template.compared());

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::{Asked, Margin, MarginError, MarginPage, Plan, Probe, Question, Range};
 use crate::compare::Watch;
-use crate::{MOST_RUNS, SEEDS, THREADS, not_written, wrote};
+use crate::{MOST_RUNS, SEEDS, not_written, threads, wrote};
 use tautline_report::request::outputs::{self, Called, write};
 use tautline_report::request::{Failure, Monitor, ScenarioRequest, in_range};
 
@@ -94,8 +94,7 @@ pub fn margin(request: &MarginRequest, monitor: &dyn Monitor) -> Result<Option<M
     in_range("--seed", &request.asked.seed, &SEEDS)?;
     in_range("--scan", &request.range.scan, &SCANS)?;
     in_range("--halvings", &request.range.halvings, &HALVINGS)?;
-    let threads = request.threads.unwrap_or_else(rayon::current_num_threads);
-    in_range("--threads", &threads, &THREADS)?;
+    let threads = threads(request.threads)?;
     let scenario = &request.scenario;
     outputs::check_new(&scenario.argument, request.outputs(), request.force)?;
     let overrides = scenario.parsed_overrides()?;

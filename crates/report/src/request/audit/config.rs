@@ -86,16 +86,25 @@ impl From<MotionName> for Motion {
 
 /// The request with what its `tautline.toml` asks where it is silent.
 pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudit<'_>, Failure> {
-    if let (ConfigFile::Nearest, Some(recording)) = (&request.config, request.subject.paths().first()) {
-        let found = nearest(recording);
-        if let Some(path) = found.as_ref().filter(|path| !path.is_file()) {
-            return Err(Failure::input("audit/settings-file", format!("{} is no file", path.display()), HELP));
-        }
-        request.config = found.map_or(ConfigFile::None, ConfigFile::File);
+    let found = file_of(&request);
+    if request.config == ConfigFile::Nearest
+        && let Some(path) = found.as_ref().filter(|path| !path.is_file())
+    {
+        return Err(Failure::input("audit/settings-file", format!("{} is no file", path.display()), HELP));
     }
+    request.config = found.map_or(ConfigFile::None, ConfigFile::File);
     match request.config.clone() {
         ConfigFile::File(path) => parse(&text_file::read(&path, MOST_BYTES, HELP)?, &path)?.fill(request, &path),
         ConfigFile::Nearest | ConfigFile::None => Ok(ConfiguredAudit { request, asked_by: None }),
+    }
+}
+
+/// The file of settings that fills a request, whatever it holds.
+pub(super) fn file_of(request: &AuditRequest<'_>) -> Option<PathBuf> {
+    match &request.config {
+        ConfigFile::File(path) => Some(path.clone()),
+        ConfigFile::Nearest => request.subject.paths().first().and_then(|recording| nearest(recording)),
+        ConfigFile::None => None,
     }
 }
 

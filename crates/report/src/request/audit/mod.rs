@@ -11,7 +11,7 @@ mod places;
 mod proof;
 mod replays;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 pub use own::{OwnRecording, Witness};
 
 use self::own_obstacles::OwnObstacles;
-use super::{Failure, Monitor, outputs};
+use super::{Failure, Monitor, RECORDING, outputs};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
@@ -116,9 +116,16 @@ impl Subject<'_> {
 /// [`ReadError`] where one cannot be read.
 pub fn open(paths: &[PathBuf], options: &ReadOptions) -> Result<read::Recording, ReadError> {
     match paths {
-        [path] => read::open(path, options),
+        [path] => read::open(&recording_in(path), options),
         paths => read::open_joined(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), options),
     }
+}
+
+/// The recording in the folder of a run; any other path as it is.
+#[must_use]
+pub fn recording_in(path: &Path) -> PathBuf {
+    let recorded = path.join(RECORDING);
+    if recorded.is_file() { recorded } else { path.to_owned() }
 }
 
 /// What a recording of `tautline run` says of itself; `None` for any other recording.
@@ -250,18 +257,39 @@ pub struct ConfiguredAudit<'a> {
 /// [`Failure`] where the question or the recording is wrong, or a file cannot be written. The monitor has the verdict
 /// before files are written.
 pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<Audited, Failure> {
-    request.configured()?.judge(monitor)
+    request.check_outputs(&[])?;
+    let configured = request.configured()?;
+    configured.check_outputs(&[])?;
+    configured.judge(monitor)
 }
 
 impl<'a> AuditRequest<'a> {
-    /// Fills what is left open as the file of settings says, and refuses outputs that would overwrite an input.
+    /// Fills what is left open as the file of settings says.
     ///
     /// # Errors
-    /// [`Failure`] where the file of settings is wrong, or an output would overwrite an input.
+    /// [`Failure`] where the file of settings is wrong.
     pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
-        let configured = config::configured(self.clone())?;
-        configured.check_outputs(&[])?;
-        Ok(configured)
+        let mut request = self.clone();
+        if let Subject::Files { paths, .. } = &mut request.subject {
+            paths.iter_mut().for_each(|path| *path = recording_in(path));
+        }
+        config::configured(request)
+    }
+
+    /// Refuses outputs of the request, and `more` of the caller, that would overwrite an input or each other.
+    ///
+    /// # Errors
+    /// [`Failure`] that names both.
+    pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
+        let Self { subject, obstacles, fence, html, proof, .. } = self;
+        let settings = config::file_of(self);
+        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
+        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        inputs.extend(settings.as_deref().map(|path| ("the file of settings", path)));
+        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
+        let own = [("--html", html), ("--proof", proof)];
+        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
+        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
     }
 
     /// Whether a radius is given for all vehicles or for one.
@@ -294,6 +322,10 @@ impl<'a> AuditRequest<'a> {
                 "--radius and --ellipsoid are both given",
                 "an ellipsoid has its own size: leave one of them out",
             ));
+        }
+        if self.settings.only.as_ref().is_some_and(BTreeSet::is_empty) {
+            let help = "name at least one vehicle, or leave --ids out to judge all";
+            return Err(Failure::input("audit/nothing-to-judge", "--ids names no vehicle", help));
         }
         let limits = &self.settings.envelope.limits;
         for (k, limit) in limits.iter().enumerate() {
@@ -415,16 +447,7 @@ impl ConfiguredAudit<'_> {
     /// # Errors
     /// [`Failure`] that names both.
     pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
-        let AuditRequest { subject, obstacles, fence, config, html, proof, .. } = &self.request;
-        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
-        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
-        if let ConfigFile::File(path) = config {
-            inputs.push(("the file of settings", path));
-        }
-        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
-        let own = [("--html", html), ("--proof", proof)];
-        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
-        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
+        self.request.check_outputs(more)
     }
 
     /// Judges the recording.

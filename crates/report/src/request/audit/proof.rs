@@ -140,8 +140,9 @@ pub(super) fn write(
     let Some(proof) = builder.finish(outcome) else {
         return none("the limit is that of radii which the recording holds, or it is not one of samples");
     };
-    let bytes = fs::read(path)
-        .map_err(|error| Failure::machine("files/cannot-read", format!("cannot read {}: {error}", path.display())))?;
+    let bytes = fs::read(path).map_err(|error| {
+        Failure::machine("recording/cannot-read", format!("cannot read {}: {error}", path.display()))
+    })?;
     let sha256 = Sha256::digest(&bytes).iter().fold(String::new(), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
         text
