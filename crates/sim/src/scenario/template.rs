@@ -130,7 +130,9 @@ impl Template {
                 "{}; a law of another name has its kind and its keys in a table [laws.NAME] of the scenario",
                 suggest(name, &known)
             );
-            return Err(ScenarioError::new(format!("there is no law named `{name}`")).with_help(help));
+            return Err(ScenarioError::new(format!("there is no law named `{name}`"))
+                .coded("scenario/unknown-choice")
+                .with_help(help));
         };
         Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
     }
