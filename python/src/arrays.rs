@@ -8,6 +8,8 @@ use tautline::track::{Clock, Item, Sample, Tracks};
 const BATCH: usize = 4096;
 /// Vehicles that a note names at most.
 const MOST_NAMED: usize = 8;
+/// Code of the error where a number is infinite or not a number.
+const NOT_FINITE: &str = "recording/not-finite";
 
 /// Positions, and velocities where there are any, of N vehicles at T instants.
 #[derive(Clone)]
@@ -42,18 +44,20 @@ impl<'a> Arrays<'a> {
     /// The next instant, appended to `items`.
     fn instant(&mut self, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let (k, time_s) = (self.at, self.times_s[self.at]);
-        let wrong = |place: String, problem: String, remedy: &str| ReadError {
+        let wrong = |code, place: String, problem: String, remedy: &str| ReadError {
             file: "arrays".to_owned(),
             place: Some(Place::Part(place)),
-            fault: Fault::Content { code: "recording/content", problem, remedy: remedy.to_owned() },
+            fault: Fault::Content { code, problem, remedy: remedy.to_owned() },
         };
         if !time_s.is_finite() {
-            return Err(wrong(format!("t[{k}]"), format!("it is {time_s}"), "times are finite: take the instant out"));
+            let problem = format!("it is {time_s}");
+            return Err(wrong(NOT_FINITE, format!("t[{k}]"), problem, "times are finite: take the instant out"));
         }
         if let Some(before_s) = k.checked_sub(1).map(|before| self.times_s[before]).filter(|before| *before >= time_s) {
             let how = if before_s == time_s { "is repeated" } else { "runs backwards" };
             let problem = format!("time {how}: {time_s} s comes after {before_s} s");
-            return Err(wrong(format!("t[{k}]"), problem, "sort the instants by time, and take repeated ones out"));
+            let remedy = "sort the instants by time, and take repeated ones out";
+            return Err(wrong("recording/time-backwards", format!("t[{k}]"), problem, remedy));
         }
         for vehicle in 0..self.positions_m.shape()[1] {
             let position = vector(&self.positions_m, k, vehicle);
@@ -62,7 +66,8 @@ impl<'a> Arrays<'a> {
                 let velocity = velocity.filter(|of| !of.iter().all(|x| x.is_nan()));
                 if let Some(odd) = velocity.and_then(|of| of.into_iter().find(|x| !x.is_finite())) {
                     let remedy = "velocities are finite, or NaN in every axis where they are not known";
-                    return Err(wrong(format!("velocities[{k}, {vehicle}]"), format!("it holds {odd}"), remedy));
+                    let place = format!("velocities[{k}, {vehicle}]");
+                    return Err(wrong(NOT_FINITE, place, format!("it holds {odd}"), remedy));
                 }
                 items.push(Item::Sample(Sample {
                     vehicle,
@@ -74,7 +79,8 @@ impl<'a> Arrays<'a> {
             } else if !is_unseen(&self.positions_m, k, vehicle) {
                 let odd = position.into_iter().find(|x| !x.is_finite()).unwrap_or_default();
                 let remedy = "positions are finite, or NaN in every axis where a vehicle was not seen";
-                return Err(wrong(format!("positions[{k}, {vehicle}]"), format!("it holds {odd}"), remedy));
+                let place = format!("positions[{k}, {vehicle}]");
+                return Err(wrong(NOT_FINITE, place, format!("it holds {odd}"), remedy));
             }
         }
         self.at += 1;

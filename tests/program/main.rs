@@ -34,3 +34,13 @@ mod runs;
 mod scenarios;
 mod shapes;
 mod told;
+
+impl program::Ran {
+    /// Returns the stable code of the error: the first line on standard error that is `area/problem`, or nothing.
+    pub(crate) fn code(&self) -> &str {
+        let is_word = |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+        let is_code =
+            |line: &&str| line.split_once('/').is_some_and(|(area, problem)| is_word(area) && is_word(problem));
+        self.err.lines().map(str::trim).find(is_code).unwrap_or_default()
+    }
+}

@@ -94,11 +94,11 @@ fn heights_are_along_the_axis_that_is_up() {
 fn rows_out_of_order_and_twice_are_read_as_the_user_says() {
     let text = "t_s,id,x,y,z\n0,a,0,0,0\n2,a,2,0,0\n1,a,1,0,0\n1,a,1,0.5,0\n0,b,0,9,0\n1,b,0,9,0\n2,b,0,9,0\n";
     for (words, exit, expected) in [
-        (&[][..], 2, "goes back in time"),
-        (&["--sort"], 2, "there a second time at 1 s"),
+        (&[][..], 2, "recording/time-backwards"),
+        (&["--sort"], 2, "recording/duplicate-row"),
         (&["--sort", "--duplicates", "first"], 0, "rows left out"),
         (&["--sort", "--duplicates", "last"], 0, "rows left out"),
-        (&["--sort", "--duplicates", "refuse"], 2, "there a second time at 1 s"),
+        (&["--sort", "--duplicates", "refuse"], 2, "recording/duplicate-row"),
     ] {
         let (code, text) = said(&audit(&[("f.csv", text)], &[&["f.csv", "--delta", "1"], words].concat()));
         assert!(code == Some(exit) && text.contains(expected), "{words:?}: {text}");

@@ -27,8 +27,8 @@ delta_m = 2.0
 duration_s = 1.0
 "#;
 
-/// Runs a scenario that is wrong; gives its message in one line after checking what all refusals have in common.
-fn refused(folder: &Path, scenario: &str, more: &[&str]) -> String {
+/// Runs a wrong scenario, checks what all refusals have in common, and returns the code and the message in one line.
+fn refused(folder: &Path, scenario: &str, more: &[&str]) -> (String, String) {
     let names = || {
         let entries = fs::read_dir(folder).expect("the folder");
         let mut names: Vec<_> = entries.map(|entry| entry.expect("an entry").file_name()).collect();
@@ -36,13 +36,15 @@ fn refused(folder: &Path, scenario: &str, more: &[&str]) -> String {
         names
     };
     let before = names();
-    let Ran { exit, out, err } = ran(folder, &[&["run", scenario], more].concat());
+    let ran = ran(folder, &[&["run", scenario], more].concat());
+    let code = ran.code().to_owned();
+    let Ran { exit, out, err } = ran;
     assert_eq!((exit, out.as_str()), (WRONG_INPUT, ""), "{err}");
     assert!(!err.contains("panicked") && !err.contains("RUST_BACKTRACE"), "{err}");
     assert!(err.contains("help:"), "a remedy is named: {err}");
     assert_eq!(names(), before, "nothing is written");
     // Long lines are broken for the terminal.
-    err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ")
+    (code, err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" "))
 }
 
 fn folder() -> TempDir {
@@ -56,33 +58,16 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
 #[test]
 fn a_scenario_that_cannot_be_flown_is_refused_at_its_place() {
     let folder = folder();
-    let line = "positions_m = [\n    [0.0, 0.0],\n    [4.0, 0.0],\n]";
-    // Text of RIGHT to replace, its replacement, part of the message, line and column.
-    let cases: &[(&str, &str, &str, &str)] = &[
-        ("spacing_m", "spacing", "unknown key `spacing`", ":9:1"),
-        ("2.0\n[time]", "\"two\"\n[time]", "expected a number", ":12:11"),
-        ("    [0.0, 0.0],\n    [4.0, 0.0],\n", "", "0 vehicles cannot form a formation", ":3:15"),
-        ("    [4.0, 0.0],\n", "", "1 vehicle cannot form a formation", ":3:15"),
-        ("spacing_m = 3.0", "spacing_m = 2.0", "is not more than delta = 2 m", ":9:13"),
-        ("[4.0, 0.0]", "[1.5, 0.0]", "vehicles 1-2 start 1.5 m apart", ":5:5"),
-        ("[4.0, 0.0]", "[nan, 0.0]", "is not a number", ":5:5"),
-        ("[4.0, 0.0]", "[inf, 0.0]", "is infinite", ":5:5"),
-        ("[4.0, 0.0]", "[0.0, 0.0]", "vehicles 1-2 start at the same point", ":5:5"),
-        ("[start]", "[swarm]\nmass_kg = -1.0\n[start]", "the mass of vehicle 1 is -1", ":3:11"),
-        ("[time]", "[wind]\nmean_m_s = [1.0, 0.0]\n[time]", "points without drag, which do not feel it", ":13:1"),
-        ("[time]", "[time]\ndt_s = 0.0", "the time step is 0", ":14:8"),
-        ("[time]", "[time]\ndt_s = -0.1", "the time step is -0.1", ":14:8"),
-        ("duration_s = 1.0", "duration_s = 0", "the duration is 0", ":14:14"),
-        ("duration_s = 1.0", "duration_s = 1e12", "steps; at most", ":14:14"),
-        (line, "shape = \"line\"\nspacing_m = 3\n[swarm]\ncount = 1000000", "7454.4 GiB of memory", ":6:9"),
-        ("[time]", "[graph]\nkind = \"edges\"\nedges = []\n[time]", "the graph is not connected", ":15:9"),
-        ("[time]", "[time", "not TOML", ":13:6"),
-    ];
-    for &(from, to, said, place) in cases {
+    // Text of RIGHT to replace, its replacement, the code, line and column.
+    for (from, to, code, place) in [
+        ("[time]", "[time", "scenario/syntax", ":13:6"),
+        ("spacing_m", "spacing", "scenario/unknown-key", ":9:1"),
+        ("[4.0, 0.0]", "[1.5, 0.0]", "scenario/within-delta", ":5:5"),
+    ] {
         assert!(RIGHT.contains(from), "{from}");
         fs::write(folder.path().join("wrong.toml"), RIGHT.replacen(from, to, 1)).expect("a file");
-        let message = refused(folder.path(), "wrong.toml", &[]);
-        assert!(message.contains(said), "{said}: {message}");
+        let (found, message) = refused(folder.path(), "wrong.toml", &[]);
+        assert_eq!(found, code, "{message}");
         assert!(message.contains(&format!("wrong.toml{place}]")), "{place}: {message}");
     }
 }
@@ -90,40 +75,30 @@ fn a_scenario_that_cannot_be_flown_is_refused_at_its_place() {
 #[test]
 fn what_is_no_scenario_file_is_refused_by_name() {
     let folder = folder();
-    let path = |name: &str| folder.path().join(name);
-    fs::create_dir(path("folder.toml")).expect("a folder");
-    File::create(path("large.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file of 1 GiB");
-    fs::write(path("latin1.toml"), b"name = \"pair\"\n# caf\xe9\n").expect("a file");
-    fs::write(path("picture.toml"), [0x89, b'P', b'N', b'G', 0, 1, 2, 3]).expect("a file");
-    fs::write(path("empty.toml"), b"").expect("a file");
-    let cases = [
-        ("folder.toml", "folder.toml is a directory"),
-        ("large.toml", "large.toml has more than 128 MiB"),
-        ("latin1.toml", "byte 19 (from 0) is not UTF-8"),
-        ("picture.toml", "is not UTF-8"),
-        ("empty.toml", "is empty"),
-        ("missing.toml", "cannot read missing.toml"),
-        ("pentagn", "`pentagn` is neither a built-in scenario nor a file"),
-        ("", "neither a built-in scenario nor a file"),
-    ];
-    for (name, said) in cases {
-        let message = refused(folder.path(), name, &[]);
-        assert!(message.contains(said) && message.contains(name), "{said}: {message}");
+    fs::create_dir(folder.path().join("folder.toml")).expect("a folder");
+    fs::write(folder.path().join("empty.toml"), b"").expect("a file");
+    for (name, code) in [
+        ("folder.toml", "scenario/cannot-read"),
+        ("empty.toml", "scenario/empty"),
+        ("missing.toml", "scenario/not-found"),
+        ("pentagn", "scenario/not-found"),
+        ("", "scenario/not-found"),
+    ] {
+        let (found, message) = refused(folder.path(), name, &[]);
+        assert_eq!(found, code, "{message}");
+        assert!(message.contains(name), "{name}: {message}");
     }
 }
 
 #[test]
 fn a_wrong_override_is_refused_at_its_place() {
     let folder = folder();
-    let cases = [
-        ("law.delta_n=2", "unknown key `delta_n`", "--set:1:5]"),
-        ("law.delta_m=3", "a desired distance of 3 m", "--set:1:13]"),
-        ("time.dt_s=nan", "the time step is not a number", "--set:1:11]"),
-        ("law.delta_m", "has no `=`", "--set:1:1]"),
-    ];
-    for (set, said, place) in cases {
-        let message = refused(folder.path(), "pentagon", &["--set", set]);
-        assert!(message.contains(said) && message.contains(place), "{said}, {place}: {message}");
+    for (set, code, place) in
+        [("law.delta_n=2", "scenario/unknown-key", "--set:1:5]"), ("law.delta_m", "scenario/override", "--set:1:1]")]
+    {
+        let (found, message) = refused(folder.path(), "pentagon", &["--set", set]);
+        assert_eq!(found, code, "{message}");
+        assert!(message.contains(place), "{place}: {message}");
     }
 }
 
@@ -132,9 +107,9 @@ fn what_a_file_holds_does_not_steer_the_terminal() {
     let folder = folder();
     fs::write(folder.path().join("wrong.toml"), RIGHT.replacen("\"pair\"", "\"\\u001b[2J\u{1b}[2J\"", 1))
         .expect("a file");
-    assert!(!refused(folder.path(), "wrong.toml", &[]).contains('\u{1b}'));
-    assert!(!refused(folder.path(), "\u{1b}[2J", &[]).contains('\u{1b}'));
-    assert!(!refused(folder.path(), "pentagon", &["--set", "\u{1b}[2J=1"]).contains('\u{1b}'));
+    assert!(!refused(folder.path(), "wrong.toml", &[]).1.contains('\u{1b}'));
+    assert!(!refused(folder.path(), "\u{1b}[2J", &[]).1.contains('\u{1b}'));
+    assert!(!refused(folder.path(), "pentagon", &["--set", "\u{1b}[2J=1"]).1.contains('\u{1b}'));
 }
 
 #[cfg(unix)]
@@ -145,7 +120,9 @@ mod machine {
 
     const MACHINE_FAILED: Option<i32> = Some(3);
 
-    fn assert_failed(Ran { exit, out, err }: Ran, named: &str) {
+    fn assert_failed(ran: Ran, named: &str) {
+        assert_eq!(ran.code(), "files/cannot-write", "{}", ran.err);
+        let Ran { exit, out, err } = ran;
         assert_eq!((exit, out.as_str()), (MACHINE_FAILED, ""), "{err}");
         assert!(!err.contains("panicked"), "{err}");
         let message: String = err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");

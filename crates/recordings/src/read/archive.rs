@@ -38,7 +38,11 @@ impl Archive {
             && let Some(name) = repeated(path, zip.central_directory_start())?
         {
             let remedy = "unpack it, look which of the two is meant, and make the archive again with that one";
-            return Err(Fault::content(format!("two of its entries are called {}", quoted(&name)), remedy));
+            return Err(Fault::coded(
+                "recording/archive-entry",
+                format!("two of its entries are called {}", quoted(&name)),
+                remedy,
+            ));
         }
         Ok(Self { path: path.to_owned(), zip })
     }
@@ -64,7 +68,11 @@ impl Archive {
         let (method, start, crc) = (entry.compression(), entry.data_start(), entry.crc32());
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
-            return Err(Fault::content("it is encrypted", "give an archive without a password"));
+            return Err(Fault::coded(
+                "recording/unsupported-compression",
+                "it is encrypted",
+                "give an archive without a password",
+            ));
         }
         let start = start.ok_or_else(|| Fault::damaged("the entry has no place in the archive"))?;
         let mut file = File::open(&self.path)?;
@@ -80,7 +88,11 @@ impl Archive {
             }
             other => {
                 let remedy = "make the archive with deflate or unpacked, as numpy.savez does";
-                return Err(Fault::content(format!("it is packed by {other}"), remedy));
+                return Err(Fault::coded(
+                    "recording/unsupported-compression",
+                    format!("it is packed by {other}"),
+                    remedy,
+                ));
             }
         })
     }
@@ -130,8 +142,11 @@ fn repeated(path: &Path, directory: u64) -> io::Result<Option<String>> {
 fn zip_fault(error: ZipError) -> Fault {
     match error {
         ZipError::Io(error) => error.into(),
-        ZipError::FileNotFound => Fault::content("the entry is missing", "make the archive again"),
-        ZipError::UnsupportedArchive(what) => Fault::content(
+        ZipError::FileNotFound => {
+            Fault::coded("recording/archive-entry", "the entry is missing", "make the archive again")
+        }
+        ZipError::UnsupportedArchive(what) => Fault::coded(
+            "recording/unsupported-compression",
             format!("the archive needs what is not supported: {what}"),
             "make it with deflate or unpacked",
         ),

@@ -56,7 +56,7 @@ pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, Re
     let packed = |path: &PathBuf| {
         let mut source = Source::file(path);
         if path.exists() && !path.is_file() {
-            let fault = Fault::content("the bag lists this file, and it is none", REINDEX);
+            let fault = Fault::coded("recording/bag-index", "the bag lists this file, and it is none", REINDEX);
             return Err(ReadError::new(path, fault));
         }
         let (mut begin, mut bytes) =
@@ -77,7 +77,11 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     File::open(path)?.take(METADATA_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > METADATA_LIMIT_BYTES {
-        return Err(Fault::content(format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX));
+        return Err(Fault::coded(
+            "recording/bag-index",
+            format!("it is longer than {METADATA_LIMIT_BYTES} bytes"),
+            REINDEX,
+        ));
     }
     Ok(bytes)
 }
@@ -89,14 +93,14 @@ fn read(path: &Path) -> Result<Bag, ReadError> {
         let place = error.location().map(|location| Place::Line(location.line()));
         let said = error.to_string();
         let problem = format!("it is not what a ROS 2 bag says of itself: {}", said.lines().next().unwrap_or_default());
-        ReadError { place, ..Fault::content(problem, REINDEX).into() }
+        ReadError { place, ..Fault::coded("recording/bag-index", problem, REINDEX).into() }
     })?;
     Ok(metadata.bag)
 }
 
 fn missing(error: std::io::Error) -> Fault {
     if error.kind() == std::io::ErrorKind::NotFound {
-        return Fault::content("the bag lists this file, and it is not there", REINDEX);
+        return Fault::coded("recording/bag-index", "the bag lists this file, and it is not there", REINDEX);
     }
     error.into()
 }
@@ -105,19 +109,20 @@ fn missing(error: std::io::Error) -> Fault {
 fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if bag.storage_identifier != "mcap" {
         let problem = format!("the bag is stored as {}, which is not read", quoted(&bag.storage_identifier));
-        return Err(Fault::content(problem, BAG));
+        return Err(Fault::coded("recording/unsupported-format", problem, BAG));
     }
     let mode = bag.compression_mode.as_deref().unwrap_or_default().to_uppercase();
     let format = bag.compression_format.as_deref().unwrap_or_default();
     if mode == "MESSAGE" || !(format.is_empty() || format == "zstd") {
         let problem = format!("the bag is packed by {} in mode {}", quoted(format), quoted(&mode));
-        return Err(Fault::content(
+        return Err(Fault::coded(
+            "recording/unsupported-compression",
             problem,
             "have `ros2 bag convert` write it without compression, or with that of files",
         ));
     }
     if bag.relative_file_paths.is_empty() {
-        return Err(Fault::content("the bag lists no file", REINDEX));
+        return Err(Fault::coded("recording/bag-index", "the bag lists no file", REINDEX));
     }
     let (mut files, mut known) = (Vec::new(), BTreeSet::new());
     for listed in &bag.relative_file_paths {
@@ -127,11 +132,15 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
         let name = path.file_name().filter(|_| !path.components().any(odd));
         let Some(name) = name else {
             let problem = format!("the bag lists {}, which is no file in its folder", quoted(listed));
-            return Err(Fault::content(problem, REINDEX));
+            return Err(Fault::coded("recording/bag-index", problem, REINDEX));
         };
         let file = folder.join(name);
         if !known.insert(file.clone()) {
-            return Err(Fault::content(format!("the bag lists {} twice", quoted(listed)), REINDEX));
+            return Err(Fault::coded(
+                "recording/bag-index",
+                format!("the bag lists {} twice", quoted(listed)),
+                REINDEX,
+            ));
         }
         files.push(file);
     }
@@ -156,7 +165,7 @@ fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
             let problem = format!("{other} lies beside the files of the bag, which does not list it");
             let remedy =
                 "take the file away if it is none of the bag; else have `ros2 bag reindex` write metadata.yaml anew";
-            Err(Fault::content(problem, remedy).into())
+            Err(Fault::coded("recording/bag-index", problem, remedy).into())
         }
     }
 }

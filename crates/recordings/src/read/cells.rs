@@ -59,18 +59,18 @@ pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, F
 pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
     let (text, column) = (cells.text(column)?, &cells.header()[column]);
     let text = text.trim();
-    let holds = |what: &str, remedy| {
+    let holds = |code, what: &str, remedy| {
         let problem = format!("column `{column}` holds {}, {what}", quoted(text));
-        Err(Fault::content(problem, remedy))
+        Err(Fault::coded(code, problem, remedy))
     };
     match text.parse::<f64>() {
         _ if text.is_empty() => Ok(None),
         Ok(number) if number.is_finite() => Ok(Some(number)),
         Ok(_) => Err(Fault::not_finite(column, text, unseen)),
         Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-            holds("a number with a decimal comma", "write numbers with a decimal point")
+            holds("recording/decimal-comma", "a number with a decimal comma", "write numbers with a decimal point")
         }
-        Err(_) => holds("which is not a number", "write a number with a decimal point"),
+        Err(_) => holds("recording/not-a-number", "which is not a number", "write a number with a decimal point"),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::error::{Fault, list, quoted};
-use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, VELOCITY, is_angle, is_velocity};
+use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::heights::Heights;
 use super::options::{ColumnNames, ReadOptions};
 use super::turned;
@@ -46,7 +46,17 @@ const WORDS: [&str; 12] = [
 pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
     let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header, 12));
     let option = ColumnNames::ROLES[role];
-    Fault::content(problem, format!("name the column with --column {option}=NAME, or put it into the header"))
+    let remedy = format!("name the column with --column {option}=NAME, or put it into the header");
+    Fault::coded(code_of_missing(role), problem, remedy)
+}
+
+fn code_of_missing(role: Role) -> &'static str {
+    match role {
+        TIME => "recording/no-time-column",
+        ID => "recording/no-vehicle-column",
+        _ if is_velocity(role) || role == RADIUS => "recording/missing-column",
+        _ => "recording/no-position-column",
+    }
 }
 
 /// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
@@ -108,7 +118,11 @@ impl<'a> Columns<'a> {
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
         let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
-        Err(Fault::content(problem, "name the one that is meant with --column, or take the other out"))
+        Err(Fault::coded(
+            "recording/ambiguous-column",
+            problem,
+            "name the one that is meant with --column, or take the other out",
+        ))
     }
 
     /// Finds the vehicles of a wide table, and gives their names in order of appearance.
@@ -123,7 +137,11 @@ impl<'a> Columns<'a> {
         if let (Some((odd, _)), Some((word, _))) = (odd, words) {
             let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
             let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
-            return Err(Fault::content(problem, "give the column a longer name, or take it out"));
+            return Err(Fault::coded(
+                "recording/ambiguous-column",
+                problem,
+                "give the column a longer name, or take it out",
+            ));
         }
         let mut names: Vec<String> = Vec::new();
         // `cf1_v_x` is a velocity where there is a `cf1_x`.
@@ -177,7 +195,11 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = units::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} says a unit of angle that is not known, {}", quoted(unit));
-                    Fault::content(problem, "write it in degrees, and name the column without a unit")
+                    Fault::coded(
+                        "recording/unknown-unit",
+                        problem,
+                        "write it in degrees, and name the column without a unit",
+                    )
                 })?;
                 continue;
             }
@@ -190,7 +212,7 @@ impl<'a> Columns<'a> {
                 let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
                 let remedy =
                     "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
-                Fault::content(problem, remedy)
+                Fault::coded("recording/unknown-unit", problem, remedy)
             })?;
             metres[column] = size;
             if size != 1.0 {
@@ -213,11 +235,19 @@ impl<'a> Columns<'a> {
         };
         if let Some(silent) = silent {
             let problem = format!("column {other} says its unit, and column {silent} none");
-            return Err(Fault::content(problem, "write the unit of each column into its name, as in `x [mm]`"));
+            return Err(Fault::coded(
+                "recording/unit-conflict",
+                problem,
+                "write the unit of each column into its name, as in `x [mm]`",
+            ));
         }
         if scale != 1.0 {
             let problem = format!("column {other} says its unit, and --scale {scale} another");
-            return Err(Fault::content(problem, "leave --scale away, or take the units out of the header"));
+            return Err(Fault::coded(
+                "recording/contradicts-option",
+                problem,
+                "leave --scale away, or take the units out of the header",
+            ));
         }
         Ok(metres)
     }

@@ -94,7 +94,7 @@ impl Convention {
         };
         let Some(alt) = at("ref_alt") else {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, and there is no column `ref_alt`";
-            return Err(Fault::content(problem, GLOBAL));
+            return Err(Fault::coded("recording/missing-column", problem, GLOBAL));
         };
         let mut px4 = self.clone();
         for start in ["", "v"] {

@@ -35,7 +35,12 @@ pub(super) fn open(
     let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("it has no vehicle {}, whose start is given", quoted(name));
-        return Err(Fault::content(problem, "name vehicles in --start as their files are called").into());
+        return Err(Fault::coded(
+            "recording/unknown-vehicle",
+            problem,
+            "name vehicles in --start as their files are called",
+        )
+        .into());
     }
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
@@ -78,7 +83,7 @@ impl Columns {
             let found = header.iter().position(|known| known.eq_ignore_ascii_case(name));
             found.ok_or_else(|| {
                 let remedy = "the header of a polynomial file is duration,x^0,...,x^7,y^0,...,z^0,...";
-                Fault::content(format!("there is no column `{name}`"), remedy)
+                Fault::coded("recording/missing-column", format!("there is no column `{name}`"), remedy)
             })
         };
         let mut highest = 0;
@@ -86,7 +91,7 @@ impl Columns {
             let Some(("x" | "y" | "z" | "X" | "Y" | "Z", power)) = name.split_once('^') else { continue };
             let power = power.parse::<usize>().ok().filter(|&power| power <= HIGHEST_POWER).ok_or_else(|| {
                 let problem = format!("column `{name}` is of a power that is not a number up to {HIGHEST_POWER}");
-                Fault::content(problem, "pieces of Crazyflie trajectories are of degree 7")
+                Fault::coded("recording/degree", problem, "pieces of Crazyflie trajectories are of degree 7")
             })?;
             highest = highest.max(power);
         }
@@ -123,7 +128,7 @@ impl Curve {
         let to_s = self.time_s + duration_s;
         if duration_s <= 0.0 || to_s <= self.time_s {
             let problem = format!("the piece lasts {duration_s} s");
-            return Err(Fault::content(problem, "take pieces without a duration out"));
+            return Err(Fault::coded("recording/duration", problem, "take pieces without a duration out"));
         }
         let mut coefficients = Vec::with_capacity(columns.powers.len());
         for &[x, y, z] in &columns.powers {

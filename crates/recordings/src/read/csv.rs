@@ -72,7 +72,7 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
                                whole";
                 let remedy = "give --format trajnet, or --dimensions 3 for a time and a position";
-                return Err(Fault::content(problem, remedy).into());
+                return Err(Fault::coded("recording/ambiguous-layout", problem, remedy).into());
             }
             Likeness::None => {}
         }
@@ -86,9 +86,11 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
-        _ if options.dimensions.is_some() => {
-            Err(Fault::content("its header says which numbers are a vehicle's", "leave --dimensions away"))
-        }
+        _ if options.dimensions.is_some() => Err(Fault::coded(
+            "recording/contradicts-option",
+            "its header says which numbers are a vehicle's",
+            "leave --dimensions away",
+        )),
         // What stands above numbers may be a remark.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
@@ -132,14 +134,15 @@ impl Text {
         let line = self.lines.line();
         if line.contains(&b'\r') {
             let remedy = "save it with the line ends of Unix or Windows";
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/line-ends",
                 "its lines end with carriage returns alone, as those of old Macintoshes",
                 remedy,
             ));
         }
         if let Some(value) = decimal_comma(line) {
             let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
-            return Err(Fault::content(problem, "write numbers with a decimal point"));
+            return Err(Fault::coded("recording/decimal-comma", problem, "write numbers with a decimal point"));
         }
         self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
@@ -154,7 +157,7 @@ impl Text {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
             let remedy =
                 "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
-            return Err(Fault::content(problem, remedy));
+            return Err(Fault::coded("recording/wrong-format", problem, remedy));
         }
         if numeric {
             self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
@@ -172,7 +175,11 @@ impl Text {
         } else {
             let remedy = "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with \
                           a row for each time";
-            return Err(Fault::content("the first line holds numbers and no names of columns", remedy));
+            return Err(Fault::coded(
+                "recording/no-header",
+                "the first line holds numbers and no names of columns",
+                remedy,
+            ));
         }
         Ok(())
     }
@@ -229,7 +236,7 @@ impl Text {
         } else {
             "every line needs a field for each column; leave cells empty where a vehicle was not seen"
         };
-        Fault::content(format!("it has {found} fields where {expected} are expected"), remedy)
+        Fault::coded("recording/field-count", format!("it has {found} fields where {expected} are expected"), remedy)
     }
 }
 
@@ -438,7 +445,11 @@ impl Fields {
         let (result, read, _, count) = reader.read_record(&text, &mut unquoted, &mut ends);
         if result != ReadRecordResult::Record || read < text.len() {
             let remedy = "close the quotes on the line where they begin";
-            return Err(Fault::content("its quotes are not closed on the same line", remedy));
+            return Err(Fault::coded(
+                "recording/unclosed-quotes",
+                "its quotes are not closed on the same line",
+                remedy,
+            ));
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         self.ends.clear();

@@ -58,7 +58,7 @@ impl Local {
         // Another file would begin somewhere else.
         let problem = "nothing says what its places on the Earth are measured from, the same for all files";
         let remedy = format!("say it with --origin, such as --origin {}", local.origin());
-        Err(Fault::content(problem, remedy))
+        Err(Fault::coded("recording/no-origin", problem, remedy))
     }
 
     /// A place that is given east, north and up of another origin \[m\].
@@ -128,7 +128,7 @@ fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
         }
         let problem = format!("{} is no {what}: it is not within {most} degrees", quoted(&format!("{value:?}")));
         let remedy = "write degrees with decimals; whole numbers of 1e-7 degrees are to be divided by 1e7";
-        Err(Fault::content(problem, remedy))
+        Err(Fault::coded("recording/not-on-earth", problem, remedy))
     };
     range("latitude", place.x, 90.0)?;
     range("longitude", place.y, 360.0)?;

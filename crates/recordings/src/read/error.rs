@@ -174,10 +174,6 @@ impl Fault {
         Self::Content { code, problem: problem.into(), remedy: remedy.into() }
     }
 
-    pub(super) fn content(problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::coded("recording/content", problem, remedy)
-    }
-
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
         Self::Damaged(reason.to_string())
     }

@@ -95,7 +95,7 @@ impl Folder {
             Some(name) => format!("give {name}, which lies in it"),
             None => remedy.to_owned(),
         };
-        Fault::content(format!("there is no table in the {what}{holds}"), remedy)
+        Fault::coded("recording/folder", format!("there is no table in the {what}{holds}"), remedy)
     }
 
     /// That tables lie in folders, which would be several recordings.
@@ -115,7 +115,11 @@ impl Folder {
         };
         let beside = if self.files.is_empty() { "" } else { "some of " };
         let problem = format!("{beside}its tables lie in folders: {}", listed(&folders));
-        Fault::content(problem, format!("{remedy}; the tables of one recording lie side by side, one for each vehicle"))
+        Fault::coded(
+            "recording/folder",
+            problem,
+            format!("{remedy}; the tables of one recording lie side by side, one for each vehicle"),
+        )
     }
 
     fn sorted(mut self) -> Self {

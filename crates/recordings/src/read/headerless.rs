@@ -62,7 +62,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
                 "say it with --dimensions {}: x and y, x, y and z, and +2 or +3 with their velocities",
                 ways.join(" or ")
             );
-            return Err(Fault::content(problem, remedy));
+            return Err(Fault::coded("recording/ambiguous-layout", problem, remedy));
         }
         (None, []) if count == 12 => {
             if options.times_per_second.is_none() {
@@ -73,7 +73,8 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         (given, _) => {
             let each = given.map_or(3, |given| given.counts().1);
             let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/field-count",
                 problem,
                 "write t x y z x y z ..., a line for each time, or give other --dimensions",
             ));

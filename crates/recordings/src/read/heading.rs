@@ -426,7 +426,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         }
         let problem =
             format!("column {} says the unit {}, and the row of units {}", quoted(name), quoted(&said), quoted(unit));
-        Err(Fault::content(problem, "take one of the two units out"))
+        Err(Fault::coded("recording/unit-conflict", problem, "take one of the two units out"))
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());

@@ -49,7 +49,11 @@ pub(super) fn spelling(name: &str) -> String {
 /// That two names are those of one vehicle, or nearly.
 pub(super) fn alike(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
-    Fault::content(problem, "write one name for one vehicle, and names for two that differ in more than that")
+    Fault::coded(
+        "recording/vehicle-twice",
+        problem,
+        "write one name for one vehicle, and names for two that differ in more than that",
+    )
 }
 
 /// A second column that could name the vehicles of the rows, beside the one that does.
@@ -231,7 +235,7 @@ impl Suspect {
             quoted(called)
         );
         let remedy = format!("name the column of the vehicle with --column id={called}; {otherwise}");
-        Some(Fault::content(problem, remedy))
+        Some(Fault::coded("recording/several-vehicles", problem, remedy))
     }
 }
 

@@ -45,7 +45,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         if let Some(first) = known.insert(spelling(name), path) {
             let problem = format!("the vehicle of {} is called {} too", first.display(), quoted(name));
             let remedy = "vehicles are called as their files: give each file another name";
-            return Err(ReadError::new(path, Fault::content(problem, remedy)));
+            return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
         }
     }
     check_own_names(&recordings, &paths, &vehicles)?;
@@ -67,7 +67,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
             continue;
         };
         let remedy = "say the unit with --time-unit, and write all times by one clock";
-        return Err(ReadError::new(path, Fault::content(problem, remedy)));
+        return Err(ReadError::new(path, Fault::coded("recording/several-clocks", problem, remedy)));
     }
     let clock = Clock {
         inferred: clocks.iter().any(|clock| clock.inferred),
@@ -124,12 +124,12 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
     if let Some((name, path, _)) = others.next().filter(|_| known.keys().eq(&files)) {
         let problem = format!("the rows name vehicle {}, which is the name of another file", quoted(name));
         let remedy = "name each file after its vehicle, or remove the column with the name";
-        return Err(ReadError::new(path, Fault::content(problem, remedy)));
+        return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
     }
     let Some((name, first, path)) = twice else { return Ok(()) };
     let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
     let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
-    Err(ReadError::new(path, Fault::content(problem, remedy)))
+    Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)))
 }
 
 /// Refuses files in different frames: on the Earth and in plain metres, or with and without directions of the axes.
@@ -145,7 +145,10 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     other.map_or(Ok(()), |(tracks, other)| {
         let [its, those] = [tracks, first].map(|tracks| words(frame(tracks)));
         let problem = format!("its positions {its}, and those of {} {those}", path.display());
-        Err(ReadError::new(other, Fault::content(problem, "use one frame and the same column names in all files")))
+        Err(ReadError::new(
+            other,
+            Fault::coded("recording/several-frames", problem, "use one frame and the same column names in all files"),
+        ))
     })
 }
 
@@ -183,7 +186,7 @@ impl Part {
                 Item::Piece(_) => "it holds a curve, and the first of its files samples",
             };
             let remedy = "files that are joined hold the samples of one vehicle each: split it, or take the column out";
-            return Err(ReadError::new(&self.path, Fault::content(problem, remedy)));
+            return Err(ReadError::new(&self.path, Fault::coded("recording/several-vehicles", problem, remedy)));
         }
         self.until_s = items.last().map_or(self.until_s, Item::time_s);
         self.waiting = items.into_iter().peekable();

@@ -179,7 +179,11 @@ impl Layout {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
-                Err(Fault::content(problem, "name the axes of all positions in the same way, as in `x_ned` or `north`"))
+                Err(Fault::coded(
+                    "recording/several-frames",
+                    problem,
+                    "name the axes of all positions in the same way, as in `x_ned` or `north`",
+                ))
             }
             _ => Ok(()),
         }
@@ -191,14 +195,18 @@ impl Layout {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
             let problem = format!("its positions are in metres, and --scale {} says another unit", options.metres());
-            return Err(Fault::content(problem, "leave --scale away"));
+            return Err(Fault::coded("recording/contradicts-option", problem, "leave --scale away"));
         }
         let several = self
             .id
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return Err(Fault::content(format!("{namer} names the vehicles"), "leave --one-vehicle away"));
+            return Err(Fault::coded(
+                "recording/contradicts-option",
+                format!("{namer} names the vehicles"),
+                "leave --one-vehicle away",
+            ));
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -218,7 +226,8 @@ impl Layout {
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/ambiguous-column",
                 problem,
                 "give the columns of each vehicle a name of their own, or take these out",
             ));
@@ -302,7 +311,11 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
         quoted(vehicle),
         quoted(read)
     );
-    Fault::content(problem, "give the positions of all vehicles in one frame, or remove the columns of the other frame")
+    Fault::coded(
+        "recording/several-frames",
+        problem,
+        "give the positions of all vehicles in one frame, or remove the columns of the other frame",
+    )
 }
 
 /// The column that names the vehicles, and others that could; none where the user says which one it is.
@@ -327,7 +340,7 @@ fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, F
         let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
         let remedy =
             "say how many seconds it lasts with --time-scale, such as 60 for minutes, or what it is with --time-unit";
-        Fault::content(problem, remedy)
+        Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }
 

@@ -143,7 +143,12 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     if data.is_dir() {
         if bag::is_bag(path) {
             let remedy = "give it alone, without --join: its topics are its vehicles";
-            return Err(Fault::content("it is a ROS 2 bag, and no file of one vehicle", remedy).into());
+            return Err(Fault::coded(
+                "recording/several-vehicles",
+                "it is a ROS 2 bag, and no file of one vehicle",
+                remedy,
+            )
+            .into());
         }
         let folder = Folder::open(path)?;
         let remedy =
@@ -152,7 +157,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, and a recording is read more than once";
-        return Err(Fault::content(problem, "save it to a file first, and give the file").into());
+        return Err(Fault::coded("recording/not-a-file", problem, "save it to a file first, and give the file").into());
     }
     if !recognise::is_archive(path)? {
         return Ok(None);

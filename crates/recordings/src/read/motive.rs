@@ -69,14 +69,19 @@ impl Head {
     fn capture(&self) -> Result<Capture, Fault> {
         let unit = self.said("Length Units").unwrap_or_default();
         let metres = units::size_of(unit, false).ok_or_else(|| {
-            Fault::content(format!("its unit of length is not known: {}", quoted(unit)), "export it in metres")
+            Fault::coded(
+                "recording/unknown-unit",
+                format!("its unit of length is not known: {}", quoted(unit)),
+                "export it in metres",
+            )
         })?;
         if let Some(space) = self.said("Coordinate Space").filter(|space| *space != "Global") {
             let problem = format!("its places are given in the space {}", quoted(space));
-            return Err(Fault::content(problem, "export it in global coordinates"));
+            return Err(Fault::coded("recording/unusable-frame", problem, "export it in global coordinates"));
         }
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
-        let time = time.ok_or_else(|| Fault::content("there is no column of time", EXPORT))?;
+        let time =
+            time.ok_or_else(|| Fault::coded("recording/no-time-column", "there is no column of time", EXPORT))?;
         let bodies = self.positions("Rigid Body");
         let has_bodies = !bodies.is_empty();
         let vehicles = if has_bodies {
@@ -85,12 +90,20 @@ impl Head {
             by_subject(self.positions("Marker"))?
         };
         if vehicles.is_empty() {
-            return Err(Fault::content("it has neither the position of a rigid body nor of a labelled marker", EXPORT));
+            return Err(Fault::coded(
+                "recording/no-positions",
+                "it has neither the position of a rigid body nor of a labelled marker",
+                EXPORT,
+            ));
         }
         let mut known = BTreeSet::new();
         if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
             let problem = format!("two rigid bodies are called {}", quoted(name));
-            return Err(Fault::content(problem, "give each a name of its own, and export the take again"));
+            return Err(Fault::coded(
+                "recording/vehicle-twice",
+                problem,
+                "give each a name of its own, and export the take again",
+            ));
         }
         let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
         notes.extend(note_of_markers(&vehicles));

@@ -77,7 +77,7 @@ impl Array {
         let descr = descr.trim_matches(['\'', '"']);
         let (kind, width, big_endian) = kind(descr).ok_or_else(|| {
             let remedy = "save times as float64, int64 or datetime64, and positions as float32 or float64";
-            Fault::content(format!("it holds elements of type `{descr}`"), remedy)
+            Fault::coded("recording/element-type", format!("it holds elements of type `{descr}`"), remedy)
         })?;
         let fortran_order = value(&header, "fortran_order").ok_or_else(|| broken("order"))? == "True";
         let shape = value(&header, "shape").ok_or_else(|| broken("shape"))?;
@@ -162,7 +162,11 @@ impl Array {
 }
 
 fn not(what: &str, found: &str) -> Fault {
-    Fault::content(format!("its elements are no {what} but {found}"), "save float64, int64 or text")
+    Fault::coded(
+        "recording/element-type",
+        format!("its elements are no {what} but {found}"),
+        "save float64, int64 or text",
+    )
 }
 
 fn read_exactly(bytes: &mut impl Read, buffer: &mut [u8]) -> Result<(), Fault> {

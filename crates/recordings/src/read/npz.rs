@@ -38,22 +38,27 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         Some(given) => Some(given.clone()),
         None => arrays.only_of(&TIMES, "t")?,
     };
-    let time = time.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("times", "t"))?;
+    let time = time
+        .filter(|name| arrays.holds(name))
+        .ok_or_else(|| arrays.missing("recording/no-time-column", "times", "t"))?;
     let positions = match options.columns.get("x") {
         Some(given) => Some(given.clone()),
         None => arrays.only_of(&POSITIONS, "x")?,
     };
-    let positions =
-        positions.filter(|name| arrays.holds(name)).ok_or_else(|| arrays.missing("positions", "positions"))?;
+    let positions = positions
+        .filter(|name| arrays.holds(name))
+        .ok_or_else(|| arrays.missing("recording/no-position-column", "positions", "positions"))?;
 
     let mut stamps = arrays.array(&time)?;
     let unit = stamps.unit().or_else(|| time.rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit)));
     let mut times = Vec::new();
     for k in 0..stamps.count() {
         let stamp = stamps.next_stamp().and_then(|stamp| match stamp {
-            Stamp::Real(time) if !time.is_finite() => {
-                Err(Fault::content(format!("it is {time}"), "times are finite: take the instant out"))
-            }
+            Stamp::Real(time) if !time.is_finite() => Err(Fault::coded(
+                "recording/not-finite",
+                format!("it is {time}"),
+                "times are finite: take the instant out",
+            )),
             stamp => Ok(stamp),
         });
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
@@ -77,7 +82,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
-    let none = Fault::content("it holds no position", "save at least one instant of one vehicle");
+    let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
     let mut about = About::new(source, options, unit, notes, none);
     about.frame.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
@@ -115,12 +120,16 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
         [] => {
             let remedy = "save as many instants as times, and two or three axes: T x N x 3, or say what the axes are \
                           with --layout, such as --layout time,vehicle,axis";
-            Err(Fault::content(problem(""), remedy))
+            Err(Fault::coded("recording/array-shape", problem(""), remedy))
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
             let remedy = format!("say what its axes are with --layout {}", ways.join(" or "));
-            Err(Fault::content(problem(": its shape does not say which axis is which"), remedy))
+            Err(Fault::coded(
+                "recording/ambiguous-layout",
+                problem(": its shape does not say which axis is which"),
+                remedy,
+            ))
         }
     }
 }
@@ -149,20 +158,24 @@ impl Arrays {
         match (found.next(), found.next()) {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                Err(Fault::content(problem, format!("name the one that is meant with --column {option}=NAME")))
+                Err(Fault::coded(
+                    "recording/ambiguous-column",
+                    problem,
+                    format!("name the one that is meant with --column {option}=NAME"),
+                ))
             }
             (first, _) => Ok(first),
         }
     }
 
-    fn missing(&self, role: &str, usual: &str) -> Fault {
+    fn missing(&self, code: &'static str, role: &str, usual: &str) -> Fault {
         let names = self.archive.names();
         let names: Vec<_> =
             names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
         let option = if usual == "t" { "t" } else { "x" };
         let problem = format!("there is no array of {role}; its arrays are {}", names.join(", "));
         let remedy = format!("save it as `{usual}`, or name it with --column {option}=NAME");
-        Fault::content(problem, remedy)
+        Fault::coded(code, problem, remedy)
     }
 
     fn array(&mut self, name: &str) -> Result<Array, ReadError> {
@@ -195,7 +208,11 @@ impl Arrays {
         let (order, expected): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
         if array.shape != expected {
             let problem = format!("it is of shape {:?} where {expected:?} belongs to the positions", array.shape);
-            return Err(in_array(name)(Fault::content(problem, "save arrays of one recording together")));
+            return Err(in_array(name)(Fault::coded(
+                "recording/array-shape",
+                problem,
+                "save arrays of one recording together",
+            )));
         }
         numbers(array, &order).map_err(in_array(name))
     }
@@ -204,12 +221,15 @@ impl Arrays {
     fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
         let names = self.texts("names")?;
         let different: BTreeSet<_> = names.iter().collect();
-        let problem = match different.len() {
-            _ if names.len() != vehicles => format!("it has {} elements for {vehicles} vehicles", names.len()),
-            count if count < vehicles => "two vehicles have the same name".to_owned(),
+        let (code, problem) = match different.len() {
+            _ if names.len() != vehicles => {
+                ("recording/array-shape", format!("it has {} elements for {vehicles} vehicles", names.len()))
+            }
+            count if count < vehicles => ("recording/vehicle-twice", "two vehicles have the same name".to_owned()),
             _ => return Ok(names),
         };
-        Err(in_array("names")(Fault::content(problem, "save a name of its own for each vehicle, or leave `names` out")))
+        let remedy = "save a name of its own for each vehicle, or leave `names` out";
+        Err(in_array("names")(Fault::coded(code, problem, remedy)))
     }
 
     fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
@@ -227,11 +247,11 @@ impl Arrays {
         let at = in_array(name);
         let &[first, second, third] = array.shape.as_slice() else {
             let problem = format!("it is of shape {:?}", array.shape);
-            return Err(at(Fault::content(problem, "save positions as T x N x 3 or N x T x 3")));
+            return Err(at(Fault::coded("recording/array-shape", problem, "save positions as T x N x 3 or N x T x 3")));
         };
         if array.count() == 0 {
             let problem = format!("it is of shape {:?}, which holds nothing", array.shape);
-            return Err(at(Fault::content(problem, "save at least one instant of one vehicle")));
+            return Err(at(Fault::coded("recording/empty", problem, "save at least one instant of one vehicle")));
         }
         let shape = [first, second, third];
         let layout = layout(shape, times, said).map_err(&at)?;
@@ -306,7 +326,11 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
-    Err(Fault::content(format!("the radius is {radius}"), "radii are finite and 0 or more, or NaN where unknown"))
+    Err(Fault::coded(
+        "recording/radius",
+        format!("the radius is {radius}"),
+        "radii are finite and 0 or more, or NaN where unknown",
+    ))
 }
 
 /// The rows of an archive.
@@ -335,12 +359,13 @@ impl Instants {
         }
         if let Some(odd) = position.iter().find(|x| !x.is_finite()) {
             let remedy = "save an array `seen` of T x N booleans that is false where a vehicle was not seen";
-            return Err(Fault::content(format!("the position holds {odd}"), remedy));
+            return Err(Fault::coded("recording/not-finite", format!("the position holds {odd}"), remedy));
         }
         // A vehicle without a velocity has NaN among those with one.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/not-finite",
                 "the velocity is not finite",
                 "velocities are finite, or all NaN where unknown",
             ));

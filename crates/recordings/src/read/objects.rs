@@ -33,7 +33,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
-        return Err(Fault::content(problem, remedy).at(Place::Line(*line)));
+        return Err(Fault::coded("recording/list-length", problem, remedy).at(Place::Line(*line)));
     }
     table::open(source, objects, layout, None, 0, options)
 }
@@ -96,7 +96,9 @@ impl Objects {
                 if objects.header.len() == MOST_COLUMNS {
                     let problem = format!("its objects have more than {MOST_COLUMNS} different keys");
                     let remedy = "write an object for each vehicle and time, with the same keys in all";
-                    return Err(Fault::content(problem, remedy).at(Place::Line(objects.lines.number())));
+                    return Err(
+                        Fault::coded("recording/field-count", problem, remedy).at(Place::Line(objects.lines.number()))
+                    );
                 }
                 objects.columns.insert(key.clone(), objects.header.len());
                 objects.header.push(key.clone());
@@ -125,7 +127,8 @@ impl Objects {
 
 fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(String, usize)>) -> Result<(), Fault> {
     let refused = |what: String| {
-        Fault::content(
+        Fault::coded(
+            "recording/malformed",
             format!("it is no object of JSON: {what}"),
             "write an object like {\"t\": 0, \"id\": \"a\", ...} in each line",
         )

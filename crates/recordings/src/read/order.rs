@@ -269,7 +269,7 @@ impl<R: Rows> Ordered<R> {
         let remedy = "take one of the two out, or say which is read with --duplicates first or --duplicates last: a \
                       vehicle is in one place at a time; where the rows are of several, name the column that tells \
                       them apart with --column id=NAME";
-        Fault::content(problem, remedy)
+        Fault::coded("recording/duplicate-row", problem, remedy)
     }
 
     #[cold]
@@ -280,7 +280,7 @@ impl<R: Rows> Ordered<R> {
             format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its previous position is at {first}");
         let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times \
                       with --time-unit";
-        Fault::content(problem, remedy)
+        Fault::coded("recording/position-jump", problem, remedy)
     }
 
     #[cold]
@@ -288,7 +288,7 @@ impl<R: Rows> Ordered<R> {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
-        Fault::content(format!("vehicle {vehicle} has {which} at {first}"), remedy)
+        Fault::coded("recording/radius", format!("vehicle {vehicle} has {which} at {first}"), remedy)
     }
 
     /// The next row, which stays the next one until it is taken.

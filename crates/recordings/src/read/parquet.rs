@@ -58,8 +58,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     layout.suspects.retain(can_name);
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
-        if let Some((what, remedy)) = unreadable(&reader, column) {
-            return Err(Fault::content(format!("column `{}` {what}", header[column]), remedy).into());
+        if let Some((code, what, remedy)) = unreadable(&reader, column) {
+            return Err(Fault::coded(code, format!("column `{}` {what}", header[column]), remedy).into());
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
@@ -106,11 +106,15 @@ fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
 }
 
 /// What keeps a column from being read as numbers or text without a change of meaning, and what helps.
-fn unreadable(reader: &SerializedFileReader<File>, column: usize) -> Option<(&'static str, &'static str)> {
+fn unreadable(
+    reader: &SerializedFileReader<File>,
+    column: usize,
+) -> Option<(&'static str, &'static str, &'static str)> {
+    const ELEMENT_TYPE: &str = "recording/element-type";
     let metadata = reader.metadata();
     let descriptor = metadata.file_metadata().schema_descr().column(column);
     if descriptor.max_rep_level() > 0 {
-        return Some(("holds lists", "save a number in each cell"));
+        return Some((ELEMENT_TYPE, "holds lists", "save a number in each cell"));
     }
     let other = match (descriptor.logical_type_ref(), descriptor.converted_type()) {
         (Some(LogicalType::Decimal(_)), _) | (_, ConvertedType::DECIMAL) => Some("holds decimals"),
@@ -121,7 +125,7 @@ fn unreadable(reader: &SerializedFileReader<File>, column: usize) -> Option<(&'s
         _ => None,
     };
     if let Some(what) = other {
-        return Some((what, "save numbers as double, and time as double, int64 or time stamps"));
+        return Some((ELEMENT_TYPE, what, "save numbers as double, and time as double, int64 or time stamps"));
     }
     let mut chunks = metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
     let packed = chunks.find_map(|chunk| match chunk.compression() {
@@ -129,7 +133,9 @@ fn unreadable(reader: &SerializedFileReader<File>, column: usize) -> Option<(&'s
         Compression::LZO => Some("is packed by lzo, which is not read"),
         _ => None,
     });
-    packed.map(|what| (what, "save it plain, or packed by snappy, gzip, lz4 or zstd"))
+    packed.map(|what| {
+        ("recording/unsupported-compression", what, "save it plain, or packed by snappy, gzip, lz4 or zstd")
+    })
 }
 
 /// Whether the whole numbers of a column have no sign.
@@ -166,7 +172,8 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
             Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
         }),
         ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
-        _ => Err(Fault::content(
+        _ => Err(Fault::coded(
+            "recording/element-type",
             format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
             "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
         )),
@@ -326,7 +333,7 @@ impl Cells for Groups {
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         if let Cell::Real(_) = self.cell(column) {
             let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
-            return Err(Fault::content(problem, "save vehicles as text or as whole numbers"));
+            return Err(Fault::coded("recording/element-type", problem, "save vehicles as text or as whole numbers"));
         }
         self.text(column)
     }

@@ -19,7 +19,11 @@ pub(super) fn origin<C: Cells>(
 ) -> Result<Option<Local>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
-        let needless = Fault::content("it has no columns of latitude and longitude", "leave --origin away");
+        let needless = Fault::coded(
+            "recording/unused-option",
+            "it has no columns of latitude and longitude",
+            "leave --origin away",
+        );
         return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
     }
     turned::refuse_known(options, "a table of latitudes and longitudes")?;
@@ -37,11 +41,16 @@ pub(super) fn origin<C: Cells>(
     }
     if reference.is_some() {
         let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
-        return Err(Fault::content(problem, GLOBAL).into());
+        return Err(Fault::coded("recording/no-fix", problem, GLOBAL).into());
     }
     if unfixed {
         let problem = "no row has a fix: every latitude and longitude is exactly 0";
-        return Err(Fault::content(problem, "record again once the receiver has a fix, or give another file").into());
+        return Err(Fault::coded(
+            "recording/no-fix",
+            problem,
+            "record again once the receiver has a fix, or give another file",
+        )
+        .into());
     }
     Ok(None)
 }

@@ -51,7 +51,12 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     if (source.gzip || packed) && !unpacks && !(packed && format == Format::Crazyflie) {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
         let problem = format!("it is {} inside {within}", format.title());
-        return Err(Fault::content(problem, format!("unpack it first, with {remedy}")).into());
+        return Err(Fault::coded(
+            "recording/unsupported-compression",
+            problem,
+            format!("unpack it first, with {remedy}"),
+        )
+        .into());
     }
     Ok(format)
 }
@@ -104,7 +109,11 @@ fn format_of(head: &[u8]) -> Result<Format, Fault> {
     }
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
-        return Err(Fault::content("it is a single NumPy array, which tells no times", remedy));
+        return Err(Fault::coded(
+            "recording/no-time-column",
+            "it is a single NumPy array, which tells no times",
+            remedy,
+        ));
     }
     if let Some(stranger) = stranger::of_bytes(head) {
         return Err(stranger);

@@ -110,7 +110,7 @@ pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -
             let remedy = "look whether its clock was set; where the rows are of several vehicles, name the column that \
                           tells them apart with --column id=NAME; where they are only out of order, have them sorted \
                           with --sort";
-            return Err(Fault::content(problem, remedy).at(of.place(row.place)));
+            return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
         }
     }
     Ok(())

@@ -86,7 +86,12 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
         Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
         Some(_) => {
             let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays nor tables");
-            return Err(Fault::content(problem, "give a .skyc or .npz file, or pack a table for each vehicle").into());
+            return Err(Fault::coded(
+                "recording/unknown-format",
+                problem,
+                "give a .skyc or .npz file, or pack a table for each vehicle",
+            )
+            .into());
         }
         None => {
             let mut bytes = Vec::new();
@@ -107,7 +112,12 @@ pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let (show, mut archive) = show(source)?;
     let Some(swarm) = show.swarm else {
-        return Err(Fault::content("it is JSON, but no Skybrush show: it has no `swarm`", stranger::TABLE).into());
+        return Err(Fault::coded(
+            "recording/unsupported-format",
+            "it is JSON, but no Skybrush show: it has no `swarm`",
+            stranger::TABLE,
+        )
+        .into());
     };
     let mut names = Vec::new();
     let mut curves = Vec::new();
@@ -131,7 +141,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     stand_throughout(&mut curves);
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
-        return Err(Fault::content("the show has no drone with a trajectory", remedy).into());
+        return Err(Fault::coded("recording/no-positions", "the show has no drone with a trajectory", remedy).into());
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
 }
@@ -156,7 +166,12 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
     let name = name.trim_start_matches("./");
     let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
         let problem = format!("it refers to `{reference}`, which is not there");
-        return Err(Fault::content(problem, "give the .skyc file that holds all parts of the show").into());
+        return Err(Fault::coded(
+            "recording/archive-entry",
+            problem,
+            "give the .skyc file that holds all parts of the show",
+        )
+        .into());
     };
     parse(&archive.whole(name)?, Some(name))
 }
@@ -170,7 +185,7 @@ fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, Re
             Fault::Truncated("the JSON ends before it is complete".to_owned())
         } else {
             let remedy = "give a show as Skybrush exports it";
-            Fault::content(format!("it is not the JSON of a Skybrush show: {error}"), remedy)
+            Fault::coded("recording/malformed", format!("it is not the JSON of a Skybrush show: {error}"), remedy)
         };
         fault.at(place)
     })
@@ -180,7 +195,10 @@ fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, Re
 fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
     if let Some(version) = trajectory.version.filter(|&version| version != 1.0) {
         let problem = format!("the trajectory is of version {version}");
-        return Err((None, Fault::content(problem, "export the show with trajectories of version 1")));
+        return Err((
+            None,
+            Fault::coded("recording/unsupported-format", problem, "export the show with trajectories of version 1"),
+        ));
     }
     let Some(Point(first_s, first, ..)) = &trajectory.points.first() else { return Ok(Vec::new()) };
     let (begin_s, first) = (trajectory.takeoff_s + first_s, Vector3::from(*first));
@@ -207,16 +225,24 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
 fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Vec<Vector3<f64>>, Fault> {
     if to_s == from_s {
         let problem = format!("two points are at the same time, {to_s} s");
-        return Err(Fault::content(problem, "a drone is in one place at a time: take one out"));
+        return Err(Fault::coded(
+            "recording/duplicate-row",
+            problem,
+            "a drone is in one place at a time: take one out",
+        ));
     }
     if to_s < from_s {
         let problem = format!("time runs backwards: {to_s} s comes after {from_s} s");
-        return Err(Fault::content(problem, "look at the order of the points, and export the show again"));
+        return Err(Fault::coded(
+            "recording/time-backwards",
+            problem,
+            "look at the order of the points, and export the show again",
+        ));
     }
     let degree = point.2.len() + 1;
     if degree > HIGHEST_DEGREE {
         let problem = format!("the segment is of degree {degree}");
-        return Err(Fault::content(problem, format!("degrees up to {HIGHEST_DEGREE} are read")));
+        return Err(Fault::coded("recording/degree", problem, format!("degrees up to {HIGHEST_DEGREE} are read")));
     }
     let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
     Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))

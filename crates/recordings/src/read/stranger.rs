@@ -37,13 +37,19 @@ pub(super) fn of_bytes(head: &[u8]) -> Option<Fault> {
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
         let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
                       t,id,lat,lon,alt in degrees and metres";
-        return Some(Fault::content("it is a MAVLink telemetry log, which is not read", remedy));
+        return Some(Fault::coded(
+            "recording/unsupported-format",
+            "it is a MAVLink telemetry log, which is not read",
+            remedy,
+        ));
     }
     if head.get(257..262) == Some(b"ustar") {
-        return Some(Fault::content("it is a tar archive, which is not read", UNPACK));
+        return Some(Fault::coded("recording/unsupported-format", "it is a tar archive, which is not read", UNPACK));
     }
     let stranger = STRANGERS.iter().find(|(begin, ..)| head.starts_with(begin));
-    stranger.map(|(_, what, remedy)| Fault::content(format!("it is {what}, which is not read"), *remedy))
+    stranger.map(|(_, what, remedy)| {
+        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), *remedy)
+    })
 }
 
 /// The same of text, which has no blanks in front.
@@ -57,5 +63,5 @@ pub(super) fn of_text(text: &[u8]) -> Option<Fault> {
         b'[' => ("JSON, but no Skybrush show", TABLE),
         _ => return None,
     };
-    Some(Fault::content(format!("it is {what}, which is not read"), remedy))
+    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), remedy))
 }

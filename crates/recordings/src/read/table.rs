@@ -61,7 +61,12 @@ pub(super) fn open<C: Cells + 'static>(
 ) -> Result<Recording, ReadError> {
     if let (Some(rest), Some(_)) = (layout.rest, unit) {
         let problem = format!("it has a column of time stamps, and {} as well", quoted(&cells.header()[rest.column]));
-        return Err(Fault::content(problem, "name the one that is meant with --column t=NAME").into());
+        return Err(Fault::coded(
+            "recording/ambiguous-column",
+            problem,
+            "name the one that is meant with --column t=NAME",
+        )
+        .into());
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
@@ -107,7 +112,12 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
     let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
-        return Err(Fault::content(problem, "leave --time-unit, --fps and --time-scale away").into());
+        return Err(Fault::coded(
+            "recording/contradicts-option",
+            problem,
+            "leave --time-unit, --fps and --time-scale away",
+        )
+        .into());
     }
     Ok(first)
 }
@@ -141,7 +151,8 @@ impl<C: Cells> Table<C> {
         if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
             let what = if Date::parse(&of_day).is_some() { "a date below numbers" } else { "a time of day" };
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/time-format",
                 problem,
                 "write all times as numbers, in seconds or in s, ms, us or ns since 1970, or all as dates with a time \
                  like 2023-11-14T22:13:20.5Z",
@@ -159,7 +170,7 @@ impl<C: Cells> Table<C> {
         }
         let holds = |what: &str, remedy: &str| {
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(text.trim()));
-            Fault::content(problem, remedy)
+            Fault::coded("recording/time-format", problem, remedy)
         };
         match Date::parse(&text) {
             Some(date) if date.has_zone == first.has_zone => Ok(Stamp::Whole(date.since_1970_ns)),
@@ -244,7 +255,11 @@ impl<C: Cells> Table<C> {
         {
             let problem =
                 format!("column {} has another value in each row, and so names no vehicle", quoted(&header[column]));
-            return Some(Fault::content(problem, "remove such columns if their values are no names"));
+            return Some(Fault::coded(
+                "recording/ambiguous-vehicle",
+                problem,
+                "remove such columns if their values are no names",
+            ));
         }
         let id = self.layout.id.filter(|_| self.names.all().len() > 1);
         self.suspects.iter().enumerate().find_map(|(vehicle, suspects)| {
@@ -268,14 +283,14 @@ impl<C: Cells> Table<C> {
             let problem =
                 format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
             let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
-            return Err(Fault::content(problem, remedy));
+            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
         }
         if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
             let (first, other) = (called(id), called(rival.column));
             let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
             let [first, other] = [&header[id], &header[rival.column]];
             let remedy = format!("say which one does with --column id={first} or --column id={other}");
-            return Err(Fault::content(problem, remedy));
+            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
         }
         Ok(())
     }
@@ -292,7 +307,7 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[
     };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
-        return Err(Fault::content(problem, "write 0 or more"));
+        return Err(Fault::coded("recording/radius", problem, "write 0 or more"));
     }
     Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }

@@ -37,7 +37,7 @@ impl Rest {
             (_, None) => format!("column {own} holds {}, which is no whole number", rest.approximately()),
         };
         let remedy = "where one of the two is the whole time, name it with --column t=NAME";
-        Err(Fault::content(problem, remedy))
+        Err(Fault::coded("recording/time-format", problem, remedy))
     }
 }
 
@@ -67,7 +67,11 @@ pub(super) fn find(header: &[String], options: &ReadOptions) -> Result<Option<(u
             if options.time_unit.is_some() || options.times_per_second.is_some() {
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
-                return Err(Fault::content(problem, "leave --time-unit, --fps and --time-scale away"));
+                return Err(Fault::coded(
+                    "recording/contradicts-option",
+                    problem,
+                    "leave --time-unit, --fps and --time-scale away",
+                ));
             }
             Ok(Some((whole.column, Some(rest))))
         }
@@ -106,7 +110,11 @@ fn split(whole: &Candidate, rest: &Candidate) -> Option<Rest> {
 fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     let (first, second) = (quoted(&header[a.column]), quoted(&header[b.column]));
     let problem = format!("the columns {first} and {second} both give the time");
-    Fault::content(problem, "name the one that is meant with --column t=NAME, or take the other out")
+    Fault::coded(
+        "recording/ambiguous-column",
+        problem,
+        "name the one that is meant with --column t=NAME, or take the other out",
+    )
 }
 
 #[cfg(test)]

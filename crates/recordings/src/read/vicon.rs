@@ -59,7 +59,12 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
         let problem = format!("it has neither objects nor trajectories, but {}", sections.join(", "));
-        return Err(Fault::content(problem, "export the trajectories of markers, or the objects of Tracker").into());
+        return Err(Fault::coded(
+            "recording/no-positions",
+            problem,
+            "export the trajectories of markers, or the objects of Tracker",
+        )
+        .into());
     };
     let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
     let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
@@ -109,7 +114,11 @@ impl Head {
         let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
         let rate = rate.ok_or_else(|| {
             let problem = format!("the rate of {} is {}", self.section, quoted(&self.rate));
-            Fault::content(problem, "export it again: the second line of a section says how many frames a second has")
+            Fault::coded(
+                "recording/frame-rate",
+                problem,
+                "export it again: the second line of a section says how many frames a second has",
+            )
         })?;
         let is_objects = self.axes.iter().any(|axis| axis == "TX");
         let markers = self.markers(if is_objects { ["TX", "TY", "TZ"] } else { ["X", "Y", "Z"] });
@@ -117,7 +126,8 @@ impl Head {
         let parts = markers.len();
         let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/no-positions",
                 "it names no marker and no object",
                 "export it again, with labelled trajectories",
             ));
@@ -125,7 +135,11 @@ impl Head {
         if is_objects && vehicles.len() < parts {
             let several = vehicles.iter().find(|(_, of)| of.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
-            return Err(Fault::content(problem, "export objects of one segment each, or the trajectories of markers"));
+            return Err(Fault::coded(
+                "recording/ambiguous-column",
+                problem,
+                "export objects of one segment each, or the trajectories of markers",
+            ));
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
         let when = When::Frames(rate);
@@ -150,10 +164,14 @@ impl Head {
         if let Some(other) = units.find(|unit| unit.map_or("", |unit| unit.as_str()) != first) {
             let problem =
                 format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
-            return Err(Fault::content(problem, "export all in millimetres"));
+            return Err(Fault::coded("recording/unit-conflict", problem, "export all in millimetres"));
         }
         units::size_of(first, false).ok_or_else(|| {
-            Fault::content(format!("its unit of length is not known: {}", quoted(first)), "export it in millimetres")
+            Fault::coded(
+                "recording/unknown-unit",
+                format!("its unit of length is not known: {}", quoted(first)),
+                "export it in millimetres",
+            )
         })
     }
 }

@@ -63,7 +63,12 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let show = parse(&bytes)?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
         let problem = format!("its axes are those of {}, which are not known", quoted(frame));
-        return Err(Fault::content(problem, "export it with the axes `ogl`: x right, y up, z forward").into());
+        return Err(Fault::coded(
+            "recording/unusable-frame",
+            problem,
+            "export it with the axes `ogl`: x right, y up, z forward",
+        )
+        .into());
     }
     let (mut vehicles, mut names) = (Vec::new(), BTreeSet::new());
     for performance in &show.performances {
@@ -76,7 +81,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
             Place::Part(format!("drone {}{sample}", quoted(&name)))
         };
         if !names.insert(name.clone()) {
-            let fault = Fault::content("two drones have this id", "give each an id of its own");
+            let fault =
+                Fault::coded("recording/vehicle-twice", "two drones have this id", "give each an id of its own");
             return Err(fault.at(place(None)));
         }
         let flown = items(&performance.agent_description, vehicles.len(), &show, options.metres());
@@ -84,7 +90,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         vehicles.push((name, items));
     }
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
-        return Err(Fault::content(
+        return Err(Fault::coded(
+            "recording/no-positions",
             "it has no drone with a sample of its way",
             "export it with the ways of its drones",
         )
@@ -104,7 +111,11 @@ fn parse(bytes: &[u8]) -> Result<Show, ReadError> {
         let fault = if error.is_eof() {
             Fault::Truncated("the JSON ends before it is complete".to_owned())
         } else {
-            Fault::content(format!("it is not the JSON of a VVIZ show: {error}"), "export the show as VVIZ 1.0")
+            Fault::coded(
+                "recording/malformed",
+                format!("it is not the JSON of a VVIZ show: {error}"),
+                "export the show as VVIZ 1.0",
+            )
         };
         fault.at(Place::Line(u64::try_from(error.line()).unwrap_or(0)))
     })
@@ -131,7 +142,8 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
             let after_s = time_s + duration_s;
             if after_s <= time_s {
                 let problem = format!("it comes {duration_s:?} s after the one before");
-                return Err(fail(Fault::content(
+                return Err(fail(Fault::coded(
+                    "recording/duration",
                     problem,
                     "a drone is in one place at a time: take one of the samples out",
                 )));
@@ -151,7 +163,8 @@ fn duration(step: &Step, show: &Show) -> Result<f64, Fault> {
     match (step.dt, show.default_position_rate) {
         (Some(duration_s), _) => Ok(duration_s),
         (None, Some(rate)) if rate > 0.0 => Ok(rate.recip()),
-        _ => Err(Fault::content(
+        _ => Err(Fault::coded(
+            "recording/frame-rate",
             "neither `dt` nor a positive `defaultPositionRate` says when it is",
             "export the show again",
         )),

@@ -7,7 +7,7 @@ use tautline_recordings::read::{Axes, ReadError, ReadOptions};
 use tempfile::TempDir;
 
 use crate::messages::read_bytes;
-use crate::recording::Whole;
+use crate::recording::{Whole, assert_refused};
 
 fn read_with(text: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
     read_bytes("flight.csv", text.as_bytes(), options)
@@ -60,10 +60,10 @@ fn axes_are_those_that_the_user_says() {
 fn a_scale_of_each_axis_has_no_radius() {
     let text = "t,id,x,y,z,radius\n0,a,1,2,3,0.5\n";
     let stretched = read_with(text, &turned("x,y,z", [1.0, 1.0, 0.001])).expect_err("refused");
-    assert!(stretched.to_string().contains("vehicles have a radius"), "{stretched}");
+    assert_refused(&stretched, "recording/contradicts-option", "");
     assert!(read_with(text, &turned("x,y,z", [1.0, 1.0, -1.0])).is_ok());
     let none = read_with(text, &turned("x,y,z", [1.0, 0.0, 1.0])).expect_err("refused");
-    assert!(none.help().contains("that are not 0"), "{}", none.help());
+    assert_refused(&none, "recording/option-out-of-range", "");
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn names_that_say_a_direction_are_read_in_it() {
         let found = read(&format!("{header}\n0,a,1,2,3\n"));
         assert_eq!(found.samples()[0].2, [2.0, 1.0, -3.0], "{header}");
         let named = read_with(&format!("{header}\n0,a,1,2,3\n"), &turned("ned", [1.0; 3])).expect_err("twice");
-        assert!(named.help().contains("leave --axes"), "{}", named.help());
+        assert_refused(&named, "recording/contradicts-option", "line 1");
     }
     assert_eq!(read("t,id,east,north,up\n0,a,1,2,3\n").samples()[0].2, [1.0, 2.0, 3.0]);
     assert_eq!(read("t,a.north,a.east,a.down,b.north,b.east,b.down\n0,1,2,3,4,5,6\n").samples()[1].2, [5.0, 4.0, -6.0]);
@@ -116,6 +116,7 @@ fn local_positions_of_px4_are_brought_to_one_place() {
     let (a, b) = (px4("47.0", &[("100", 1), ("100", 1)]), px4(&format!("{}", 47.0 + apart), &[("0", 1), ("0", 1)]));
     let folder = folder(&[("a.csv", &a), ("b.csv", &b)]);
     let asked = Whole::read(folder.path(), &ReadOptions::default()).expect_err("no origin");
+    assert_refused(&asked, "recording/no-origin", "line 2");
     assert!(asked.help().contains("--origin 47.0,8.0,400.0"), "{}", asked.help());
     let options = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &options).expect("read");
@@ -141,24 +142,23 @@ fn local_positions_of_px4_without_a_reference_are_not_known() {
         let text = String::from_utf8(px4(lat, &[("1", 1)])).expect("text");
         let text = if lat == "0" { text.replace(",8.0,", ",0,") } else { text };
         let error = read(text.as_bytes()).expect_err("nowhere");
-        assert!(
-            error.to_string().contains("not known in any row") && error.help().contains("vehicle_global_position"),
-            "{error}"
-        );
+        assert_refused(&error, "recording/no-fix", "");
     }
     let error = read(b"timestamp,x,y,z,ref_lat,ref_lon\n0,1,2,3,47,8\n").expect_err("no height");
-    assert!(error.to_string().contains("ref_alt") && error.help().contains("vehicle_global_position"), "{error}");
+    assert_refused(&error, "recording/missing-column", "line 1");
     let scaled = ReadOptions { scale: Some(0.001.into()), ..ReadOptions::default() };
-    assert!(read_bytes("px4.csv", &px4("47.0", &[("1", 1)]), &scaled).expect_err("metres").help().contains("--scale"));
+    let error = read_bytes("px4.csv", &px4("47.0", &[("1", 1)]), &scaled).expect_err("metres");
+    assert_refused(&error, "recording/contradicts-option", "line 1");
 }
 
 #[test]
 fn axes_that_are_known_are_not_turned_again() {
     let ned = turned("ned", [1.0; 3]);
     let earth = read_with("t,id,lat,lon,alt\n0,a,47,8,400\n", &ned).expect_err("known");
-    assert!(earth.help().contains("leave --axes"), "{}", earth.help());
+    assert_refused(&earth, "recording/contradicts-option", "");
     let motive = "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n";
-    assert!(read_bytes("take.csv", motive.as_bytes(), &ned).expect_err("known").help().contains("leave --axes away"));
+    let error = read_bytes("take.csv", motive.as_bytes(), &ned).expect_err("known");
+    assert_refused(&error, "recording/unused-option", "");
 }
 
 #[test]
@@ -177,7 +177,8 @@ fn heights_are_turned_once() {
         let z = if name == "alt" { 3.0 } else { -3.0 };
         for options in [turned("ned", [1.0; 3]), turned("x,y,z", [1.0, 1.0, -1.0]), turned("x,z,y", [1.0; 3])] {
             let error = read_with(&text, &options).expect_err("both");
-            assert!(error.help().contains(&format!("--column z={name}")), "{error} {}", error.help());
+            assert_refused(&error, "recording/contradicts-option", "line 1");
+            assert!(error.help().ends_with(&format!("--column z={name}")), "{error} {}", error.help());
         }
         assert_eq!(read_with(&text, &turned("y,x,z", [1.0; 3])).expect("read").samples()[0].2, [2.0, 1.0, z]);
         let mut plain = turned("ned", [1.0; 3]);
@@ -194,7 +195,7 @@ fn a_plane_stays_one_when_it_is_turned() {
     assert!(tautline_recordings::read::open(&flat, &ned).expect("read").is_planar());
     assert_eq!(Whole::read(&flat, &ned).expect("read").samples()[0].2, [2.0, 1.0, 0.0]);
     let error = Whole::read(&flat, &turned("x,z,y", [1.0; 3])).expect_err("no z");
-    assert!(error.help().contains("--column z="), "{error}");
+    assert_refused(&error, "recording/contradicts-option", "");
     // North and east alone are a plane too.
     std::fs::write(&flat, "t,id,north,east\n0,a,1,2\n").expect("written");
     let open = || tautline_recordings::read::open(&flat, &ReadOptions::default()).expect("read");
@@ -208,10 +209,10 @@ fn a_plane_stays_one_when_it_is_turned() {
 fn axes_of_which_some_say_their_direction_and_others_do_not_are_refused() {
     for header in ["t,a_x_ned,a_y_ned,a_z_ned,b_x,b_y,b_z", "t,a.north,a.east,a.down,b.x,b.y,b.z"] {
         let error = read_with(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
-        assert!(error.to_string().contains("does not") && error.help().contains("in the same way"), "{error}");
+        assert_refused(&error, "recording/several-frames", "line 1");
     }
     let error = read_with("t,id,north,east,z\n0,a,1,2,3\n", &ReadOptions::default()).expect_err("up or down?");
-    assert!(error.to_string().contains("column `z` does not"), "{error}");
+    assert_refused(&error, "recording/several-frames", "line 1");
     assert_eq!(read("t,id,north,east,alt\n0,a,1,2,3\n").samples()[0].2, [2.0, 1.0, 3.0], "a height is up");
     let (ned, silent): (&[u8], &[u8]) = (b"t,north,east,down\n0,1,2,3\n", b"t,x,y,z\n0,1,2,3\n");
     let earth: &[u8] = b"t,lat,lon,alt\n0,47,8,400\n";

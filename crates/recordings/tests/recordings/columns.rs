@@ -4,7 +4,7 @@ use std::fs;
 
 use tautline_recordings::read::{Dimensions, ReadError, ReadOptions, TimeUnit};
 
-use crate::recording::Whole;
+use crate::recording::{Whole, assert_refused};
 
 fn read_with(name: &str, content: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
     let folder = tempfile::tempdir().expect("a folder");
@@ -23,11 +23,10 @@ fn ones(header: &str) -> String {
     format!("{header}\n{}\n{}\n", row("1"), row("2"))
 }
 
-/// What is refused says so, and what helps.
-fn refused(content: &str, options: &ReadOptions, said: &str, remedy: &str) {
-    let error = read_with("flight.csv", content, options).expect_err(content);
-    assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
-    assert!(error.help().contains(remedy), "{}\ninstead of {remedy}", error.help());
+/// Asserts that a header is refused with this code.
+#[track_caller]
+fn refused(content: &str, options: &ReadOptions, code: &str) {
+    assert_refused(&read_with("flight.csv", content, options).expect_err(content), code, "line 1");
 }
 
 #[test]
@@ -56,20 +55,15 @@ fn units_of_length_are_honoured_wherever_a_name_says_them() {
 fn units_that_are_not_known_or_contradict_each_other_are_refused() {
     let scaled = ReadOptions { scale: Some(0.001.into()), ..ReadOptions::default() };
     let plain = ReadOptions::default();
-    for (header, options, said, remedy) in [
-        (
-            "t,id,x [px],y [px],z [px]",
-            &plain,
-            "column `x [px]` says a unit of length that is not known, `px`",
-            "--scale",
-        ),
-        ("t,x1 (deg),y1 (deg)", &plain, "`deg`", "write it in m"),
-        ("t,id,x,y,z,vx [mm],vy [mm],vz [mm]", &plain, "a unit of velocity that is not known, `mm`", "write it in"),
-        ("t,x [mm],y [mm],z", &plain, "column `y [mm]` says its unit, and column `z` none", "into its name"),
-        ("t,id,x [mm],y [mm],radius", &plain, "says its unit, and column `radius` none", "into its name"),
-        ("t,x [mm],y [mm]", &scaled, "says its unit, and --scale 0.001 another", "leave --scale away"),
+    for (header, options, code) in [
+        ("t,id,x [px],y [px],z [px]", &plain, "recording/unknown-unit"),
+        ("t,x1 (deg),y1 (deg)", &plain, "recording/unknown-unit"),
+        ("t,id,x,y,z,vx [mm],vy [mm],vz [mm]", &plain, "recording/unknown-unit"),
+        ("t,x [mm],y [mm],z", &plain, "recording/unit-conflict"),
+        ("t,id,x [mm],y [mm],radius", &plain, "recording/unit-conflict"),
+        ("t,x [mm],y [mm]", &scaled, "recording/contradicts-option"),
     ] {
-        refused(&ones(header), options, said, remedy);
+        refused(&ones(header), options, code);
     }
     // A column that the user names says its unit as well.
     for (east, north) in [("east [mm]", "north (mm)"), ("east_mm", "north_mm")] {
@@ -89,7 +83,7 @@ fn units_of_time_are_honoured_or_refused() {
     let ms = read(&ones("Time [MS],x,y")).expect("read");
     assert_eq!((ms.clock.unit, ms.clock.inferred), ("ms", false));
     for header in ["time [min],x,y", "time (hours),id,x,y", "t_min,x1,y1", "timestamp [frames],x,y"] {
-        refused(&ones(header), &ReadOptions::default(), "a unit of time that is not known", "--time-scale");
+        refused(&ones(header), &ReadOptions::default(), "recording/unknown-unit");
     }
     let minutes = ReadOptions { times_per_second: Some(1.0 / 60.0), ..ReadOptions::default() };
     let whole = read_with("f.csv", &ones("time [min],x,y"), &minutes).expect("read");
@@ -101,14 +95,14 @@ fn units_of_time_are_honoured_or_refused() {
 #[test]
 fn numbers_of_frames_are_no_times() {
     for header in ["frame,id,x,y", "Frame Number,x1,y1", "frame_idx,x,y", "step,id,x,y"] {
-        refused(&ones(header), &ReadOptions::default(), "the numbers of frames", "--fps 30");
+        refused(&ones(header), &ReadOptions::default(), "recording/frames");
         let options = ReadOptions { times_per_second: Some(50.0), ..ReadOptions::default() };
         let whole = read_with("f.csv", &ones(header), &options).expect("read");
         assert_eq!(whole.samples()[1].0, 0.04, "{header}");
     }
     let mut named = ReadOptions::default();
     named.columns.set("t", "frame");
-    refused(&ones("t,frame,id,x,y"), &named, "the numbers of frames", "--fps");
+    refused(&ones("t,frame,id,x,y"), &named, "recording/frames");
     // Where there is a time, frames are beside the point.
     assert_eq!(read(&ones("frame,t,id,x,y")).expect("read").samples()[1].0, 2.0);
 }
@@ -129,13 +123,13 @@ fn quantities_are_no_vehicles() {
         assert_eq!(whole.vehicles, ["1", "2"], "{extra}");
         let unused = format!("columns not used: {}", extra.replace(',', ", "));
         assert!(whole.notes.contains(&unused), "{:?}", whole.notes);
-        refused(&ones(&format!("t,{extra}")), &ReadOptions::default(), "no column for the vehicle", "--column id");
+        refused(&ones(&format!("t,{extra}")), &ReadOptions::default(), "recording/no-vehicle-column");
     }
     // Vehicles called by letters are vehicles, and `a` is one of them.
     assert_eq!(read(&ones("t,a_x,a_y,b_x,b_y")).expect("read").vehicles, ["a", "b"]);
     assert_eq!(read(&ones("t,a.x,a.y,v.x,v.y")).expect("read").vehicles, ["a", "v"]);
     let ambiguous = ones("t,cf1_x,cf1_y,cf2_x,cf2_y,a_x,a_y");
-    refused(&ambiguous, &ReadOptions::default(), "`a_x` may be of a vehicle, as `cf1_x` is", "longer name");
+    refused(&ambiguous, &ReadOptions::default(), "recording/ambiguous-column");
 }
 
 #[test]
@@ -160,7 +154,7 @@ fn columns_that_are_repeated_are_not_dropped() {
         "t,id,x,y,x_2,y_2",
         "t,id,x,y,x[1],y[1]",
     ] {
-        refused(&ones(header), &ReadOptions::default(), "both give the position along x", "--column");
+        refused(&ones(header), &ReadOptions::default(), "recording/ambiguous-column");
     }
     assert_eq!(read(&ones("t,x.1,y.1,x.2,y.2")).expect("read").vehicles, ["1", "2"]);
     assert_eq!(read(&ones("t,x[0],y[0],x[1],y[1]")).expect("read").vehicles, ["0", "1"]);
@@ -226,12 +220,12 @@ fn tuples_and_tables_of_one_vehicle_are_read() {
 
     let kitti = "1 0 0 7 0 1 0 8 0 0 1 9\n1 0 0 8 0 1 0 8 0 0 1 9\n";
     let asked = read_with("00.txt", kitti, &ReadOptions::default()).expect_err("no time");
-    assert!(asked.help().contains("--fps"), "{}", asked.help());
+    assert_refused(&asked, "recording/frames", "line 1");
     let options = ReadOptions { times_per_second: Some(10.0), ..ReadOptions::default() };
     let found = read_with("00.txt", kitti, &options).expect("read");
     assert_eq!(found.samples(), [(0.0, "00", [7.0, 8.0, 9.0]), (0.1, "00", [8.0, 8.0, 9.0])]);
 
     let one = read(&ones("t,x,y,z,vx,vy,vz,qx,qy,qz,qw,roll,gyro.x")).expect("read");
     assert_eq!(one.vehicles, ["flight"]);
-    refused(&ones("t,who,x,y,z"), &ReadOptions::default(), "no column for the vehicle", "--column id=NAME");
+    refused(&ones("t,who,x,y,z"), &ReadOptions::default(), "recording/no-vehicle-column");
 }

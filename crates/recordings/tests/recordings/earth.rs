@@ -5,7 +5,7 @@ use std::fs;
 use tautline_recordings::read::{ReadError, ReadOptions};
 
 use crate::messages::{Message, SEC, cdr, mcap_of, read_bytes};
-use crate::recording::Whole;
+use crate::recording::{Whole, assert_refused};
 
 /// Two units in the last place of a coordinate around the Earth's centre.
 const ROUNDING_M: f64 = 2e-9;
@@ -113,22 +113,18 @@ fn who_is_not_seen_has_no_place_and_heights_may_be_missing_altogether() {
 
 #[test]
 fn what_is_no_place_is_refused_where_it_is() {
-    for (row, said) in [
-        ("0,a,91,8,400", "line 2: `91.0` is no latitude"),
-        ("0,a,473977420,85455940,488", "`473977420.0` is no latitude"),
-        ("0,a,47,361,400", "`361.0` is no longitude"),
-        ("0,a,nan,8,400", "line 2: column `lat` holds `nan`"),
-        ("0,a,47,8,", "line 2: column `alt` is empty"),
+    for (row, code) in [
+        ("0,a,91,8,400", "recording/not-on-earth"),
+        ("0,a,473977420,85455940,488", "recording/not-on-earth"),
+        ("0,a,47,361,400", "recording/not-on-earth"),
+        ("0,a,nan,8,400", "recording/not-finite"),
+        ("0,a,47,8,", "recording/empty-cell"),
     ] {
-        let error = read(&format!("t,id,lat,lon,alt\n{row}\n"), &ReadOptions::default()).expect_err(said);
-        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
+        let error = read(&format!("t,id,lat,lon,alt\n{row}\n"), &ReadOptions::default()).expect_err(row);
+        assert_refused(&error, code, "line 2");
     }
-    assert!(
-        read(&table("t,id,lat [grad],lon,alt"), &ReadOptions::default())
-            .expect_err("refused")
-            .to_string()
-            .contains("`grad`")
-    );
+    let error = read(&table("t,id,lat [grad],lon,alt"), &ReadOptions::default()).expect_err("refused");
+    assert_refused(&error, "recording/unknown-unit", "line 1");
 }
 
 #[test]
@@ -152,7 +148,7 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
     let named = read("alt [ft]", 1.0).expect("read");
     assert_eq!(named.samples(), feet.samples());
     assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale gives")));
-    assert!(read("alt [ft]", 0.5).expect_err("refused").help().contains("--scale"));
+    assert_refused(&read("alt [ft]", 0.5).expect_err("refused"), "recording/contradicts-option", "line 1");
 }
 
 #[test]
@@ -168,14 +164,14 @@ fn a_fix_at_zero_and_zero_is_none() {
     // So are metres.
     assert_eq!(whole("t,id,x,y,z\n0,a,0,0,0\n").items.len(), 1);
     let none = read("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,0,0,9\n", &ReadOptions::default()).expect_err("refused");
-    assert!(none.to_string().contains("no row has a fix"), "{none}");
+    assert_refused(&none, "recording/no-fix", "");
 
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["a.csv", "b.csv"] {
         fs::write(folder.path().join(name), "t,lat,lon,alt\n0,0,0,0\n1,47,8,400\n2,47,8,400\n").expect("written");
     }
     let error = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
-    assert!(error.help().contains("--origin 47.0,8.0,400.0"), "{}", error.help());
+    assert_refused(&error, "recording/no-origin", "line 3");
     let origin = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &origin).expect("read");
     assert_eq!(found.items.len(), 4);
@@ -195,16 +191,15 @@ fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
     for other in ["0,8", "1e-7,0", "-1,-1", "90,0", "47,188"] {
         let text = format!("t,id,lat,lon,alt\n0,a,47,8,400\n0.1,a,47,8,400\n0.2,a,{other},400\n0.3,a,47,8,400\n");
         let error = read(&text, &ReadOptions::default()).expect_err(other);
-        let said = error.to_string();
-        assert!(said.contains("line 4: vehicle `a` jumps") && said.contains("is at line 3"), "{said}");
-        assert!(error.help().contains("where the receiver had no fix"), "{}", error.help());
+        assert_refused(&error, "recording/position-jump", "line 4");
+        assert!(error.to_string().ends_with("is at line 3"), "{error}");
     }
     let kind = "sensor_msgs/msg/NavSatFix";
     let places = [(0, [47.0, 8.0, 400.0]), (1, [0.0, 8.0, 400.0])];
     let messages =
         places.map(|(second, place)| ("/r1/fix", kind, "cdr", 1 + u64::from(second != 0), fix(second, 0, place)));
     let error = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect_err("refused");
-    assert!(error.to_string().contains("jumps"), "{error}");
+    assert_eq!(error.code(), "recording/position-jump", "{error}");
     // A satellite is slower than the limit, and a jump of less than 1 km is accepted.
     assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,0,8,400000\n10,a,0,8.6,400000\n").items.len(), 2);
     assert_eq!(whole("t_s,id,lat,lon,alt\n0,a,47,8,400\n0.001,a,47.005,8,400\n").items.len(), 2);
@@ -216,15 +211,15 @@ fn a_vehicle_in_degrees_beside_one_in_metres_is_refused() {
         let cells = "0,".repeat(header.split(',').count());
         let text = format!("{header}\n{}\n", cells.trim_end_matches(','));
         let error = read(&text, &ReadOptions::default()).expect_err(header);
-        assert!(error.to_string().contains("in latitude and longitude, that of vehicle `B` in metres"), "{error}");
-        assert!(error.help().contains("in one frame"), "{}", error.help());
+        assert_refused(&error, "recording/several-frames", "line 1");
     }
     let both = whole("t,A.lat,A.lon,A.alt,A.x,A.y,A.z\n0,47,8,400,1,2,3\n");
     assert_eq!(both.samples(), [(0.0, "A", [1.0, 2.0, 3.0])]);
     // Columns of a named vehicle beside `x`, `y`, `z` may be a second vehicle.
     for header in ["t,x,y,z,B.x,B.y,B.z", "t,x,y,z,b.lat,b.lon,b.alt"] {
         let error = read(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
-        assert!(error.help().contains("--one-vehicle"), "{}", error.help());
+        assert_refused(&error, "recording/no-vehicle-column", "line 1");
+        assert!(error.help().ends_with("--one-vehicle"), "{}", error.help());
     }
 }
 
@@ -235,6 +230,7 @@ fn files_of_one_vehicle_each_are_measured_from_one_origin() {
         fs::write(folder.path().join(name), format!("t,lat,lon,alt\n0,{lat},{lon},{alt}\n")).expect("written");
     }
     let error = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
+    assert_refused(&error, "recording/no-origin", "line 2");
     assert!(error.help().contains("--origin 47.397742,8.545594,488.0"), "{error}\n{}", error.help());
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &origin).expect("read");
@@ -262,14 +258,13 @@ fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
     let refused = |messages: &[Message], options: &ReadOptions| {
         read_bytes("gps.mcap", &mcap_of(messages), options).expect_err("refused")
     };
-    let error = refused(&messages, &ReadOptions::default()).to_string();
-    assert!(error.contains("message 7 on topic `/r1/fix`") && error.contains("not finite"), "{error}");
-    let error = refused(&messages[..2], &ReadOptions::default()).to_string();
-    assert!(error.contains("no message of its topics with positions has one"), "{error}");
+    let error = refused(&messages, &ReadOptions::default());
+    assert_refused(&error, "recording/not-finite", "message 7 on topic `/r1/fix`");
+    assert_refused(&refused(&messages[..2], &ReadOptions::default()), "recording/no-positions", "");
     let pose =
         ("/r2/pose", "geometry_msgs/msg/PoseStamped", "cdr", 1, cdr(&(((SEC, 0), "map"), ([0.0; 3], [0.0; 4])), true));
-    let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default()).to_string();
-    assert!(error.contains("`WGS 84`") && error.contains("`map`"), "{error}");
+    let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default());
+    assert_refused(&error, "recording/several-frames", "message 2 on topic `/r2/pose`");
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
     assert_eq!(refused(&[pose], &origin).help(), "leave --origin away");
 }

@@ -6,6 +6,14 @@ use std::path::Path;
 use tautline_core::track::{Clock, Item, Sample};
 use tautline_recordings::read::{self, ReadError, ReadOptions};
 
+/// Asserts the code of a refusal and its place in the file, which is empty for a file as a whole.
+#[track_caller]
+pub(crate) fn assert_refused(error: &ReadError, code: &str, place: &str) {
+    let found = error.place.as_ref().map(ToString::to_string).unwrap_or_default();
+    assert_eq!((error.code(), &*found), (code, place), "{error}");
+    assert!(!error.help().is_empty() && !error.is_machine(), "{error}");
+}
+
 /// Everything that a recording gives.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Whole {

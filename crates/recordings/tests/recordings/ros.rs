@@ -7,7 +7,7 @@ use tautline_recordings::read::{ReadError, ReadOptions};
 use tempfile::TempDir;
 
 use crate::messages::{Message, NO_TURN, SEC, cdr, header, mcap_of, read_bytes, whole};
-use crate::recording::Whole;
+use crate::recording::{Whole, assert_refused};
 
 /// What is done to a folder that was whole.
 type Spoil = Box<dyn FnOnce(&Path)>;
@@ -36,9 +36,8 @@ fn read(bytes: &[u8], options: &ReadOptions) -> Whole {
     read_bytes("ros.mcap", bytes, options).unwrap_or_else(|error| panic!("{error}\n{}", error.help()))
 }
 
-fn refused(messages: &[Message], options: &ReadOptions) -> (String, String) {
-    let error = read_bytes("ros.mcap", &mcap_of(messages), options).expect_err("refused");
-    (error.to_string(), error.help())
+fn refused(messages: &[Message], options: &ReadOptions) -> ReadError {
+    read_bytes("ros.mcap", &mcap_of(messages), options).expect_err("refused")
 }
 
 fn bag(name: &str) -> PathBuf {
@@ -79,8 +78,8 @@ fn poses_of_every_kind_are_read_in_both_byte_orders() {
             let expected: Vec<_> = vehicles.iter().map(|name| (5e-9, *name, at)).collect();
             assert_eq!(found.samples(), expected, "{kind}");
             let cut = mcap_of(&[(topic, kind, "cdr", 7, message[..40].to_vec())]);
-            let error = read_bytes("cut.mcap", &cut, &ReadOptions::default()).expect_err("refused").to_string();
-            assert!(error.contains("message 1 on topic `/"), "{error}");
+            let error = read_bytes("cut.mcap", &cut, &ReadOptions::default()).expect_err("refused");
+            assert_refused(&error, "recording/damaged", &format!("message 1 on topic `{topic}`"));
         }
     }
 }
@@ -95,8 +94,8 @@ fn velocities_of_odometry_are_not_used_and_it_is_said() {
         found.notes
     );
     let named = cdr(&(header(1), vec![("cf1", ([f64::NAN, 0.0, 0.0], NO_TURN))]), true);
-    let (said, help) = refused(&[("/poses", NAMED, "cdr", 1, named)], &ReadOptions::default());
-    assert!(said.contains("message 1 on topic `/poses`") && said.contains("not finite"), "{said}\n{help}");
+    let error = refused(&[("/poses", NAMED, "cdr", 1, named)], &ReadOptions::default());
+    assert_refused(&error, "recording/not-finite", "message 1 on topic `/poses`");
 }
 
 /// Two vehicles that pass each other, as `bags.py` flies them.
@@ -114,7 +113,8 @@ fn a_bag_of_crazyswarm_names_each_vehicle_once() {
     let by_transforms = Whole::read(&bag("crazyswarm"), &options(None, &["/tf"])).expect("read");
     assert_eq!(by_transforms.items, found.items);
     let error = Whole::read(&bag("crazyswarm"), &options(None, &["/pose"])).expect_err("refused");
-    assert!(error.to_string().contains("`/pose`") && error.to_string().contains("/poses, /tf"), "{error}");
+    assert_refused(&error, "recording/unknown-topic", "");
+    assert!(error.to_string().ends_with("those that it has are /poses, /tf"), "{error}");
 }
 
 #[test]
@@ -160,52 +160,38 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
     };
     let foreign = |folder: &Path| fs::write(folder.join("split_1.mcap.zstd"), "no bag").expect("written");
     let other = |folder: &Path| drop(fs::copy(folder.join("split_1.mcap.zstd"), folder.join("split_2.mcap")));
+    let is_folder = |folder: &Path| {
+        let split = folder.join("split_1.mcap.zstd");
+        fs::remove_file(&split).and_then(|()| fs::create_dir(&split)).expect("a folder in its place");
+    };
+    let (first, second, index) = ("split_0.mcap.zstd", "split_1.mcap.zstd", "metadata.yaml");
     let cases: [(Spoil, &str, &str); 13] = [
-        (
-            Box::new(text("message_count: 21", "message_count: 22")),
-            "its files have 21 messages, and metadata.yaml counts 22",
-            "copy",
-        ),
-        (
-            Box::new(|folder: &Path| {
-                let split = folder.join("split_1.mcap.zstd");
-                fs::remove_file(&split).and_then(|()| fs::create_dir(&split)).expect("a folder in its place");
-            }),
-            "the bag lists this file, and it is none",
-            "copy",
-        ),
-        (
-            Box::new(remove("split_1.mcap.zstd")),
-            "split_1.mcap.zstd: the bag lists this file, and it is not there",
-            "copy",
-        ),
-        (Box::new(remove("split_0.mcap.zstd")), "split_0.mcap.zstd: the bag lists", "reindex"),
-        (Box::new(cut), "split_1.mcap.zstd: it breaks off", "copy or record it again"),
-        (Box::new(foreign), "split_1.mcap.zstd: it is not an MCAP file", "--format"),
-        (Box::new(other), "split_2.mcap lies beside the files of the bag", "reindex"),
-        (
-            Box::new(text("- split_1.mcap.zstd", "- ../split_1.mcap.zstd")),
-            "metadata.yaml: the bag lists `../split_1",
-            "copy",
-        ),
-        (Box::new(text("- split_1.mcap.zstd", "- split_0.mcap.zstd")), "lists `split_0.mcap.zstd` twice", "copy"),
+        (Box::new(text("message_count: 21", "message_count: 22")), "", "recording/bag-index"),
+        (Box::new(is_folder), second, "recording/bag-index"),
+        (Box::new(remove("split_1.mcap.zstd")), second, "recording/bag-index"),
+        (Box::new(remove("split_0.mcap.zstd")), first, "recording/bag-index"),
+        (Box::new(cut), second, "recording/truncated"),
+        (Box::new(foreign), second, "recording/wrong-format"),
+        (Box::new(other), "", "recording/bag-index"),
+        (Box::new(text("- split_1.mcap.zstd", "- ../split_1.mcap.zstd")), index, "recording/bag-index"),
+        (Box::new(text("- split_1.mcap.zstd", "- split_0.mcap.zstd")), index, "recording/bag-index"),
         (
             Box::new(text("storage_identifier: mcap", "storage_identifier: sqlite3")),
-            "stored as `sqlite3`",
-            "rosbags-convert",
+            index,
+            "recording/unsupported-format",
         ),
         (
             Box::new(text("compression_mode: file", "compression_mode: MESSAGE")),
-            "in mode `MESSAGE`",
-            "ros2 bag convert",
+            index,
+            "recording/unsupported-compression",
         ),
-        (Box::new(text("relative_file_paths", "relative_paths")), "metadata.yaml, line", "reindex"),
-        (Box::new(text("storage_identifier: mcap", "storage_identifier: [")), "metadata.yaml, line", "reindex"),
+        (Box::new(text("relative_file_paths", "relative_paths")), index, "recording/bag-index"),
+        (Box::new(text("storage_identifier: mcap", "storage_identifier: [")), index, "recording/bag-index"),
     ];
-    for (change, said, remedy) in cases {
-        let error = changed(change).1.expect_err(said);
-        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
-        assert!(error.help().contains(remedy), "{}\ninstead of {remedy}", error.help());
+    for (change, file, code) in cases {
+        let error = changed(change).1.expect_err(code);
+        assert_eq!(error.code(), code, "{error}");
+        assert!(error.file.ends_with(file) && !error.help().is_empty(), "{error}");
     }
 }
 
@@ -220,7 +206,7 @@ fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
         fs::write(&path, &bytes[..end]).expect("written");
     };
     let (folder, refused) = changed(cut);
-    assert!(refused.expect_err("not closed").help().contains("--allow-unfinished"));
+    assert_refused(&refused.expect_err("not closed"), "recording/unfinished", "");
     let accepting = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &accepting).expect("accepted");
     assert!(
@@ -283,7 +269,8 @@ fn transforms_that_stand_still_are_exact_and_nothing_is_assumed() {
         ("/hall/pose", POSE, "cdr", 3, pose(1, "map", [5.0, 5.0, 5.0])),
         ("/far/pose", POSE, "cdr", 3, pose(1, "elsewhere", [5.0, 5.0, 5.0])),
     ];
-    assert!(refused(&messages, &ReadOptions::default()).1.contains("--frame"));
+    let error = refused(&messages, &ReadOptions::default());
+    assert_refused(&error, "recording/several-frames", "message 3 on topic `/hall/pose`");
     let found = read(&mcap_of(&messages), &in_frame("map"));
     let samples = found.samples();
     assert_eq!((found.vehicles.len(), samples[1], &found.assumed), (2, (1e-9, "/hall/pose", [5.0; 3]), &None));
@@ -306,17 +293,16 @@ fn where_a_moving_transform_is_not_known_there_is_no_position() {
     assert!(found.notes.iter().any(|note| note.contains("1 by some between") && note.contains("2 left out")));
     // Samples too far apart say nothing of what is between them.
     let late = ("/tf", TF, "cdr", 9, cdr(&(vec![(((SEC + 2, 0), "map"), "odom", ([0.0; 3], NO_TURN))],), true));
-    let (said, _) = refused(&[moving(0, 1.0), late, at(150)], &in_frame("map"));
-    assert!(said.contains("no position is given in the frame `map`"), "{said}");
-    for (odd, said) in [
-        (transform(300, "map", "odom", [0.0; 3], [0.0; 4]), "is no rotation"),
-        (transform(300, "map", "odom", [f64::NAN, 0.0, 0.0], NO_TURN), "not finite"),
-        (transform(200, "map", "odom", [0.0; 3], NO_TURN), "in two places"),
-        (transform(300, "world", "odom", [0.0; 3], NO_TURN), "is given in `map` and in `world`"),
+    assert_refused(&refused(&[moving(0, 1.0), late, at(150)], &in_frame("map")), "recording/unusable-frame", "");
+    let message = "message 4 on topic `/tf`";
+    for (odd, code, place) in [
+        (transform(300, "map", "odom", [0.0; 3], [0.0; 4]), "recording/transforms", message),
+        (transform(300, "map", "odom", [f64::NAN, 0.0, 0.0], NO_TURN), "recording/not-finite", message),
+        (transform(200, "map", "odom", [0.0; 3], NO_TURN), "recording/transforms", ""),
+        (transform(300, "world", "odom", [0.0; 3], NO_TURN), "recording/transforms", ""),
     ] {
         let all = [moving(100, 1.0), moving(200, 2.0), at(150), ("/tf", TF, "cdr", 5, odd)];
-        let found = refused(&all, &in_frame("map")).0;
-        assert!(found.contains(said), "{found}\ninstead of {said}");
+        assert_refused(&refused(&all, &in_frame("map")), code, place);
     }
 }
 
@@ -324,24 +310,23 @@ fn where_a_moving_transform_is_not_known_there_is_no_position() {
 fn a_vehicle_that_is_told_of_twice_is_refused_until_a_topic_is_named() {
     let named = cdr(&(header(1), vec![("cf1", ([1.0, 0.0, 0.0], NO_TURN))]), true);
     let poses = ("/poses", NAMED, "cdr", 1, named);
-    for (other, who) in [
-        (("/cf1/pose", POSE, "cdr", 1, pose(1, "map", [1.0, 0.0, 0.0])), "`cf1`"),
-        (("/more", NAMED, "cdr", 1, poses.4.clone()), "`cf1`"),
-    ] {
+    for other in
+        [("/cf1/pose", POSE, "cdr", 1, pose(1, "map", [1.0, 0.0, 0.0])), ("/more", NAMED, "cdr", 1, poses.4.clone())]
+    {
         let both = [poses.clone(), other];
-        let (said, help) = refused(&both, &ReadOptions::default());
-        assert!(said.contains("both tell of") && said.contains(who) && help.contains("--topic"), "{said}");
+        let error = refused(&both, &ReadOptions::default());
+        assert_refused(&error, "recording/ambiguous-topics", "");
+        assert!(error.to_string().ends_with("`cf1`"), "{error}");
         assert_eq!(read(&mcap_of(&both), &options(None, &["/poses"])).vehicles, ["cf1"]);
     }
     let robot = [
         ("/r1/odom", ODOMETRY, "cdr", 1, odometry(1, "map", "base_link", [0.0; 3])),
         ("/r1/pose", POSE, "cdr", 1, pose(1, "map", [0.0; 3])),
     ];
-    assert!(refused(&robot, &ReadOptions::default()).0.contains("`/r1`"));
+    assert_refused(&refused(&robot, &ReadOptions::default()), "recording/ambiguous-topics", "");
     // A vehicle that transforms alone tell of is never left out in silence.
     let stranger = ("/tf", TF, "cdr", 1, transform(1, "map", "cf2", [0.0; 3], NO_TURN));
-    let (said, help) = refused(&[poses, stranger], &ReadOptions::default());
-    assert!(said.contains("transforms tell of `cf2`") && help.contains("--topic"), "{said}");
+    assert_refused(&refused(&[poses, stranger], &ReadOptions::default()), "recording/ambiguous-topics", "");
 }
 
 #[test]
@@ -350,8 +335,7 @@ fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
         ("/r1/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
         ("/r2/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
     ];
-    let (said, help) = refused(&both, &ReadOptions::default());
-    assert!(said.contains("`/r1/odom` and `/r2/odom`") && help.contains("--frame odom"), "{said}\n{help}");
+    assert_refused(&refused(&both, &ReadOptions::default()), "recording/several-frames", "");
     assert_eq!(read(&mcap_of(&both), &in_frame("odom")).vehicles.len(), 2);
     let tf = |topic, x| (topic, TF, "cdr", 1, transform(1, "map", "odom", [x, 0.0, 0.0], NO_TURN));
     let [one, two] = both;
@@ -377,8 +361,7 @@ fn bodies_of_robots_in_namespaces_are_called_by_both() {
         ]
     };
     let messages = [robot("/r1/tf", 1.0), robot("/r2/tf", 2.0)].concat();
-    let (said, _) = refused(&messages, &ReadOptions::default());
-    assert!(said.contains("`/r1` and `/r2` give positions in a frame `odom`"), "{said}");
+    assert_refused(&refused(&messages, &ReadOptions::default()), "recording/several-frames", "");
     let found = read(&mcap_of(&messages), &in_frame("map"));
     assert_eq!(found.samples(), [(1e-9, "/r1/base_link", [1.0, 1.0, 0.0]), (1e-9, "/r2/base_link", [2.0, 1.0, 0.0])]);
     assert_eq!(found.assumed, None);

@@ -9,7 +9,7 @@ use tautline_recordings::read::{self, ReadError, ReadOptions};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
-use crate::recording::Whole;
+use crate::recording::{Whole, assert_refused};
 
 /// A folder with these files.
 fn folder(files: &[(&str, &str)]) -> TempDir {
@@ -131,22 +131,19 @@ fn tables_of_any_format_are_joined_by_one_clock() {
 
 #[test]
 fn files_that_are_not_of_one_recording_are_refused() {
-    for (files, said) in [
-        (&[("a.csv", A), ("b.csv", "t,x1,y1,x2,y2\n0,1,2,3,4\n")][..], "b.csv: it holds several vehicles"),
-        (&[("a.csv", A), ("b.csv", "t,model_name,x,y\n0,p,1,2\n1,q,3,4\n")], "b.csv: it holds several vehicles"),
-        (
-            &[("a.csv", A), ("b.csv", "t,x,y\n0,1,2\n10,1,2\n")],
-            "times of `b` would be taken as ms and those of `a` as s",
-        ),
-        (&[("a.csv", A), ("b.csv", "timestamp,x,y\n1700000000.5,1,2\n")], "the clock of `b` begins more than a month"),
-        (&[("a.csv", A), ("a.txt", B)], "is called `a` too"),
-        (&[("a.csv", A), ("b.csv", "t,x,y\n0,one,2\n")], "b.csv, line 2: column `x` holds `one`"),
-        (&[("a.csv", A), ("b.csv", "duration,x^0,y^0,z^0\n1,0,0,0\n")], "b.csv: it holds a curve"),
-        (&[("readme.md", "nothing")], "there is no table in the folder"),
+    for (files, file, code, place) in [
+        (&[("a.csv", A), ("b.csv", "t,x1,y1,x2,y2\n0,1,2,3,4\n")][..], "b.csv", "recording/several-vehicles", ""),
+        (&[("a.csv", A), ("b.csv", "t,model_name,x,y\n0,p,1,2\n1,q,3,4\n")], "b.csv", "recording/several-vehicles", ""),
+        (&[("a.csv", A), ("b.csv", "t,x,y\n0,1,2\n10,1,2\n")], "b.csv", "recording/several-clocks", ""),
+        (&[("a.csv", A), ("b.csv", "timestamp,x,y\n1700000000.5,1,2\n")], "b.csv", "recording/several-clocks", ""),
+        (&[("a.csv", A), ("a.txt", B)], "a.txt", "recording/vehicle-twice", ""),
+        (&[("a.csv", A), ("b.csv", "t,x,y\n0,one,2\n")], "b.csv", "recording/not-a-number", "line 2"),
+        (&[("a.csv", A), ("b.csv", "duration,x^0,y^0,z^0\n1,0,0,0\n")], "b.csv", "recording/several-vehicles", ""),
+        (&[("readme.md", "nothing")], "", "recording/folder", ""),
     ] {
-        let error = whole(folder(files).path()).expect_err(said);
-        assert!(error.to_string().contains(said), "{error}\ninstead of {said}");
-        assert!(!error.help().is_empty());
+        let error = whole(folder(files).path()).expect_err(code);
+        assert_refused(&error, code, place);
+        assert!(error.file.ends_with(file), "{error}");
     }
 }
 
@@ -168,7 +165,7 @@ fn relative_curves_start_where_it_is_said() {
     assert!(!found.notes.iter().any(|note| note.contains("--start")), "{:?}", found.notes);
     options.starts.insert("cf3".to_owned(), [0.0; 3]);
     let refused = Whole::read(folder.path(), &options).expect_err("refused");
-    assert!(refused.to_string().contains("no vehicle `cf3`"), "{refused}");
+    assert_refused(&refused, "recording/unknown-vehicle", "");
     // The archive of the same folder says the same.
     let path = folder.path().join("curves.zip");
     fs::write(&path, zipped(&[("cf1.csv", CURVE), ("cf2.csv", CURVE)])).expect("written");
@@ -176,7 +173,7 @@ fn relative_curves_start_where_it_is_said() {
     // Samples are where they are.
     fs::write(folder.path().join("flight.csv"), A).expect("written");
     let refused = Whole::read(&folder.path().join("flight.csv"), &options).expect_err("refused");
-    assert!(refused.help().contains("leave --start away"), "{}", refused.help());
+    assert_refused(&refused, "recording/unused-option", "");
 }
 
 #[test]
@@ -216,10 +213,11 @@ fn strangers_are_told_the_way_in() {
         let path = folder.path().join("recording");
         fs::write(&path, bytes).expect("written");
         let error = whole(&path).expect_err(said);
+        assert_refused(&error, "recording/unsupported-format", "");
         assert!(error.to_string().contains(said) && error.help().contains(way), "{error}\n{}", error.help());
     }
     let said = "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n  relative_file_paths: [flight_0.db3]\n";
     let bag = self::folder(&[("metadata.yaml", said), ("flight_0.db3", "")]);
     let error = whole(bag.path()).expect_err("refused");
-    assert!(error.to_string().contains("`sqlite3`") && error.help().contains("rosbags-convert"), "{error}");
+    assert_refused(&error, "recording/unsupported-format", "");
 }

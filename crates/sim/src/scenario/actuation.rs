@@ -39,6 +39,7 @@ impl ActuationTable {
             (Some(own_hz), Some(of_time_hz)) if own_hz != of_time_hz => Err(ScenarioError::new(format!(
                 "actuation.control_hz is {own_hz} and time.control_hz is {of_time_hz}, and both are the control rate"
             ))
+            .coded("scenario/exclusive-keys")
             .with_help("keep one of them")
             .at("actuation.control_hz")
             .at("time.control_hz")),

@@ -15,6 +15,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "spread slots are held for {hold_s} s of a flight of {duration_s} s"
             ))
+            .coded("scenario/outside-flight")
             .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
             .at("breathing.hold_s")
             .at("time.duration_s"));
@@ -24,6 +25,7 @@ impl Scenario {
             && law.capabilities().settling.is_none()
         {
             return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
+                .coded("scenario/unsupported-by-law")
                 .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
                 .at("breathing.mode")
                 .at("law.kind"));
@@ -32,6 +34,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("a breath scales slots by {scale}, which brings them nearer to each other"))
+            .coded("scenario/out-of-range")
             .with_help("it must be at least 1; the default is 2")
             .at("breathing.scale"))
     }

@@ -93,11 +93,13 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
 /// Number of vehicles: as given, or else as many as there are points, start before formation.
 fn count(document: &Document) -> Result<usize, ScenarioError> {
     if let Some(count) = document.swarm.count {
-        return usize::try_from(count).map_err(|_| ScenarioError::new("too many vehicles").at("swarm.count"));
+        return usize::try_from(count)
+            .map_err(|_| ScenarioError::new("too many vehicles").coded("scenario/out-of-range").at("swarm.count"));
     }
     let listed = document.start.positions_m.as_ref().map(Vec::len);
     listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
         ScenarioError::new("the number of vehicles is not given")
+            .coded("scenario/missing-key")
             .with_help("add `count` to [swarm], for example count = 6")
             .at("swarm.count")
     })
@@ -135,6 +137,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
         Some(other) => Err(ScenarioError::new(format!("a swarm of {other} dimensions"))
+            .coded("scenario/out-of-range")
             .with_help("2 is the plane z = 0, 3 is space")
             .at("swarm.dimensions")),
         None => {
@@ -154,12 +157,14 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
         (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,
         (Some(_), Some(_)) => {
             return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
+                .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
                 .at("start.shape")
                 .at("start.positions_m"));
         }
         (None, None) => {
             return Err(ScenarioError::new("no start positions are given")
+                .coded("scenario/missing-key")
                 .with_help("add positions_m = [[x, y], ...] or a shape, for example shape = \"line\", spacing_m = 3.0")
                 .at("start"));
         }

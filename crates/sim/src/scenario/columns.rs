@@ -68,7 +68,10 @@ impl Columns {
 
     /// What is wrong in a line of the file.
     pub(super) fn refused(&self, path: &Path, line: u64, said: &str) -> ScenarioError {
-        ScenarioError::new(format!("{}:{line}: {said}", path.display())).with_help(self.help).at(self.key)
+        ScenarioError::new(format!("{}:{line}: {said}", path.display()))
+            .coded("scenario/file")
+            .with_help(self.help)
+            .at(self.key)
     }
 
     /// Where each column is, by the first line, and whether that line is a heading.

@@ -51,6 +51,7 @@ fn size(
         _ => {
             let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
             let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
+                .coded("scenario/exclusive-keys")
                 .with_help("keep one of them: each decides how large the drawing is");
             Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
         }
@@ -74,9 +75,13 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
             (Drawing::svg(&bytes, keys.filled).map_err(|error| refused(&error, files::KEY, Some(file)))?, files::KEY)
         }
         (given, _) => {
-            let said =
-                if given.is_some() { "both `path` and `file` are given" } else { "neither `path` nor `file` is given" };
+            let (code, said) = if given.is_some() {
+                ("scenario/exclusive-keys", "both `path` and `file` are given")
+            } else {
+                ("scenario/missing-key", "neither `path` nor `file` is given")
+            };
             return Err(ScenarioError::new(said)
+                .coded(code)
                 .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
                 .at(PATH)
                 .at(files::KEY));
@@ -105,6 +110,7 @@ fn sized(
     let (pair, nearest) = formation.min_distance().unwrap_or((Pair::new(0, 1), f64::INFINITY));
     if nearest == 0.0 {
         return Err(ScenarioError::new(format!("slots {pair} of what is drawn are the same point"))
+            .coded("scenario/within-delta")
             .with_help("draw longer lines or larger areas, or fly fewer vehicles")
             .at(key)
             .at("swarm.count"));
@@ -132,6 +138,7 @@ impl Dimension {
         let drawn = drawing.size()[axis];
         if drawn == 0.0 {
             return Err(ScenarioError::new(format!("what is drawn is a straight line, and not {asked_m} m {name}"))
+                .coded("scenario/shape")
                 .with_help("give its other dimension, or spacing_m")
                 .at(key));
         }
@@ -145,6 +152,7 @@ impl Dimension {
             "in a drawing {asked_m} m {name}, {count} vehicles come as near as {nearest_m} m, not more than delta = \
              {delta_m} m"
         ))
+        .coded("scenario/within-delta")
         .with_help(format!(
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
@@ -178,7 +186,7 @@ fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> Scen
         DrawingError::Slots(_) => format!("fly at most {MAX_DRAWN_SLOTS} vehicles"),
     };
     let shown = file.map_or_else(String::new, |file| format!("{}: ", file.display()));
-    let refused = ScenarioError::new(format!("{shown}{error}")).with_help(help).at(key);
+    let refused = ScenarioError::new(format!("{shown}{error}")).coded("scenario/shape").with_help(help).at(key);
     if matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_)) {
         refused.at("swarm.count")
     } else {

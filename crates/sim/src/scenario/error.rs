@@ -57,7 +57,7 @@ impl ScenarioError {
         Self::new(message).coded("scenario/out-of-range")
     }
 
-    /// Gives the error another code than `scenario/inconsistent`, the one of keys that contradict each other.
+    /// Gives the error another code than `scenario/inconsistent`.
     pub(super) fn coded(mut self, code: &'static str) -> Self {
         self.code = code;
         self

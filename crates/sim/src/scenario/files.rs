@@ -15,7 +15,7 @@ const MAX_BYTES: u64 = 128 << 20;
 /// All bytes of a file that is not too long, which a key names.
 pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioError> {
     let shown = path.display();
-    let refused = |said: String, help: &str| ScenarioError::new(said).with_help(help).at(key);
+    let refused = |said: String, help: &str| ScenarioError::new(said).coded("scenario/file").with_help(help).at(key);
     let unreadable = |error: std::io::Error| {
         let help = "give the path of a file that can be read; it counts from the folder of the scenario file, or from the \
                     working directory where there is none";

@@ -103,6 +103,7 @@ fn index(number: u64) -> Option<usize> {
 fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
         ScenarioError::new(format!("there is no vehicle {hub}: they are counted from 1 to {count}"))
+            .coded("scenario/unknown-vehicle")
             .with_help("name a vehicle of the swarm as the middle of the star")
             .at("graph.hub")
     })
@@ -114,6 +115,7 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     if !(1..=most).contains(&degree) {
         let others = if most == 1 { "1 other".to_owned() } else { format!("{most} others") };
         return Err(ScenarioError::new(format!("{degree} links of a vehicle in the mean, where each has {others}"))
+            .coded("scenario/out-of-range")
             .with_help(format!("it is from 1 to {most}; a graph has at least the links of a tree, about 2 in the mean"))
             .at("graph.degree"));
     }
@@ -126,6 +128,7 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
     let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
         index(*a).zip(index(*b)).ok_or_else(|| {
             ScenarioError::new(format!("edge {} names vehicle 0", entry + 1))
+                .coded("scenario/edge")
                 .with_help("vehicles are counted from 1")
                 .at_entry("graph.edges", entry)
         })
@@ -136,6 +139,7 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
         | GraphError::OutOfRange { edge, .. }
         | GraphError::Duplicate { edge, .. }) = error;
         ScenarioError::new(error.to_string())
+            .coded("scenario/edge")
             .with_help("list each pair of different vehicles once, in either order")
             .at_entry("graph.edges", edge)
     })

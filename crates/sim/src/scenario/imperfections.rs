@@ -38,6 +38,7 @@ impl Scenario {
                 return Err(ScenarioError::new(format!(
                     "{what} is drawn anew with each measurement, and none has a time"
                 ))
+                .coded("scenario/missing-key")
                 .with_help("say how often it is measured: sensing.rate_hz, such as 100")
                 .at(key));
             }
@@ -60,6 +61,7 @@ impl Scenario {
         Err(ScenarioError::new(format!(
             "{key} makes what is known jump, and the ideal plant asks the law in continuous time, where nothing does"
         ))
+        .coded("scenario/unsupported-by-plant")
         .with_help("set actuation.control_hz, at which commands are made and held, or plant.kind to \"rapier\"")
         .at(key)
         .at("plant.kind"))
@@ -101,14 +103,16 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("{key} is about messages, and nothing says how often they are sent"))
+            .coded("scenario/missing-key")
             .with_help("set network.rate_hz, such as 50")
             .at(key))
     }
 
     fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
         let &LinkFailure { link: [a, b], from_s, to_s } = failure;
-        let refuse =
-            |said: String, help: &str| Err(ScenarioError::new(said).with_help(help).at_entry("network.failure", entry));
+        let refuse = |code, said: String, help: &str| {
+            Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("network.failure", entry))
+        };
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
             (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
@@ -118,6 +122,7 @@ impl Scenario {
         };
         if !is_link {
             return refuse(
+                "scenario/edge",
                 format!("the graph has no link between vehicles {a} and {b} that could be down"),
                 "name the two ends of an edge of [graph], counted from 1",
             );
@@ -131,6 +136,7 @@ impl Scenario {
             return Ok(());
         }
         refuse(
+            "scenario/outside-flight",
             format!("the link of vehicles {a} and {b} is down from {from_s} s to {until_s} s"),
             "it is down from 0 s or later, before the end of the flight, and until later than that",
         )
@@ -145,7 +151,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "{rate_hz} messages a second are more than {MESSAGES_A_STEP} in a step of {} s, and only the last one counts",
                 self.time.dt_s
-            ))
+            )).coded("scenario/step-too-long")
             .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
             .at("network.rate_hz")
             .at("sensing.rate_hz"));
@@ -164,6 +170,7 @@ impl Scenario {
             "messages over {heard} links would take {} GiB of memory; at most {gib} GiB are used",
             bytes >> 30
         ))
+        .coded("scenario/memory")
         .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
         .at("network.rate_hz")
         .at("graph.kind"))
@@ -182,6 +189,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
+            .coded("scenario/unsupported-by-plant")
             .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
             .at("actuation.lag_s")
             .at("plant.kind"))
@@ -198,6 +206,7 @@ impl Scenario {
                     "vehicle {vehicle} is to fail, and there are {}",
                     self.count()
                 ))
+                .coded("scenario/unknown-vehicle")
                 .with_help("vehicles are counted from 1")
                 .at_entry("failure", entry));
             }
@@ -207,6 +216,7 @@ impl Scenario {
                     "vehicle {vehicle} is to fail at {at_s} s, in a flight from 0 s to {} s",
                     self.time.duration_s
                 ))
+                .coded("scenario/outside-flight")
                 .with_help("let it fail within the flight")
                 .at_entry("failure", entry)
                 .at("time.duration_s"));
@@ -222,22 +232,24 @@ impl Scenario {
     }
 
     fn check_rotor(&self, entry: usize, rotor: u64, share: f64) -> Result<(), ScenarioError> {
-        let (said, help) = if self.airframe.quadrotor().is_none() {
+        let (code, said, help) = if self.airframe.quadrotor().is_none() {
             (
+                "scenario/unsupported-by-vehicle",
                 "a rotor is to fail, and vehicles are points".to_owned(),
                 "set vehicle.model to a quadrotor, or kind to \"dead\"",
             )
         } else if !(1..=4).contains(&rotor) {
-            (format!("rotor {rotor} is to fail"), "a quadrotor has rotors 1 to 4")
+            ("scenario/out-of-range", format!("rotor {rotor} is to fail"), "a quadrotor has rotors 1 to 4")
         } else if !(0.0..1.0).contains(&share) {
             (
+                "scenario/out-of-range",
                 format!("a rotor that fails still gives a share of {share} of its thrust"),
                 "set share from 0 to less than 1",
             )
         } else {
             return Ok(());
         };
-        Err(ScenarioError::new(said).with_help(help).at_entry("failure", entry))
+        Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("failure", entry))
     }
 
     /// What becomes of rotors.
@@ -260,6 +272,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new("the ideal plant's vehicles hold no command that could stay as it was")
+            .coded("scenario/unsupported-by-plant")
             .with_help("set actuation.control_hz, or plant.kind to \"rapier\"")
             .at_entry("failure", entry)
             .at("plant.kind"))
@@ -270,6 +283,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new("a vehicle is to send nothing any more, and nothing says how often messages are sent")
+            .coded("scenario/missing-key")
             .with_help("set network.rate_hz, such as 50")
             .at_entry("failure", entry))
     }
@@ -281,15 +295,20 @@ pub(super) fn latency(key: &'static str, what: &str, latency_s: f64, duration_s:
     if latency_s == 0.0 || (SHORTEST_S..=duration_s).contains(&latency_s) {
         return Ok(latency_s);
     }
-    let (said, help) = if latency_s < SHORTEST_S {
-        (format!("{what} is {latency_s} s"), format!("give at least {SHORTEST_S} s, or 0 for none"))
+    let (code, said, help) = if latency_s < SHORTEST_S {
+        (
+            "scenario/out-of-range",
+            format!("{what} is {latency_s} s"),
+            format!("give at least {SHORTEST_S} s, or 0 for none"),
+        )
     } else {
         (
+            "scenario/outside-flight",
             format!("{what} is {latency_s} s in a flight of {duration_s} s"),
             "nothing would ever be known but the start: give less, or enlarge time.duration_s".to_owned(),
         )
     };
-    Err(ScenarioError::new(said).with_help(help).at(key).at("time.duration_s"))
+    Err(ScenarioError::new(said).coded(code).with_help(help).at(key).at("time.duration_s"))
 }
 
 /// A share, and bursts that can make it up.
@@ -297,6 +316,7 @@ fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
     at_least_zero("network.loss", "the share of messages that are lost", loss)?;
     if loss > 1.0 {
         return Err(ScenarioError::new(format!("the share of messages that are lost is {loss}"))
+            .coded("scenario/out-of-range")
             .with_help("it is at most 1; 0.02 is two in a hundred")
             .at("network.loss"));
     }

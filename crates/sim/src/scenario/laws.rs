@@ -52,6 +52,7 @@ pub(super) fn check(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
             let error = ScenarioError::new(format!("the law named {name} is of the kind {kind}"))
+                .coded("scenario/name")
                 .with_help("give it a name that is no kind of law")
                 .at("law.kind");
             return Err((name, error));
@@ -69,5 +70,5 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
         None => return Ok(()),
     };
-    Err(ScenarioError::new(said).with_help(help))
+    Err(ScenarioError::new(said).coded("scenario/name").with_help(help))
 }

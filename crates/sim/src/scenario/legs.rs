@@ -63,6 +63,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     let most = most_assigned(freedom);
     if scenario.count() > most {
         return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
+            .coded("scenario/out-of-range")
             .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
             .at("formation.assignment")
             .at("swarm.count"));
@@ -85,7 +86,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     if assignment != Assignment::WhenStalled {
         return Ok(false);
     }
-    Err(ScenarioError::new(why)
+    Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
         .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
         .at_leg(leg, "formation.assignment")
         .at("law.kind")
@@ -161,6 +162,7 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
     for (number, slots) in listed.enumerate() {
         if let Some(slots) = slots.filter(|&slots| slots != count) {
             return Err(ScenarioError::new(format!("leg {} has {slots} slots for {count} vehicles", number + 2))
+                .coded("scenario/count-mismatch")
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number + 1, "formation.points_m")
                 .at("swarm.count"));

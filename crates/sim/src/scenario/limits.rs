@@ -69,6 +69,7 @@ pub(super) fn check_lengths<const N: usize>(
 ) -> Result<(), ScenarioError> {
     match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
         Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
+            .coded("scenario/count-mismatch")
             .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
             .at(key)
             .at("swarm.count")),
@@ -82,12 +83,13 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
     if bytes <= MAX_MEMORY_BYTES {
         return Ok(());
     }
-    Err(ScenarioError::out_of_range(format!(
+    Err(ScenarioError::new(format!(
         "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
          {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
         bytes as f64 / GIB,
         MAX_MEMORY_BYTES >> 30
     ))
+    .coded("scenario/memory")
     .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
     .at("swarm.count")
     .at("graph.kind"))

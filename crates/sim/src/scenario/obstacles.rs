@@ -151,7 +151,7 @@ impl ObstacleTable {
 
     /// The obstacle at rest that it means, with a clearance \[m\] where it has none.
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
-        let wrong = |said: String| ScenarioError::new(said).at_entry("obstacle", number);
+        let wrong = |said: String| ScenarioError::new(said).coded("scenario/obstacle").at_entry("obstacle", number);
         let Solid { shape, path, clearance_m: own_m } =
             self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {

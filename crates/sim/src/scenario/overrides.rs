@@ -77,6 +77,7 @@ impl Override {
         }
         if path.len() > MAX_DEPTH {
             return Err(ScenarioError::new(format!("the path has {} parts", path.len()))
+                .coded("scenario/override")
                 .with_help(format!("no key of a scenario has more than {MAX_DEPTH}"))
                 .with_place(place(0..equals)));
         }
@@ -169,6 +170,7 @@ impl Override {
 
     fn refuse(&self, span: &Range<usize>, message: &str) -> ScenarioError {
         ScenarioError::new(message)
+            .coded("scenario/override")
             .with_help("entries of lists are counted from 1, as vehicles are; x, y, z name the axes of a point")
             .with_place(self.place(span.clone()))
     }

@@ -135,12 +135,14 @@ impl ReferenceTable {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
                 ScenarioError::new(format!("there is no vehicle {number}: they are counted from 1 to {count}"))
+                    .coded("scenario/unknown-vehicle")
                     .with_help("name a vehicle of the swarm")
                     .at(key)
             })
         };
         match (&self.known_by, self.leader) {
             (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
+                .coded("scenario/exclusive-keys")
                 .with_help("a leader knows the reference alone: keep one of them")
                 .at("reference.leader")
                 .at("reference.known_by")),
@@ -181,6 +183,7 @@ impl ReferenceKind {
                 require_finite("the time of a turn", period_s).map_err(|error| error.at("reference.period_s"))?;
                 if period_s.abs() < SMALLEST {
                     return Err(ScenarioError::new(format!("one turn in {period_s} s is too fast to compute with"))
+                        .coded("scenario/out-of-range")
                         .with_help(format!("a turn takes at least {SMALLEST:e} s; below zero it is clockwise"))
                         .at("reference.period_s"));
                 }
@@ -203,6 +206,7 @@ impl ReferenceKind {
                     }
                     _ => {
                         return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
+                            .coded("scenario/missing-key")
                             .with_help("give the time at each point, or the largest speed between them")
                             .at("reference.times_s")
                             .at("reference.speed_m_s")
@@ -215,8 +219,11 @@ impl ReferenceKind {
                 let points = in_time(&places(points_m)?, times_s)?;
                 check_span(&points, duration_s)?;
                 check_steady(&points)?;
-                let spline = Spline::through(&points)
-                    .ok_or_else(|| ScenarioError::new("no curve goes through the points").at("reference.points_m"))?;
+                let spline = Spline::through(&points).ok_or_else(|| {
+                    ScenarioError::new("no curve goes through the points")
+                        .coded("scenario/reference")
+                        .at("reference.points_m")
+                })?;
                 ReferenceMotion::Table(spline)
             }
             Self::File { file } => Self::of_file(file)?.motion(duration_s)?,
@@ -234,6 +241,7 @@ fn place(key: &'static str, point: Point) -> Result<Vector3<f64>, ScenarioError>
 fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     if points_m.is_empty() {
         return Err(ScenarioError::new("the reference has no points")
+            .coded("scenario/missing-key")
             .with_help("give points_m = [[x, y], ...]")
             .at("reference.points_m"));
     }
@@ -256,6 +264,7 @@ fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
 fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vector3<f64>)>, ScenarioError> {
     if points_m.len() != times_s.len() {
         return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
+            .coded("scenario/count-mismatch")
             .with_help("give a time for each point")
             .at("reference.times_s")
             .at("reference.points_m"));
@@ -271,6 +280,7 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
                 format!("time {} of the reference is {time_s} s, not after {before_s} s", k + 1)
             };
             return Err(ScenarioError::new(said)
+                .coded("scenario/reference")
                 .with_help("times must grow from point to point; a formation jumps by a [[leg]]")
                 .at_entry("reference.times_s", k));
         }
@@ -287,6 +297,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
             "the reference is given from {} to {} s, and the flight lasts from 0 to {duration_s} s",
             first.0, last.0
         ))
+        .coded("scenario/outside-flight")
         .with_help("give points from time 0 to the end of the flight, or shorten time.duration_s")
         .at("reference.times_s")
         .at("time.duration_s"));
@@ -309,7 +320,7 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
         points[k].0,
         points[k + 1].0,
         speeds_m_s[k]
-    ))
+    )).coded("scenario/reference")
     .with_help("give points in between, or a motion of the kind \"way-points\", which begins and ends each way at rest")
     .at_entry("reference.points_m", k + 1))
 }

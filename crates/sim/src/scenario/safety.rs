@@ -47,6 +47,7 @@ impl SafetyTable {
                 "set safety.shape to \"ellipsoid\", or leave them out: a ball is half of law.delta_m in radius",
             )),
             (SafetyKind::Ellipsoid, None, _) => Err(ScenarioError::new("an ellipsoid without half axes")
+                .coded("scenario/missing-key")
                 .with_help("give safety.half_axes_m, for example [0.125, 0.125, 0.375]")
                 .at("safety.shape")),
             (SafetyKind::Ellipsoid, Some(half_m), delta_m) => of_ellipsoid(half_m, delta_m),

@@ -14,6 +14,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))
+            .coded("scenario/unsupported-by-law")
             .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
             .at("safety.shape")
             .at("law.kind"))

@@ -64,6 +64,7 @@ fn v(keys: &VKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioErro
     // As many degrees as there are in its least angle are not less than it.
     if angle_rad < NARROWEST_V_RAD * (1.0 - f64::EPSILON) || angle_deg > 180.0 {
         return Err(ScenarioError::new(format!("a V with an angle of {angle_deg} degrees"))
+            .coded("scenario/out-of-range")
             .with_help("it must be from 60, so that the arms keep the spacing, to 180")
             .at("formation.angle_deg"));
     }
@@ -82,6 +83,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     if let Some(turns) = keys.turns {
         if keys.spacing_m.is_some() {
             return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
+                .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
                 .at("formation.turns")
                 .at("formation.spacing_m"));
@@ -93,6 +95,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     let spacing_m = spacing(keys.spacing_m, delta_m)?;
     let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
         return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
+            .coded("scenario/shape")
             .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
             .at("formation.radius_m")
             .at("formation.spacing_m"));
@@ -112,6 +115,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         return Err(ScenarioError::new(format!(
             "turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m"
         ))
+        .coded("scenario/shape")
         .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
         .at("formation.pitch_m")
         .at("formation.spacing_m"));

@@ -41,6 +41,7 @@ pub(super) fn positions(
                 return Err(ScenarioError::new(format!(
                     "a smallest separation of {min_separation_m} m is not more than delta = {delta_m} m"
                 ))
+                .coded("scenario/within-delta")
                 .with_help("enlarge start.min_separation_m or reduce law.delta_m")
                 .at("start.min_separation_m")
                 .at("law.delta_m"));
@@ -100,6 +101,7 @@ pub fn scatter(
                  {min_separation_m} m of another",
                 i + 1
             ))
+            .coded("scenario/no-room")
             .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
             .at("start.half_extent_m")
             .at("start.min_separation_m")

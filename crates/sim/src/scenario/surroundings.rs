@@ -16,6 +16,7 @@ impl Scenario {
             check_solid(obstacle).map_err(|error| error.at_entry("obstacle", number))?;
             if self.obstacles[..number].iter().any(|before| before.name == obstacle.name) {
                 return Err(ScenarioError::new(format!("two obstacles are named `{}`", obstacle.name))
+                    .coded("scenario/name")
                     .with_help("give each a name of its own")
                     .at_entry("obstacle", number));
             }
@@ -65,7 +66,9 @@ impl Scenario {
         } else {
             format!("{who} {distance_m} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
-        ScenarioError::new(said).with_help("move one of them away, or reduce the clearance_m of the obstacle")
+        ScenarioError::new(said)
+            .coded("scenario/near-obstacle")
+            .with_help("move one of them away, or reduce the clearance_m of the obstacle")
     }
 
     fn check_hulls_beside(&self, number: usize, obstacle: &Obstacle) -> Result<(), ScenarioError> {
@@ -81,6 +84,7 @@ impl Scenario {
             obstacle.name,
             obstacle.clearance_m
         ))
+        .coded("scenario/hulls-touch")
         .with_help("enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m")
         .at_entry("obstacle", number)
         .at_entry("swarm.hull_radius_m", vehicle))
@@ -91,10 +95,13 @@ impl Scenario {
 fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
     let Obstacle { name, place_m, shape, clearance_m } = obstacle;
     if name.trim().is_empty() {
-        return Err(ScenarioError::new("the name of an obstacle is empty").with_help("give it one"));
+        return Err(ScenarioError::new("the name of an obstacle is empty")
+            .coded("scenario/name")
+            .with_help("give it one"));
     }
     if name.trim().parse::<u64>().is_ok() {
         return Err(ScenarioError::new(format!("an obstacle is named `{name}`, as a vehicle is"))
+            .coded("scenario/name")
             .with_help("give it a name that is no number"));
     }
     let lengths = |what: &str, numbers: &[f64]| {

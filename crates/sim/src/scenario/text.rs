@@ -202,6 +202,7 @@ impl<'a> Text<'a> {
                         Some(_) => format!("`{key}`"),
                     });
                     return Err(ScenarioError::new(format!("both {name} and {other} are given"))
+                        .coded("scenario/exclusive-keys")
                         .with_help(format!("{other} is another name of {name}: keep one of them"))
                         .with_place(self.locate(key.span())));
                 }

@@ -28,18 +28,21 @@ impl Scenario {
         }
         if self.space != Space::Plane {
             return Err(ScenarioError::new("unicycles move in the plane z = 0, and this swarm lives in space")
+                .coded("scenario/plane")
                 .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
                 .at("vehicle.model")
                 .at("swarm.dimensions"));
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
             return Err(ScenarioError::new("the ideal plant flies points and quadrotors, no unicycles")
+                .coded("scenario/unsupported-by-plant")
                 .with_help("leave out plant.kind: the way of a unicycle is solved in closed form")
                 .at("plant.kind")
                 .at("vehicle.model"));
         }
         if self.a22_per_s != 0.0 {
             return Err(ScenarioError::new("a unicycle has no velocity coefficient a22")
+                .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave out swarm.a22_per_s")
                 .at("swarm.a22_per_s")
                 .at("vehicle.model"));
@@ -47,6 +50,7 @@ impl Scenario {
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
             return Err(ScenarioError::new("a unicycle does not feel the air")
+                .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
                 .at(key)
                 .at("vehicle.model"));
@@ -58,7 +62,7 @@ impl Scenario {
                 return Err(ScenarioError::new(format!(
                     "vehicle {} starts at {speed_m_s} m/s, and a unicycle here goes at {min_speed_m_s} to {max_speed_m_s} m/s",
                     i + 1
-                ))
+                )).coded("scenario/out-of-range")
                 .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
                 .at_entry("start.velocities_m_s", i)
                 .at("vehicle.min_speed_m_s")

@@ -68,6 +68,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("a seed of {}, which a scenario file cannot hold", self.noise_seed))
+            .coded("scenario/out-of-range")
             .with_help(format!("it is at most {}", i64::MAX))
             .at("noise.seed"))
     }
@@ -82,6 +83,7 @@ impl Scenario {
                 "the formation is to be held for {} s in a flight of {} s",
                 arrival.hold_s, time.duration_s
             ))
+            .coded("scenario/outside-flight")
             .with_help("enlarge time.duration_s or reduce arrival.hold_s")
             .at("arrival.hold_s")
             .at("time.duration_s"));
@@ -91,7 +93,10 @@ impl Scenario {
 
     fn check_legs(&self) -> Result<(), ScenarioError> {
         if self.legs.is_empty() {
-            return Err(ScenarioError::new("there is no formation to fly to").with_help("give one").at("formation"));
+            return Err(ScenarioError::new("there is no formation to fly to")
+                .coded("scenario/missing-key")
+                .with_help("give one")
+                .at("formation"));
         }
         let mut from_s = 0.0;
         for (number, leg) in self.legs.iter().enumerate().skip(1) {
@@ -102,12 +107,14 @@ impl Scenario {
                     number + 1,
                     self.count()
                 ))
+                .coded("scenario/count-mismatch")
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number, "formation.points_m"));
             }
             let Begins::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
                 return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
+                    .coded("scenario/outside-flight")
                     .with_help(format!(
                         "legs begin one after the other, from {from_s} s on and before the end of the flight at {} s",
                         self.time.duration_s
@@ -132,12 +139,14 @@ impl Scenario {
                 guidance.motion.shortest_s(),
                 self.time.dt_s
             ))
+            .coded("scenario/step-too-long")
             .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
             .at("reference.kind")
             .at("time.dt_s"));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
             return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
+                .coded("scenario/plane")
                 .with_help("set its z to 0, or swarm.dimensions to 3")
                 .at("reference.kind")
                 .at("swarm.dimensions"));
@@ -159,6 +168,7 @@ impl Scenario {
             leader + 1,
             off_m_s.norm()
         ))
+        .coded("scenario/reference")
         .with_help("leave out its start velocity: it then starts as the reference does")
         .at_entry("start.velocities_m_s", leader)
         .at("reference.leader"))
@@ -167,7 +177,7 @@ impl Scenario {
     /// A reference that the law follows, known by whom it must be.
     fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
         let refuse = |said: String, help: &str, key: &'static str| {
-            Err(ScenarioError::new(said).with_help(help).at(key).at("law.kind"))
+            Err(ScenarioError::new(said).coded("scenario/unsupported-by-law").with_help(help).at(key).at("law.kind"))
         };
         match self.law() {
             Ok(law) if law.capabilities().controls != Controls::Places => {
@@ -250,6 +260,7 @@ impl Scenario {
                         "z of {what} of vehicle {} is {z}, but the swarm lives in the plane z = 0",
                         i + 1
                     ))
+                    .coded("scenario/plane")
                     .with_help("set z to 0, or swarm.dimensions to 3")
                     .at_leg_entry(leg, key, i)
                     .at("swarm.dimensions"));
@@ -343,6 +354,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "one step of {dt_s} s is longer than the flight of {duration_s} s"
             ))
+            .coded("scenario/step-too-long")
             .with_help("enlarge time.duration_s or reduce time.dt_s")
             .at("time.duration_s"));
         }
@@ -351,6 +363,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "{duration_s} s in steps of {dt_s} s are {steps:.2e} steps; at most {MAX_STEPS:e} are flown"
             ))
+            .coded("scenario/too-many-steps")
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
             .at("time.duration_s")
             .at("time.dt_s"));
@@ -360,6 +373,7 @@ impl Scenario {
                 "one step of {dt_s} s is longer than the time 1/|a22| = {} s in which velocities change by themselves",
                 1.0 / self.a22_per_s.abs()
             ))
+            .coded("scenario/step-too-long")
             .with_help("reduce time.dt_s or swarm.a22_per_s")
             .at("swarm.a22_per_s")
             .at("time.dt_s"));
@@ -372,6 +386,7 @@ impl Scenario {
                 return Err(ScenarioError::new(format!(
                     "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
                 ))
+                .coded("scenario/step-too-long")
                 .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
                 .at("time.control_hz")
                 .at("time.dt_s"));
@@ -411,7 +426,10 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     } else {
         return Ok(());
     };
-    Err(ScenarioError::out_of_range(said).with_help("it names a folder: use letters, digits, `-` and `_`").at("name"))
+    Err(ScenarioError::new(said)
+        .coded("scenario/name")
+        .with_help("it names a folder: use letters, digits, `-` and `_`")
+        .at("name"))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.

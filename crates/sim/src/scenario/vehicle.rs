@@ -62,6 +62,7 @@ impl Scenario {
                 "an attitude loop of {attitude_hz} Hz runs more than once in a step of {} s",
                 self.time.dt_s
             ))
+            .coded("scenario/step-too-long")
             .with_help(format!(
                 "reduce vehicle.attitude_hz to at most {}, or time.dt_s to at most {}",
                 1.0 / self.time.dt_s,

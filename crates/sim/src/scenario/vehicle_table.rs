@@ -169,7 +169,10 @@ impl VehicleTable {
                 found.ok_or_else(|| {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
-                    ScenarioError::new(format!("there is no model `{name}`")).with_help(help).at(MODEL)
+                    ScenarioError::new(format!("there is no model `{name}`"))
+                        .coded("scenario/unknown-choice")
+                        .with_help(help)
+                        .at(MODEL)
                 })?
             }
         };
@@ -209,6 +212,7 @@ impl VehicleTable {
         ];
         match given.into_iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(ScenarioError::new(format!("{what} has neither attitude nor rotors"))
+                .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
                 .at(key)
                 .at(MODEL)),
@@ -226,6 +230,7 @@ impl VehicleTable {
         ];
         match given.into_iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(ScenarioError::new(format!("{what} has no such limit"))
+                .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave this key out, or set vehicle.model to \"unicycle\"")
                 .at(key)
                 .at(MODEL)),
@@ -280,9 +285,12 @@ impl From<&Unicycle> for VehicleTable {
 fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
-        ScenarioError::new(format!("{shown} is not UTF-8")).with_help("save the file as UTF-8 text").at(MODEL)
+        ScenarioError::new(format!("{shown} is not UTF-8"))
+            .coded("scenario/file")
+            .with_help("save the file as UTF-8 text")
+            .at(MODEL)
     })?;
     vehicle::read(&text).map_err(|Misread { message, help, span }| {
-        ScenarioError::new(message).with_help(help).with_place(Place::new(&shown, &text, span))
+        ScenarioError::new(message).coded("scenario/file").with_help(help).with_place(Place::new(&shown, &text, span))
     })
 }

@@ -20,12 +20,14 @@ impl Scenario {
                 self.time.dt_s,
                 1.0 / drag_per_s
             ))
+            .coded("scenario/step-too-long")
             .with_help("reduce time.dt_s or vehicle.drag_per_s")
             .at("vehicle.drag_per_s")
             .at("time.dt_s"));
         }
         if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
             return Err(ScenarioError::new(format!("a drag of {drag_per_s} 1/s on vehicles that are no points"))
+                .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave it out: the drag of a quadrotor is that of its rotors and its body, in its model")
                 .at("vehicle.drag_per_s")
                 .at("vehicle.model"));
@@ -34,6 +36,7 @@ impl Scenario {
             return Err(ScenarioError::new(
                 "a wind blows and the vehicles are points without drag, which do not feel it",
             )
+            .coded("scenario/unsupported-by-vehicle")
             .with_help(
                 "set vehicle.drag_per_s to what a vehicle loses of its velocity through still air, for example 0.3",
             )
@@ -55,6 +58,7 @@ impl Scenario {
                 "{what} blows at {} m/s along z, out of the plane z = 0",
                 air_m_s.z
             ))
+            .coded("scenario/plane")
             .with_help("set its z to 0, or swarm.dimensions to 3")
             .at(key)
             .at("swarm.dimensions"));
@@ -74,6 +78,7 @@ impl Scenario {
                     "{what} takes {slope_s} s, too short to be followed in steps of {} s",
                     self.time.dt_s
                 ))
+                .coded("scenario/step-too-long")
                 .with_help(format!("give it at least {shortest_s} s, or reduce time.dt_s"))
                 .at("wind.gust")
                 .at("time.dt_s"));
@@ -84,6 +89,7 @@ impl Scenario {
                 "a gust begins at {at_s} s, after the flight of {} s",
                 self.time.duration_s
             ))
+            .coded("scenario/outside-flight")
             .with_help("let it begin earlier, or enlarge time.duration_s")
             .at("wind.gust")
             .at("time.duration_s"));
@@ -94,6 +100,7 @@ impl Scenario {
                 .at("wind.gust")),
             Some(met) if !met.is_sorted() || met.last().is_some_and(|&last| last >= self.count()) => {
                 Err(ScenarioError::new("the vehicles that a gust meets are out of order, or not of the swarm")
+                    .coded("scenario/unknown-vehicle")
                     .with_help(format!("list them in ascending order, from 0 to {}", self.count() - 1))
                     .at("wind.gust"))
             }
@@ -109,6 +116,7 @@ fn check_turbulence(dryden: &Dryden) -> Result<(), ScenarioError> {
         return Ok(());
     }
     Err(ScenarioError::new(format!("turbulence at a height of {height_m} m, for which its scales are not made"))
+        .coded("scenario/out-of-range")
         .with_help("set height_m to 3.048 (10 feet) for what flies lower, and to at most 304.8 (1000 feet)")
         .at("wind.dryden"))
 }

@@ -135,6 +135,7 @@ impl GustTable {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
                 ScenarioError::new(format!("a gust meets vehicle {number}: they are counted from 1 to {count}"))
+                    .coded("scenario/unknown-vehicle")
                     .with_help("name vehicles of the swarm")
                     .at("wind.gust")
             })

@@ -6,7 +6,7 @@ use tautline_core::record::OwnedSample;
 use tautline_core::swarm::{Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::{LawError, Linear, Void};
-use tautline_sim::scenario::{Failure, FailureKind, Scenario};
+use tautline_sim::scenario::{Failure, FailureKind, Override, Scenario, Source};
 use tautline_sim::sim::{Ending, Simulation};
 
 /// Every imperfection at once that Rapier can have.
@@ -308,4 +308,43 @@ fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
     let reason = late.ending.reason().expect("it ended early");
     assert!(reason.contains("by what they measured or heard of each other") && reason.contains("true distance is 2."));
     assert_eq!(flight(0.0).ending, Ending::Completed);
+}
+
+#[test]
+fn a_wrong_imperfection_is_refused_at_its_place() {
+    let ideal = "plant.kind=ideal";
+    let failure = |keys: &str| format!("failure=[{{{keys}}}]");
+    let link = |keys: &str| format!("network.failure=[{{{keys}}}]");
+    for (sets, code) in [
+        (&["sensing.position_noise_m=-0.1"][..], "scenario/out-of-range"),
+        (&["sensing.position_noise_m=nan"], "scenario/out-of-range"),
+        (&["sensing.position_noise_m=0.1"], "scenario/missing-key"),
+        (&["sensing.rate_hz=0"], "scenario/out-of-range"),
+        (&["sensing.latency_s=200"], "scenario/outside-flight"),
+        (&["sensing.latency_s=1e-9"], "scenario/out-of-range"),
+        (&["sensing.rate_hz=100", ideal], "scenario/unsupported-by-plant"),
+        (&["network.loss=1.5", "network.rate_hz=50"], "scenario/out-of-range"),
+        (&["network.loss=-0.5", "network.rate_hz=50"], "scenario/out-of-range"),
+        (&["network.loss=0.1"], "scenario/missing-key"),
+        (&["network.jitter_s=0.1"], "scenario/missing-key"),
+        (&["network.loss=0.8", "network.loss_burst=2", "network.rate_hz=50"], "scenario/inconsistent"),
+        (&["network.latency_s=121"], "scenario/outside-flight"),
+        (&["network.missing=guess"], "scenario/unknown-choice"),
+        (&["network.rate_hz=50", &link("link=[1, 9], from_s=1")], "scenario/edge"),
+        (&["network.rate_hz=50", &link("link=[1, 2], from_s=3, to_s=2")], "scenario/outside-flight"),
+        (&["network.rate_hz=1e8"], "scenario/step-too-long"),
+        (&["actuation.max_accel_m_s2=0"], "scenario/out-of-range"),
+        (&["actuation.lag_s=0.1", ideal], "scenario/unsupported-by-plant"),
+        (&["actuation.control_hz=50", "time.control_hz=60"], "scenario/exclusive-keys"),
+        (&[&failure("vehicle=6, at_s=1, kind=\"dead\"")], "scenario/unknown-vehicle"),
+        (&[&failure("vehicle=1, at_s=500, kind=\"dead\"")], "scenario/outside-flight"),
+        (&[&failure("vehicle=1, at_s=5, kind=\"silent\"")], "scenario/missing-key"),
+        (&[&failure("vehicle=1, at_s=5, kind=\"frozen\""), ideal], "scenario/unsupported-by-plant"),
+    ] {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+        let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(code);
+        assert_eq!(error.code(), code, "{sets:?}: {error}");
+        assert!(error.help().is_some(), "{sets:?}: {error}");
+        assert!(error.place().is_some_and(|place| place.source == "--set"), "{sets:?}: {error}");
+    }
 }

@@ -15,6 +15,7 @@ mod plant_claims;
 mod quadrotors;
 mod reach;
 mod reference_flights;
+mod references;
 mod safety;
 mod scenario_bytes;
 mod scenario_files;

@@ -12,7 +12,7 @@ use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
 use tautline_laws::space::{Obstacle, Shape, least_room};
 use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
-use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::scenario::{PlantSpec, Scenario, Source};
 use tautline_sim::sim::{Ending, Flight, Motion, Simulation};
 
 use crate::flight::{Log, builtin, fly, fly_with};
@@ -239,4 +239,62 @@ fn a_step_that_takes_more_than_half_of_the_room_is_flown_in_halves() {
     assert_eq!(flight.ending, Ending::Completed);
     assert_eq!(flight.clearance.expect("obstacles").status, Status::Clear);
     assert!(log.events.iter().any(|event| matches!(event, Event::StepRefined { .. })));
+}
+
+const TOWER_AND_WALL: &str = r#"[swarm]
+count = 3
+[start]
+positions_m = [[-6, 0], [-6, 3], [-8, 0]]
+[formation]
+shape = "points"
+points_m = [[6, -1], [6, 1], [4, 0]]
+[reference]
+kind = "rest"
+[[obstacle]]
+name = "tower"
+ball = { radius_m = 1.0 }
+at_m = [0.0, 0.3, 0.0]
+[[obstacle]]
+name = "wall"
+box = { size_m = [4.0, 1.0, 3.0], yaw_deg = 33.3 }
+at_m = [0.0, 6.0, 0.0]
+clearance_m = 0.7
+[law]
+kind = "displacement"
+delta_m = 1.0
+[time]
+duration_s = 25
+"#;
+
+#[test]
+fn a_wrong_obstacle_is_refused_at_its_place() {
+    let replaced = |from: &str, to: &str| {
+        assert!(TOWER_AND_WALL.contains(from), "{from}");
+        TOWER_AND_WALL.replace(from, to)
+    };
+    let tower = "name = \"tower\"\nball = { radius_m = 1.0 }\nat_m = [0.0, 0.3, 0.0]\n";
+    for (text, code) in [
+        (replaced("[0.0, 0.3, 0.0]", "[-6.0, 1.2, 0.0]"), "scenario/near-obstacle"),
+        (replaced("[0.0, 0.3, 0.0]", "[-6.0, 0.2, 0.0]"), "scenario/near-obstacle"),
+        (replaced("[0.0, 0.3, 0.0]", "[6.0, 2.2, 0.0]"), "scenario/near-obstacle"),
+        (replaced("radius_m = 1.0", "radius_m = 0.0"), "scenario/out-of-range"),
+        (replaced("clearance_m = 0.7", "clearance_m = 0.26"), "scenario/hulls-touch"),
+        (replaced("clearance_m = 0.7", "clearance_m = nan"), "scenario/out-of-range"),
+        (replaced("\"wall\"", "\"tower\""), "scenario/name"),
+        (replaced("\"wall\"", "\"2\""), "scenario/name"),
+        (replaced("\"wall\"", "\"\""), "scenario/name"),
+        (replaced(tower, "name = \"t\"\nball = { radius_m = 1.0 }\n"), "scenario/obstacle"),
+        (replaced(tower, "name = \"t\"\nat_m = [0, 0, 0]\n"), "scenario/obstacle"),
+        (
+            replaced(tower, "name = \"t\"\nball = { radius_m = 1 }\npath = [[0, 0, 0, 0], [1, 1, 0, 0]]\n"),
+            "scenario/obstacle",
+        ),
+        (replaced(tower, "name = \"t\"\nbal = { radius_m = 1 }\nat_m = [0, 0, 0]\n"), "scenario/unknown-key"),
+        (replaced(tower, "name = \"t\"\nhalf_space = { normal = [0, 0, 0] }\n"), "scenario/out-of-range"),
+    ] {
+        let source = Source::Text { name: "test".to_owned(), text };
+        let error = Scenario::read(&source, &[]).expect_err(code);
+        assert_eq!(error.code(), code, "{error}");
+        assert!(error.help().is_some() && error.place().is_some(), "{error}");
+    }
 }

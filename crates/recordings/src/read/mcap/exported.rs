@@ -53,7 +53,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
-    let none = Fault::content("it holds no instant", "export again");
+    let none = Fault::coded("recording/empty", "it holds no instant", "export again");
     let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
     (about.epoch_ns, about.frame.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;

@@ -67,7 +67,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
                   geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, sensor_msgs/msg/NavSatFix, \
                   motion_capture_tracking_interfaces/msg/NamedPoseArray or tf2_msgs/msg/TFMessage are read";
-    Err(Fault::content("it has no topic with positions", remedy).into())
+    Err(Fault::coded("recording/no-positions", "it has no topic with positions", remedy).into())
 }
 
 impl From<RecordError> for ReadError {

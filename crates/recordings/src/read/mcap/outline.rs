@@ -106,7 +106,8 @@ impl Outline {
                 "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
                 told.listed
             );
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/list-length",
                 problem,
                 "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
                  --topic if the list is of no vehicles",
@@ -131,7 +132,7 @@ impl Outline {
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
-            return Err(Fault::content(problem, "give the frame another name"));
+            return Err(Fault::coded("recording/unusable-frame", problem, "give the frame another name"));
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
@@ -149,7 +150,7 @@ impl Outline {
         let What::Odometry(child) = seen.what else { return Ok(()) };
         if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
             let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
-            return Err(Fault::content(problem, "record each robot on a topic of its own"));
+            return Err(Fault::coded("recording/several-vehicles", problem, "record each robot on a topic of its own"));
         }
         told.child = Some(child);
         Ok(())
@@ -178,7 +179,7 @@ impl Outline {
         let twice = |first: &str, second: &str, who: &str| {
             let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
             let remedy = if is_chosen { "name one of the two alone with --topic" } else { CHOOSE };
-            Fault::content(problem, remedy)
+            Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
         for (topic, told) in &self.topics {
@@ -214,7 +215,7 @@ impl Outline {
         let problem = format!(
             "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
         );
-        Err(Fault::content(problem, CHOOSE))
+        Err(Fault::coded("recording/ambiguous-topics", problem, CHOOSE))
     }
 
     /// Topics that tell by their names where somebody is asked to be, unless the user names those that are read.
@@ -279,7 +280,7 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
             "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
         );
         let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
-        return Err(Fault::content(problem, remedy));
+        return Err(Fault::coded("recording/several-frames", problem, remedy));
     }
     Ok(())
 }

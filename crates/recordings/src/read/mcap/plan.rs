@@ -64,7 +64,9 @@ impl Plan {
             turned::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return Err(Fault::content("it has no place on the Earth", "leave --origin away").into());
+            return Err(
+                Fault::coded("recording/unused-option", "it has no place on the Earth", "leave --origin away").into()
+            );
         }
         plan.check()?;
         plan.find_bodies()?;
@@ -85,7 +87,7 @@ impl Plan {
         if let Some(name) = self.outline.named.iter().find(|topic| !known.contains(topic)) {
             let problem =
                 format!("it has no topic {} with positions; those that it has are {}", quoted(name), known.join(", "));
-            return Err(Fault::content(problem, "name one of these with --topic"));
+            return Err(Fault::coded("recording/unknown-topic", problem, "name one of these with --topic"));
         }
         self.outline.refuse_twice()?;
         self.outline.refuse_wishes()
@@ -120,7 +122,7 @@ impl Plan {
             let problem = format!("transforms tell of {}, and topics of poses tell of other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
             let remedy = format!("say which topics are read with --topic NAME, once for each; it has {known}");
-            return Err(Fault::content(problem, remedy));
+            return Err(Fault::coded("recording/ambiguous-topics", problem, remedy));
         }
         if !covered.is_empty() {
             let covered = covered.join(", ");
@@ -233,7 +235,8 @@ impl Plan {
             Some(frame) => {
                 let problem =
                     format!("no position is given in the frame {}, nor brought there by transforms", quoted(frame));
-                Fault::content(
+                Fault::coded(
+                    "recording/unusable-frame",
                     problem,
                     "name another frame, or record /tf and /tf_static from before the first position on",
                 )
@@ -241,9 +244,17 @@ impl Plan {
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms are of no vehicle: its frames are {}", frames.join(", "));
-                Fault::content(problem, "record the transforms of the vehicles' own frames as well")
+                Fault::coded(
+                    "recording/no-positions",
+                    problem,
+                    "record the transforms of the vehicles' own frames as well",
+                )
             }
-            None => Fault::content("no message of its topics with positions has one", "record again"),
+            None => Fault::coded(
+                "recording/no-positions",
+                "no message of its topics with positions has one",
+                "record again",
+            ),
         }
     }
 

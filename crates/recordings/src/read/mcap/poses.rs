@@ -88,7 +88,8 @@ impl Poses {
         };
         if wanted == EARTH {
             let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
-            return Err(Fault::content(
+            return Err(Fault::coded(
+                "recording/unusable-frame",
                 problem,
                 "leave --frame out, or name a frame of poses; --topic says which topics are read",
             ));
@@ -152,7 +153,7 @@ impl Poses {
                 let problem =
                     format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
                 let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
-                return Err(Fault::content(problem, remedy));
+                return Err(Fault::coded("recording/several-frames", problem, remedy));
             }
         }
         Ok(())

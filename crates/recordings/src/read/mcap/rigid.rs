@@ -30,7 +30,7 @@ impl Placed {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
             let problem = format!("the quaternion {x}, {y}, {z}, {w} is no rotation: its length is not 1");
-            return Err(Fault::content(problem, "record again, or leave --frame away"));
+            return Err(Fault::coded("recording/transforms", problem, "record again, or leave --frame away"));
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }

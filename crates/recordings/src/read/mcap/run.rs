@@ -16,7 +16,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
-    let none = Fault::content("it holds no sample", "record again");
+    let none = Fault::coded("recording/empty", "it holds no sample", "record again");
     let about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
     Ok(Box::new(Ordered::open(run, about)?))
 }

@@ -83,7 +83,7 @@ impl Splits {
             let problem =
                 format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
-                return Err(Fault::content(problem, "copy the whole folder again").into());
+                return Err(Fault::coded("recording/bag-index", problem, "copy the whole folder again").into());
             }
             self.note(problem);
         }

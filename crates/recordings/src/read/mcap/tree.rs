@@ -99,7 +99,7 @@ impl Tree {
             return Ok(());
         }
         let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
-        Err(Fault::content(problem, "record again, with one publisher of each transform"))
+        Err(Fault::coded("recording/transforms", problem, "record again, with one publisher of each transform"))
     }
 
     /// Frames that stand still in their parents.
@@ -120,11 +120,11 @@ impl Tree {
                 let problem =
                     format!("frame {} is given in {} and in {}", quoted(child), quoted(&edge.parent), quoted(stray));
                 let remedy = "a frame has one parent: record robots under namespaces of their own, or name topics of poses with --topic";
-                return Err(Fault::content(problem, remedy));
+                return Err(Fault::coded("recording/transforms", problem, remedy));
             }
             if way.len() > DEEPEST {
                 let problem = format!("transforms lead from {} through more than {DEEPEST} frames", quoted(frame));
-                return Err(Fault::content(problem, "look whether they go round in a circle"));
+                return Err(Fault::coded("recording/transforms", problem, "look whether they go round in a circle"));
             }
             way.push(&edge.parent);
         }
@@ -188,7 +188,11 @@ impl Tree {
             edge.samples.dedup();
             if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
                 let problem = format!("frame {} is in two places of its parent at {time_ns} ns", quoted(frame));
-                return Err(Fault::content(problem, "record again, with one publisher of each transform"));
+                return Err(Fault::coded(
+                    "recording/transforms",
+                    problem,
+                    "record again, with one publisher of each transform",
+                ));
             }
         }
         Ok(())
