@@ -140,12 +140,7 @@ impl Question {
         require_presence: bool,
         independent: bool,
     ) -> PyResult<Self> {
-        let motions = [
-            ("linear", Motion::Linear),
-            ("hold", Motion::Hold),
-            ("polynomial", Motion::Polynomial),
-            ("bounded", Motion::Bounded),
-        ];
+        let motions = Motion::ALL.map(|motion| (motion.name(), motion));
         let mut settings = recorded::Settings {
             delta_m: delta,
             motion: choice("motion", motion, &motions)?,

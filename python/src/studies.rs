@@ -26,7 +26,7 @@ fn answered<T: Send>(py: Python<'_>, work: impl FnOnce(&Silent) -> Result<T, Fai
     away_with_threads(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::raised)
 }
 
-/// What is there of an answer that an interruption did not cut short.
+/// The answer of a study that was not interrupted.
 fn whole<T>(answer: Option<T>) -> PyResult<T> {
     answer.ok_or_else(|| broken("the work was interrupted"))
 }

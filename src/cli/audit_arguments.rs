@@ -123,13 +123,14 @@ pub(super) struct AuditArguments {
     pub(super) allow_undecided: bool,
 }
 
-pub(super) fn motion() -> impl TypedValueParser<Value = Motion> {
-    one_of(vec![
-        (PossibleValue::new("linear").help("Straight lines"), Motion::Linear),
-        (PossibleValue::new("hold").help("Nothing, with a jump at each sample"), Motion::Hold),
-        (PossibleValue::new("polynomial").help("The recording's own curves"), Motion::Polynomial),
-        (PossibleValue::new("bounded").help("Anything within the largest acceleration"), Motion::Bounded),
-    ])
+fn motion() -> impl TypedValueParser<Value = Motion> {
+    let help = |motion| match motion {
+        Motion::Linear => "Straight lines",
+        Motion::Hold => "Nothing, with a jump at each sample",
+        Motion::Polynomial => "The recording's own curves",
+        Motion::Bounded => "Anything within the largest acceleration",
+    };
+    one_of(Motion::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
 
 /// Whose lines mark what was found.

@@ -79,7 +79,7 @@ pub(super) fn quiet_guarded_panics() {
 }
 
 /// Does what a command asks for. `line` is the whole command line.
-pub(super) fn obey(command: Command, line: &str) -> Result<Exit, Failure> {
+pub(super) fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
     match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audits::audits(&arguments, line),

@@ -53,7 +53,7 @@ pub(super) fn show(failure: &Failure) -> Exit {
     if GraphicalReportHandler::new().render_report(&mut text, report.as_ref()).is_err() {
         text = format!("error: {failure}\n");
     }
-    // Nobody is left to tell where standard error is closed.
+    // An error here means that standard error is closed.
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
     Exit::of(failure)
 }

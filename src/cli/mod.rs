@@ -38,7 +38,7 @@ use std::process::ExitCode;
 
 use clap::Parser as _;
 
-use command::{Arguments, Command, obey, quiet_guarded_panics};
+use command::{Arguments, Command, dispatch, quiet_guarded_panics};
 use diagnostic::Exit;
 use tautline_report::request::command_line;
 
@@ -72,5 +72,5 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     } {
         driver::silence();
     }
-    obey(command, &line).unwrap_or_else(|failure| diagnostic::show(&failure)) as u8
+    dispatch(command, &line).unwrap_or_else(|failure| diagnostic::show(&failure)) as u8
 }

@@ -148,7 +148,7 @@ impl From<RenderError> for Failure {
         match error {
             RenderError::Record(error) => error.into(),
             error => {
-                let failure = Self::told(error.code(), error.is_machine(), error.to_string());
+                let failure = Self::new(error.code(), error.is_machine(), error.to_string());
                 error.help().into_iter().fold(failure, Self::with_help)
             }
         }

@@ -13,13 +13,10 @@ use crate::{
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::report::page;
-use tautline_report::request::{Failure, FlightPictures, Monitor, NamedPicture, Pictures, write_files};
+use tautline_report::request::{Failure, FlightPictures, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_report::run::run_while;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
-
-/// Room for the pictures of a page \[bytes\].
-const PAGE_BYTES: usize = 900 << 10;
 
 /// Draws runs with the graphics adapter of the machine.
 pub struct RunPictures {
@@ -118,7 +115,7 @@ impl FlightPictures for Observer {
             Vec::new()
         });
         let file = |name: &str| format!("{name}.png");
-        let room = PAGE_BYTES / snapshots.len().max(1);
+        let room = PICTURES_BYTES / snapshots.len().max(1);
         let encoded: Vec<_> =
             snapshots.par_iter().map(|snapshot| encoded(&snapshot.picture, room)).collect::<Result<_, _>>()?;
         let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();

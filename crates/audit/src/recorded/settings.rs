@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
+use serde::Deserialize;
 
 use super::error::RecordedError;
 use crate::envelope::{Envelope, Limit, Quantity};
@@ -14,7 +15,8 @@ use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;
 
 /// How vehicles are taken to move between two samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Motion {
     /// On a straight line at constant speed. The sweep is exact.
     Linear,
@@ -26,6 +28,22 @@ pub enum Motion {
     /// On any path whose acceleration stays within a bound: true distances lie within an interval around those of the
     /// line, or of the cubic where the recording has velocities.
     Bounded,
+}
+
+impl Motion {
+    /// All motions.
+    pub const ALL: [Self; 4] = [Self::Linear, Self::Hold, Self::Polynomial, Self::Bounded];
+
+    /// The name of the motion for `--motion`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Hold => "hold",
+            Self::Polynomial => "polynomial",
+            Self::Bounded => "bounded",
+        }
+    }
 }
 
 /// What is said of one vehicle.

@@ -32,13 +32,13 @@ impl Failure {
     /// A failure by wrong input. `code` is stable, such as `audit/no-limit`.
     #[must_use]
     pub fn input(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
-        Self::told(code, false, message).with_help(help)
+        Self::new(code, false, message).with_help(help)
     }
 
     /// A failure of the machine: no space, no permission, no adapter.
     #[must_use]
     pub fn machine(code: &'static str, message: impl AsRef<str>) -> Self {
-        Self::told(code, true, message)
+        Self::new(code, true, message)
     }
 
     /// The failure after an interruption.
@@ -49,7 +49,7 @@ impl Failure {
 
     /// A failure of either kind, without a remedy.
     #[must_use]
-    pub fn told(code: &'static str, is_machine: bool, message: impl AsRef<str>) -> Self {
+    pub fn new(code: &'static str, is_machine: bool, message: impl AsRef<str>) -> Self {
         Self { code, is_machine, message: blanked(message.as_ref()), help: None, place: None }
     }
 
@@ -150,13 +150,13 @@ impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
         // The error's own text shows a part of a line of any length.
         if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
-            return Self::told(error.code(), false, error.to_string());
+            return Self::new(error.code(), false, error.to_string());
         }
         let message = match error.field().filter(|_| error.place().is_none()) {
             Some(field) => format!("{field}: {}", error.message()),
             None => error.message().to_owned(),
         };
-        let mut failure = Self::told(error.code(), false, message);
+        let mut failure = Self::new(error.code(), false, message);
         failure.help = error.help().map(str::to_owned);
         error.place().into_iter().fold(failure, Self::at)
     }
@@ -168,8 +168,8 @@ impl From<RecordError> for Failure {
             RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string()).with_help(
                 "what was recorded before stays readable; free some space or give another folder with --out",
             ),
-            RecordError::Open { .. } => Self::told("files/cannot-read", false, error.to_string()),
-            RecordError::Read { .. } => Self::told("recording/malformed", false, error.to_string()),
+            RecordError::Open { .. } => Self::new("files/cannot-read", false, error.to_string()),
+            RecordError::Read { .. } => Self::new("recording/malformed", false, error.to_string()),
         }
     }
 }
@@ -182,19 +182,19 @@ impl From<ArtefactError> for Failure {
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        Self::told(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }
 
 impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
-        Self::told(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }
 
 impl From<ParameterError> for Failure {
     fn from(error: ParameterError) -> Self {
-        Self::told("law/parameter", false, error.to_string())
+        Self::new("law/parameter", false, error.to_string())
     }
 }
 
@@ -204,7 +204,7 @@ impl From<SimError> for Failure {
             SimError::Record(error) => error.into(),
             SimError::Law(error) => error.into(),
             SimError::NoLeg | SimError::Obstacle(_) | SimError::Vehicles { .. } | SimError::Commands { .. } => {
-                Self::told("simulation/inconsistent", false, error.to_string())
+                Self::new("simulation/inconsistent", false, error.to_string())
             }
             SimError::Audit(error) => Self::input(
                 "simulation/cannot-judge",

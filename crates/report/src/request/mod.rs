@@ -27,7 +27,7 @@ pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked};
 pub use folder::{OutFolder, try_to_write_in};
 pub use monitor::{Monitor, Quiet, Silent};
-pub use pictures::{FlightPictures, NamedPicture, Pictures};
+pub use pictures::{FlightPictures, NamedPicture, PICTURES_BYTES, Pictures};
 pub use range::in_range;
 pub use run::{
     RECORDING, RunFiles, RunRequest, flight_page, replay_of_run, run_into, run_verdict, svg_files, threads, write_files,

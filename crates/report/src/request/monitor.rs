@@ -29,7 +29,7 @@ pub trait Monitor: Sync {
     /// A task begins, of `total` units of work where their number is known.
     fn begin(&self, _task: &str, _total: Option<u64>) {}
 
-    /// So many more units of the task are done.
+    /// `units` more units of the task are done.
     fn advance(&self, _units: u64) {}
 
     /// The task is at its end.

@@ -9,6 +9,9 @@ use tautline_sim::scenario::Scenario;
 use super::{Failure, Monitor};
 use crate::report::page::Picture;
 
+/// Room for the pictures of a page \[bytes\].
+pub const PICTURES_BYTES: usize = 900 << 10;
+
 /// A picture and its name, such as `closest`.
 pub type NamedPicture = (String, Picture);
 

@@ -29,7 +29,7 @@ const THREADS_OF_USE: usize = 2;
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct RunRequest<'a> {
-    /// What is flown.
+    /// The scenario.
     pub scenario: &'a Scenario,
     /// The command that flies the same again, for the page.
     pub command: String,
@@ -184,7 +184,7 @@ pub fn run_verdict(report: &Report) -> RunVerdict {
     }
 }
 
-/// A pool of so many threads; 0 for one a core.
+/// Starts a pool of `number` threads, or of one per core for 0.
 ///
 /// # Errors
 /// [`Failure`] where the system refuses.

@@ -18,7 +18,7 @@ impl ScenarioRequest {
     /// The scenario of a file or of a built-in name.
     ///
     /// # Errors
-    /// [`Failure`] where there is none.
+    /// [`Failure`] where neither exists.
     pub fn named(argument: &str, overrides: &[String]) -> Result<Self, Failure> {
         let (argument, overrides) = (argument.to_owned(), overrides.to_vec());
         Ok(Self { source: Source::resolve(&argument)?, argument, overrides })

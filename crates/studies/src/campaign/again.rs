@@ -24,13 +24,12 @@ fn number_of(campaign: &Campaign, law: &Law) -> usize {
 /// Flights that were flown again.
 pub(super) struct Again {
     flights: Vec<WorstFlight>,
-    no_pictures: Option<String>,
 }
 
 impl Again {
     /// What a page shows of them.
     pub(super) fn page<'a>(&'a self, command: &'a str, spec: &'a str) -> CampaignPage<'a> {
-        CampaignPage { command, spec, worst: &self.flights, no_pictures: self.no_pictures.as_deref() }
+        CampaignPage { command, spec, worst: &self.flights }
     }
 }
 
@@ -57,7 +56,7 @@ pub(super) fn flown_again(
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     worst.truncate(most);
-    let mut again = Again { flights: Vec::new(), no_pictures: None };
+    let mut again = Again { flights: Vec::new() };
     for (law, worst) in worst {
         if monitor.is_interrupted() {
             monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
@@ -80,7 +79,7 @@ fn bad_again(folder: &Folder, summary: &Summary, most: usize, monitor: &dyn Moni
     let mut worst: Vec<_> = laws.flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
     worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
     worst.truncate(most);
-    let mut again = Again { flights: Vec::new(), no_pictures: None };
+    let mut again = Again { flights: Vec::new() };
     for (law, bad) in worst {
         if monitor.is_interrupted() {
             break;

@@ -18,8 +18,6 @@ pub struct CampaignPage<'a> {
     pub spec: &'a str,
     /// The flights to look at, the worst of each law first.
     pub worst: &'a [WorstFlight],
-    /// Why they have no pictures.
-    pub no_pictures: Option<&'a str>,
 }
 
 /// A flight to look at.
@@ -247,9 +245,6 @@ fn worst(page: &CampaignPage<'_>) -> Vec<Markup> {
         return vec![page::list(&["There are none."])];
     }
     let mut blocks = Vec::new();
-    if let Some(why) = page.no_pictures {
-        blocks.push(page::list(&[why]));
-    }
     let pictures: Vec<_> = page.worst.iter().filter_map(|flight| flight.picture.clone()).collect();
     if !pictures.is_empty() {
         blocks.push(page::pictures(&pictures));

@@ -333,7 +333,7 @@ impl From<CampaignError> for Failure {
                 Self::from(*error).under(&format!("run {run} under the law {law}"))
             }
             other => {
-                let failure = Self::told(other.code(), other.is_machine(), other.to_string());
+                let failure = Self::new(other.code(), other.is_machine(), other.to_string());
                 other.help().into_iter().fold(failure, Self::with_help)
             }
         }

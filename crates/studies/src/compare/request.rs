@@ -7,10 +7,7 @@ use crate::{MOST_RUNS, SEEDS, not_written, threads, wrote};
 use tautline_core::text::at_least;
 use tautline_report::report::page::Picture;
 use tautline_report::request::outputs::{self, Called, write};
-use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest, in_range};
-
-/// Room for the pictures of a page \[bytes\].
-const PICTURE_BYTES: usize = 900 << 10;
+use tautline_report::request::{Failure, Monitor, PICTURES_BYTES, Pictures, ScenarioRequest, in_range};
 
 /// A scenario, the laws to compare on it, and the files to write. `-` is standard output.
 #[derive(Clone, Debug)]
@@ -166,7 +163,7 @@ fn worst_moments(plan: &Plan, comparison: &Comparison, pictures: &dyn Pictures) 
         };
         let mut scenario = plan.scenario(law, worst.seed)?;
         scenario.name = format!("{}, {}", scenario.name, law.name);
-        let data_uri = pictures.shot(&scenario, min_at_s, PICTURE_BYTES / comparison.laws.len().max(1))?;
+        let data_uri = pictures.shot(&scenario, min_at_s, PICTURES_BYTES / comparison.laws.len().max(1))?;
         let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
         let description = format!(
             "{}: {} m apart at {min_at_s:.2} s{pair}, the closest of {} flights (start.seed {}).",

@@ -30,7 +30,7 @@ struct AuditTable {
     delta_m: Option<f64>,
     radius_m: Option<f64>,
     ellipsoid_m: Option<[f64; 3]>,
-    motion: Option<MotionName>,
+    motion: Option<Motion>,
     max_accel_m_s2: Option<f64>,
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
@@ -60,26 +60,6 @@ impl ScaleEntry {
             Self::All(metres) => Ok(metres.into()),
             // The words of `--scale` have the same checks.
             Self::Each([x, y, z]) => format!("{x:?},{y:?},{z:?}").parse(),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum MotionName {
-    Linear,
-    Hold,
-    Polynomial,
-    Bounded,
-}
-
-impl From<MotionName> for Motion {
-    fn from(name: MotionName) -> Self {
-        match name {
-            MotionName::Linear => Self::Linear,
-            MotionName::Hold => Self::Hold,
-            MotionName::Polynomial => Self::Polynomial,
-            MotionName::Bounded => Self::Bounded,
         }
     }
 }
@@ -138,7 +118,7 @@ impl AuditTable {
             |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), HELP);
         let folder = path.parent().unwrap_or(Path::new(""));
         let is_silent = request.is_silent();
-        let is_bounded = self.motion.is_some_and(|motion| matches!(motion, MotionName::Bounded));
+        let is_bounded = self.motion.is_some_and(|motion| motion == Motion::Bounded);
         if self.ellipsoid_m.is_some() && self.radius_m.is_some() {
             return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
         }
@@ -166,7 +146,7 @@ impl AuditTable {
             settings.radius_m = self.radius_m;
             settings.ellipsoid_m = self.ellipsoid_m.map(Vector3::from);
         }
-        settings.motion = settings.motion.or(self.motion.map(Motion::from));
+        settings.motion = settings.motion.or(self.motion);
         if settings.motion == Some(Motion::Bounded) && !has_max_accel {
             settings.max_accel_m_s2 = self.max_accel_m_s2;
         }

@@ -34,10 +34,10 @@ const OPENING: usize = 65_536;
 /// Vehicles that are never there with another and have a note of their own, at most.
 const MOST_ALONE: usize = 3;
 
-/// Opens what is judged, each time from its beginning.
+/// Opens the recording, each time from its beginning.
 pub type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + Sync + 'a;
 
-/// What is judged.
+/// The recording of a request.
 #[derive(Clone)]
 pub enum Subject<'a> {
     /// Files or folders; several are one recording with a vehicle in each.
@@ -160,7 +160,7 @@ pub enum ConfigFile {
 /// A recording and the question about it.
 #[derive(Clone)]
 pub struct AuditRequest<'a> {
-    /// What is judged.
+    /// The recording.
     pub subject: Subject<'a>,
     /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence of a file are added to these.
     pub settings: Settings,
@@ -174,7 +174,7 @@ pub struct AuditRequest<'a> {
     pub independent: bool,
     /// Whether an undecided verdict is good.
     pub allow_undecided: bool,
-    /// Which file fills what is left open. Nothing is looked for beside motion that the caller holds.
+    /// Which file fills what is left open. Motion that the caller holds has no nearest file.
     pub config: ConfigFile,
     /// The command or expression that judges again, for the page.
     pub command: String,
@@ -353,7 +353,7 @@ impl<'a> AuditRequest<'a> {
             return Err(Failure::input(
                 "audit/vehicle-count",
                 message,
-                "look for who is missing or too many, or give another --expect-vehicles",
+                "look for missing or additional vehicles, or give another --expect-vehicles",
             ));
         }
         let asked =
