@@ -3,7 +3,7 @@
 
 import numpy as np
 import tautline as tl
-from shared import Case, passing, printed_json
+from shared import Case, passing, printed_json, short
 
 
 class Arrays(Case):
@@ -145,6 +145,18 @@ class Arrays(Case):
 
 
 class Files(Case):
+    def test_the_folder_of_a_run_is_its_recording(self) -> None:
+        tl.fly(short(), record=self.folder / "run.mcap")
+        self.assertEqual(tl.audit(self.folder).to_dict(), tl.audit(self.folder / "run.mcap").to_dict())
+        self.assertEqual(len(tl.read(self.folder).vehicles), 5)
+        tl.export(self.folder, self.folder / "out.csv")
+        self.assertTrue((self.folder / "out.csv").exists())
+
+    def test_names_of_an_iterator_are_all_judged(self) -> None:
+        t, p = passing()
+        judged = tl.audit(t, p, delta=5.0, limit={"speed": 0.1}, ids=iter(["1", "2"]))
+        self.assertEqual(judged.status, "violation")
+
     def test_a_file_is_judged_as_on_the_command_line(self) -> None:
         file = self.folder / "run.mcap"
         tl.fly("pentagon-laplacian", record=file)
