@@ -271,7 +271,9 @@ impl<'a> AuditRequest<'a> {
     pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
         let mut request = self.clone();
         if let Subject::Files { paths, .. } = &mut request.subject {
-            paths.iter_mut().for_each(|path| *path = recording_in(path));
+            for path in paths {
+                *path = recording_in(path);
+            }
         }
         config::configured(request)
     }
