@@ -323,6 +323,8 @@ impl Law for EdgeTensionLaw {
         let energy_initial = energy.ok();
         let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());
         let count = start.own.count() as f64;
+        // On the complete graph every pair is linked.
+        let links_alone = energy_initial.zip(self.tightest).filter(|_| !self.graph.is_complete());
         let grown = promised.map(|(energy, tightest)| match &self.growth {
             None => Grown { energy, until_s: None },
             Some(growth) => {
@@ -335,7 +337,7 @@ impl Law for EdgeTensionLaw {
             certified_until_s: grown.and_then(|grown| grown.until_s),
             certified_room_m: None,
             energy_initial,
-            linked_m: energy_initial.zip(self.tightest).map(|(energy, of)| of.push_side_root(count * energy)),
+            linked_m: links_alone.map(|(energy, of)| of.push_side_root(count * energy)),
             void,
             legs: Vec::new(),
         }
