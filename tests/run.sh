@@ -1,7 +1,7 @@
 #!/bin/sh
 # All set-up that the tests need, and the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
-# --long adds what takes minutes: the tests that are marked as ignored, release bits, MP4 films, clusters, notebooks, and the
-# commands of the docs. TAUTLINE_LONG=1 beside it tries more random cases, and the slowest of those commands.
+# --long adds what takes minutes: the tests that are marked as ignored, release bits, MP4 films, two of tests/mutants, clusters,
+# notebooks, and the commands of the docs. TAUTLINE_LONG=1 beside it tries more random cases, and the slowest of those commands.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -24,6 +24,8 @@ if [ "$long" ]; then
     cargo test --release -p tautline-sim --test bits
     # The encoder that is not built in by default.
     cargo test -p tautline-render --features mp4 film
+    # Two of the deliberate breaks, one of the law and one of the judge.
+    sh tests/mutants.sh 03-a22 07-sweep-off
 fi
 
 # What is offered to others' continuous integration; campaigns on clusters and every command of the docs, with the program that
