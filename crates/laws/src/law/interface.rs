@@ -123,7 +123,7 @@ impl Default for Capabilities {
             avoids_obstacles: false,
             requires_calling_thread: false,
             settling: None,
-            assumptions: "The certified distance holds for exact states of all whom a vehicle hears and sees, no delay, no limit \
+            assumptions: "The certified distance holds for exact states of all vehicles that a vehicle hears and sees, no delay, no limit \
                           on the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows \
                           by no more than that wind can add, and no pair can hold more than all of it.",
         }

@@ -1,6 +1,7 @@
 //! Why a request has no answer.
 
-use std::fmt;
+use std::fmt::{self, Display};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use tautline_audit::recorded::RecordedError;
@@ -127,7 +128,7 @@ impl Failure {
     }
 }
 
-impl fmt::Display for Failure {
+impl Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(place) = &self.place {
             write!(f, "{}, line {}: ", place.source, place.line)?;
@@ -144,6 +145,19 @@ pub fn blanked(text: &str) -> String {
     let blank =
         |c: char| if c.is_control() && c != '\n' && c != '\t' { " ".repeat(c.len_utf8()) } else { c.to_string() };
     text.chars().map(blank).collect()
+}
+
+/// Refuses a number that is out of its range; `option` names it, such as `--runs`.
+///
+/// # Errors
+/// [`Failure`] with the code `request/out-of-range`.
+pub fn in_range<T: PartialOrd + Display>(option: &str, value: &T, range: &RangeInclusive<T>) -> Result<(), Failure> {
+    if range.contains(value) {
+        return Ok(());
+    }
+    let (least, most) = (range.start(), range.end());
+    let message = format!("{option}: {value} is not in {least}..={most}");
+    Err(Failure::input("request/out-of-range", message, "give a number in this range"))
 }
 
 impl From<ScenarioError> for Failure {

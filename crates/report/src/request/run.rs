@@ -216,7 +216,7 @@ fn figures(scenario: &Scenario, history: &RunHistory, report: &Report) -> Vec<Fi
     figures::of_run(history, &criteria)
 }
 
-/// Codes and messages of what is known before the first step.
+/// Codes and messages of the warnings before the first step.
 fn warnings(preflight: &Preflight) -> Vec<(String, String)> {
     preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect()
 }

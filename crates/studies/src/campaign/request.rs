@@ -17,7 +17,7 @@ const PAGE: &str = "campaign.html";
 /// Most flights that are flown again for the page.
 pub const MOST_WORST: usize = 10;
 
-/// A specification, and what is asked beyond it.
+/// A specification with its overrides, output folder, shards and threads.
 #[derive(Clone, Debug)]
 pub struct CampaignRequest {
     /// The file of the specification.

@@ -1,4 +1,4 @@
-//! `tautline.toml`: what is asked of the recordings beside it, where the command line does not say otherwise.
+//! `tautline.toml`: defaults of audits of the recordings beside it. A request goes before it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
