@@ -91,3 +91,31 @@ fn wrong_requests_have_codes() {
     let many = CampaignRequest { worst: 11, ..missing };
     assert_eq!(code(campaign(&many, &(), &silent).expect_err("refused")), "request/out-of-range");
 }
+
+#[test]
+fn a_wrong_specification_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let vary = |keys: &str| format!("scenario = \"pentagon\"\nruns = 10\n[vary]\n{keys}\n");
+    let jitter = "uniform = [0.0, 0.1]";
+    let grid = "grid = { from = 0.1, to = 1.0, count = 1000000 }";
+    for (spec, code) in [
+        (vary("start.jitter_m = { uniform = [0.0, -1.0] }"), "campaign/variation"),
+        (
+            format!("scenario = \"pentagon\"\n[vary]\nlaw.alpha = {{ {grid} }}\nlaw.delta_m = {{ {grid} }}\n"),
+            "campaign/plan",
+        ),
+        (vary("law = { list = [{ kind = \"edge-tension\" }] }\n[set]\nlaw.alpha = 3.0"), "campaign/plan"),
+        (
+            vary(&format!("\"start.positions_m.2.x\" = {{ {jitter} }}\n\"start.positions_m.2.1\" = {{ {jitter} }}")),
+            "campaign/plan",
+        ),
+        (vary(&format!("\" start.jitter_m\" = {{ {jitter} }}")), "campaign/plan"),
+    ] {
+        let (file, out) = (folder.path().join("spec.toml"), folder.path().join("camp"));
+        fs::write(&file, &spec).expect("written");
+        let request = CampaignRequest { out: Some(out.clone()), ..CampaignRequest::new(file) };
+        let failure = campaign(&request, &(), &Silent::default()).expect_err(&spec);
+        assert_eq!(failure.code(), code, "{spec}: {failure}");
+        assert!(!out.exists(), "{spec}");
+    }
+}
