@@ -107,7 +107,7 @@ fn keys_of_whole_numbers_and_the_control_rate_of_quadrotors_are_keys_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["--set", "time.duration_s=1.5", "--scan", "2", "--halvings", "0", "--verdict", "clear"];
     for (scenario, key, from, to) in
-        [("pentagon", "noise.seed", "1", "2"), ("crazyflies", "actuation.control_hz", "50", "100")]
+        [("pentagon", "noise.seed", "1", "2"), ("crazyflies", "time.control_hz", "50", "100")]
     {
         let ran =
             ran(folder.path(), &[&["margin", scenario, "--key", key, "--from", from, "--to", to], &short[..]].concat());

@@ -270,8 +270,10 @@ mod tests {
 
     #[test]
     fn a_shell_is_as_high_as_the_ellipsoid_that_must_stay_empty() {
-        let scenario =
-            Scenario { safety: tautline_sim::scenario::Safety::Ellipsoid { half_height_m: 3.0 }, ..pentagon() };
+        let scenario = Scenario {
+            safety: tautline_sim::scenario::Safety::Ellipsoid { half_axes_m: [1.0, 1.0, 3.0] },
+            ..pentagon()
+        };
         let bytes = message(&mut FoxgloveScene::of(&scenario), 0.0, &scenario.start).expect("a message");
         let update = SceneUpdate::decode(bytes.as_slice()).expect("a scene");
         let size = |k: usize| update.entities[0].spheres[k].size.map(|size| (size.x, size.y, size.z));

@@ -11,7 +11,7 @@ use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::near_lists::NearLists;
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
@@ -24,14 +24,19 @@ const LEAST_CLEARANCE: f64 = 1e-6;
 #[serde(deny_unknown_fields, default)]
 pub struct CbfQpKeys {
     /// Gain of the nominal controller on the way to the slot in 1/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
     /// Its gain on velocity in 1/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub c_per_s: f64,
     /// Highest speed that it asks for in m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: f64,
     /// Highest acceleration that is commanded in m/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
     /// How fast the barrier may be approached, in s/m^2: h' >= -gamma h^3.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub gamma_s_per_m2: f64,
 }
 
@@ -42,21 +47,6 @@ impl Default for CbfQpKeys {
 }
 
 impl CbfQpKeys {
-    /// No key follows from others.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        vec![
-            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
-            Gain::positive("law.c_per_s", "the gain c", self.c_per_s),
-            Gain::positive("law.max_speed_m_s", "the highest speed", self.max_speed_m_s),
-            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
-            Gain::positive("law.gamma_s_per_m2", "gamma", self.gamma_s_per_m2),
-        ]
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<CbfQpLaw, ParameterError> {
         CbfQpLaw::new(setting, self.clone())
     }
@@ -113,7 +103,13 @@ impl CbfQpLaw {
     /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
-        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        let gains = [
+            ("k_per_s2", keys.k_per_s2),
+            ("c_per_s", keys.c_per_s),
+            ("max_speed_m_s", keys.max_speed_m_s),
+            ("max_accel_m_s2", keys.max_accel_m_s2),
+            ("gamma_s_per_m2", keys.gamma_s_per_m2),
+        ];
         ParameterError::check(links, formation, &gains)?;
         Ok(Self {
             range_m: range_m(&keys, delta_m, a22_per_s),

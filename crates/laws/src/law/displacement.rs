@@ -18,7 +18,7 @@ use super::interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMa
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
 use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
@@ -32,10 +32,13 @@ use tautline_core::swarm::{Pair, Rows, row, set_row};
 #[serde(deny_unknown_fields, default)]
 pub struct DisplacementKeys {
     /// Gain on positions over links in 1/s^2, before it is divided by the graph's algebraic connectivity.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
     /// Rate at which relative velocities are damped at least in 1/s, whatever a22 is.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub zeta_per_s: f64,
     /// Scale of the tension between vehicles that are nearer than slots are, in m^2/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub alpha: f64,
 }
 
@@ -46,19 +49,6 @@ impl Default for DisplacementKeys {
 }
 
 impl DisplacementKeys {
-    /// No key follows from others.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        vec![
-            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
-            Gain::positive("law.zeta_per_s", "the damping zeta", self.zeta_per_s),
-            Gain::positive("law.alpha", "alpha", self.alpha),
-        ]
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<DisplacementLaw, ParameterError> {
         DisplacementLaw::new(setting, self.clone())
     }

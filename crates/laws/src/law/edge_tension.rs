@@ -15,7 +15,7 @@ use super::interface::{Capabilities, Controls, Law, RateQuery, Rates};
 use super::kernel::Kernel;
 use super::memo::Memo;
 use super::modes::{Linear, Mode};
-use super::setting::{Blown, Gain, Setting};
+use super::setting::{Blown, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -29,6 +29,7 @@ use tautline_core::swarm::{Pair, Rows, Swarm, row, separation};
 pub struct EdgeTensionKeys {
     /// Scale of the tension in m^2/s^2.
     #[serde(default = "one")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub alpha: f64,
 }
 
@@ -46,15 +47,6 @@ impl Default for EdgeTensionKeys {
 }
 
 impl EdgeTensionKeys {
-    /// No key follows from others.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        vec![Gain::positive("law.alpha", "alpha", self.alpha)]
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
         let law =

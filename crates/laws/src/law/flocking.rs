@@ -10,7 +10,7 @@ use super::certificate::{Certificate, Void};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use crate::target::Target;
@@ -30,14 +30,18 @@ const REACH: f64 = 1.2;
 #[serde(deny_unknown_fields, default)]
 pub struct FlockingKeys {
     /// Gain c1 on distances to near vehicles in 1/s^2; velocities are matched with 2 sqrt(c1).
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub c1_alpha_per_s2: f64,
     /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a flock that
     /// goes nowhere.
+    #[schemars(extend("minimum" = 0))]
     pub c1_gamma_per_s2: f64,
     /// Highest acceleration that is commanded in m/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
     /// Distance d that near vehicles keep in m; the smallest distance of two slots unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing_m: Option<f64>,
 }
 
@@ -48,21 +52,6 @@ impl Default for FlockingKeys {
 }
 
 impl FlockingKeys {
-    /// No key follows from others before the slots are known.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        let spacing = self.spacing_m.map(|spacing_m| Gain::positive("law.spacing_m", "the spacing d", spacing_m));
-        let gains = [
-            Gain::positive("law.c1_alpha_per_s2", "the gain c1 on distances", self.c1_alpha_per_s2),
-            Gain::at_least_zero("law.c1_gamma_per_s2", "the gain c1 towards the centre", self.c1_gamma_per_s2),
-            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
-        ];
-        gains.into_iter().chain(spacing).collect()
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<FlockingLaw, ParameterError> {
         FlockingLaw::new(setting, self.clone())
     }
@@ -106,7 +95,12 @@ impl FlockingLaw {
     /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, a22_per_s, .. } = setting;
-        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        let gains = [
+            ("c1_alpha_per_s2", keys.c1_alpha_per_s2),
+            ("c1_gamma_per_s2", keys.c1_gamma_per_s2),
+            ("max_accel_m_s2", keys.max_accel_m_s2),
+            ("spacing_m", keys.spacing_m.unwrap_or_default()),
+        ];
         ParameterError::check(links, formation, &gains)?;
         let spacing_m = spacing_m(&keys, formation);
         let carried = Carried::new(setting)?;

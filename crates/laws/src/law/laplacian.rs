@@ -11,7 +11,7 @@ use super::error::{LawError, ParameterError};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::modes::{Linear, Mode};
 use super::pinned::PinnedConsensus;
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
@@ -23,9 +23,11 @@ use tautline_core::swarm::{Rows, row};
 pub struct LaplacianKeys {
     /// Gain on positions in 1/s^2.
     #[serde(default = "one")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub f1_per_s2: f64,
     /// Gain on velocities in 1/s; 1 + `swarm.a22_per_s` unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
     pub f2_per_s: Option<f64>,
 }
 
@@ -43,12 +45,6 @@ impl LaplacianKeys {
     /// Puts in what follows from other keys.
     pub(super) fn complete(self, a22_per_s: f64) -> Self {
         Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        let f1 = Gain::positive("law.f1_per_s2", "the gain f1", self.f1_per_s2);
-        let f2 = self.f2_per_s.map(|f2_per_s| Gain::at_least_zero("law.f2_per_s", "the gain f2", f2_per_s));
-        std::iter::once(f1).chain(f2).collect()
     }
 
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<LaplacianLaw, ParameterError> {

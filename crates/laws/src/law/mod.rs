@@ -41,7 +41,7 @@ pub use laplacian::{LaplacianKeys, LaplacianLaw};
 pub use modes::{Heard, HeardLinks, Linear, Mode};
 pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
-pub use setting::{Blown, Gain, Setting};
+pub use setting::{Blown, Setting};
 pub use spec::LawSpec;
 pub use tension::{EdgeTension, TensionError};
 

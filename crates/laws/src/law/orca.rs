@@ -14,7 +14,7 @@ use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::near_lists::NearLists;
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
@@ -27,25 +27,34 @@ const MARGIN: f64 = 0.01;
 #[serde(deny_unknown_fields, default)]
 pub struct OrcaKeys {
     /// Preferred velocity towards the slot for each metre that it is away, in 1/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s: f64,
     /// Highest speed that a vehicle prefers in m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_m_s: f64,
     /// Highest speed that it may take in m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: f64,
     /// For how long a velocity must be free of collisions in s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub horizon_s: f64,
     /// Rate at which the chosen velocity is taken on in 1/s; vehicles that are too near each other part within its inverse.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub tracking_per_s: f64,
     /// Highest acceleration that is commanded in m/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
     /// How many others a vehicle minds at most, the nearest ones.
+    #[schemars(range(min = 1))]
     pub neighbours_max: usize,
     /// How near others must be to be minded in m; unless given, as far as two vehicles at their highest speeds come towards
     /// each other within the horizon, and what they keep apart.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_m: Option<f64>,
     /// How much more than delta vehicles mean to keep apart in m; a hundredth of delta unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
     pub margin_m: Option<f64>,
 }
 
@@ -66,26 +75,6 @@ impl Default for OrcaKeys {
 }
 
 impl OrcaKeys {
-    /// No key follows from others before delta is known.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        let range = self.range_m.map(|range_m| Gain::positive("law.range_m", "the range", range_m));
-        let margin = self.margin_m.map(|margin_m| Gain::at_least_zero("law.margin_m", "the margin", margin_m));
-        let gains = [
-            Gain::positive("law.k_per_s", "the gain k", self.k_per_s),
-            Gain::positive("law.speed_m_s", "the preferred speed", self.speed_m_s),
-            Gain::positive("law.max_speed_m_s", "the highest speed", self.max_speed_m_s),
-            Gain::positive("law.horizon_s", "the horizon", self.horizon_s),
-            Gain::positive("law.tracking_per_s", "the rate of tracking", self.tracking_per_s),
-            Gain::positive("law.max_accel_m_s2", "the highest acceleration", self.max_accel_m_s2),
-            Gain::positive("law.neighbours_max", "the number of neighbours", self.neighbours_max as f64),
-        ];
-        gains.into_iter().chain(range).chain(margin).collect()
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<OrcaLaw, ParameterError> {
         OrcaLaw::new(setting, self.clone())
     }
@@ -134,7 +123,16 @@ impl OrcaLaw {
     /// finite, or where there is a reference that some do not know.
     pub fn new(setting: &Setting<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
         let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
-        let gains: Vec<_> = keys.gains().iter().map(|gain| (gain.name, gain.value)).collect();
+        let gains = [
+            ("k_per_s", keys.k_per_s),
+            ("speed_m_s", keys.speed_m_s),
+            ("max_speed_m_s", keys.max_speed_m_s),
+            ("horizon_s", keys.horizon_s),
+            ("tracking_per_s", keys.tracking_per_s),
+            ("max_accel_m_s2", keys.max_accel_m_s2),
+            ("range_m", keys.range_m.unwrap_or_default()),
+            ("margin_m", keys.margin_m.unwrap_or_default()),
+        ];
         ParameterError::check(links, formation, &gains)?;
         let diameter_m = delta_m + keys.margin_m.unwrap_or(MARGIN * delta_m);
         let range_m = keys.range_m.unwrap_or(diameter_m + 2.0 * keys.max_speed_m_s * keys.horizon_s);

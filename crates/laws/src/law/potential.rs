@@ -10,7 +10,7 @@ use super::consensus::{
 use super::error::{LawError, ParameterError};
 use super::interface::{Capabilities, Law, RateQuery, Rates, VelocityMargin};
 use super::memo::Memo;
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 use super::tension::TensionError;
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -23,13 +23,17 @@ use tautline_core::swarm::{Pair, Rows, row, set_row};
 #[serde(deny_unknown_fields, default)]
 pub struct PotentialKeys {
     /// Gain on positions over links in 1/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
     /// Braking of each vehicle's own velocity in 1/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub c_per_s: f64,
     /// Scale of the repulsion in m^4/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_m4_per_s2: f64,
     /// Highest acceleration that is commanded in m/s^2; no limit unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
 }
 
@@ -40,22 +44,6 @@ impl Default for PotentialKeys {
 }
 
 impl PotentialKeys {
-    /// No key follows from others.
-    pub(super) fn complete(self, _a22_per_s: f64) -> Self {
-        self
-    }
-
-    pub(super) fn gains(&self) -> Vec<Gain> {
-        let gains = [
-            Gain::positive("law.k_per_s2", "the gain k", self.k_per_s2),
-            Gain::positive("law.c_per_s", "the braking c", self.c_per_s),
-            Gain::positive("law.eta_m4_per_s2", "the scale eta", self.eta_m4_per_s2),
-        ];
-        let limit =
-            self.max_accel_m_s2.map(|limit| Gain::positive("law.max_accel_m_s2", "the highest acceleration", limit));
-        gains.into_iter().chain(limit).collect()
-    }
-
     pub(super) fn build(&self, setting: &Setting<'_>) -> Result<PotentialLaw, ParameterError> {
         PotentialLaw::new(setting, self.clone())
     }

@@ -64,26 +64,3 @@ impl<'a> Setting<'a> {
         self.guidance.map_or(Pinning::Nobody, |guidance| guidance.known_by.clone())
     }
 }
-
-/// A number among a law's keys, and what it must be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gain {
-    /// Its key in the scenario, such as `law.alpha`.
-    pub key: &'static str,
-    /// What it is called in a sentence, such as `the gain f1`.
-    pub name: &'static str,
-    /// As given.
-    pub value: f64,
-    /// Whether it may be zero.
-    pub may_be_zero: bool,
-}
-
-impl Gain {
-    pub(super) fn positive(key: &'static str, name: &'static str, value: f64) -> Self {
-        Self { key, name, value, may_be_zero: false }
-    }
-
-    pub(super) fn at_least_zero(key: &'static str, name: &'static str, value: f64) -> Self {
-        Self { key, name, value, may_be_zero: true }
-    }
-}

@@ -11,7 +11,7 @@ use super::interface::Law;
 use super::laplacian::LaplacianKeys;
 use super::orca::OrcaKeys;
 use super::potential::PotentialKeys;
-use super::setting::{Gain, Setting};
+use super::setting::Setting;
 
 macro_rules! laws {
     ($($(#[doc = $doc:literal])+ $kind:ident($keys:ty),)+) => {
@@ -30,12 +30,6 @@ macro_rules! laws {
                 vec![$(Self::$kind(<$keys>::default()),)+]
             }
 
-            /// The numbers among its keys.
-            #[must_use]
-            pub fn gains(&self) -> Vec<Gain> {
-                match self { $(Self::$kind(keys) => keys.gains(),)+ }
-            }
-
             /// The law, ready to fly.
             ///
             /// # Errors
@@ -43,17 +37,20 @@ macro_rules! laws {
             pub fn build(&self, setting: &Setting<'_>) -> Result<Box<dyn Law>, ParameterError> {
                 Ok(match self { $(Self::$kind(keys) => Box::new(keys.build(setting)?),)+ })
             }
-
-            /// With the keys that follow from others where they are not given.
-            #[must_use]
-            pub fn complete(self, a22_per_s: f64) -> Self {
-                match self { $(Self::$kind(keys) => Self::$kind(keys.complete(a22_per_s)),)+ }
-            }
         }
     };
 }
 
 impl LawSpec {
+    /// With the keys that follow from others where they are not given.
+    #[must_use]
+    pub fn complete(self, a22_per_s: f64) -> Self {
+        match self {
+            Self::Laplacian(keys) => Self::Laplacian(keys.complete(a22_per_s)),
+            other => other,
+        }
+    }
+
     /// Whether the law keeps numbers of each edge of a complete graph, which itself takes no memory for them.
     #[must_use]
     pub fn keeps_edges(&self) -> bool {

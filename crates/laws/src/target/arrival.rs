@@ -18,10 +18,13 @@ const TIME_ROUNDING_S: f64 = 1e-9;
 #[serde(deny_unknown_fields, default)]
 pub struct Arrival {
     /// Largest error of a desired distance over the edges of the graph, and of a vehicle's place in the formation, in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub edge_error_m: f64,
     /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, in m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub disagreement_m_s: f64,
     /// Shortest time for which all of it must hold in s.
+    #[schemars(extend("minimum" = 0))]
     pub hold_s: f64,
 }
 

@@ -15,13 +15,10 @@ use tautline_core::swarm::{Rows, Swarm, mean_row, row};
 pub enum BreathingMode {
     /// When the swarm is stalled, under a law whose promise is renewed then.
     #[default]
-    #[serde(alias = "stalled")]
     Auto,
     /// From the start of every leg, and when the swarm is stalled.
-    #[serde(alias = "always")]
     Start,
     /// Never.
-    #[serde(alias = "never")]
     Off,
 }
 
@@ -32,12 +29,13 @@ pub struct Breathing {
     /// When.
     pub mode: BreathingMode,
     /// By how much the first time, about their centre; each time by one more.
+    #[schemars(extend("minimum" = 1))]
     pub scale: f64,
     /// How often on a leg, at most.
     pub most: u32,
     /// How long spread slots are held at least in s.
     #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("default" = 0.0))]
+    #[schemars(extend("minimum" = 0, "default" = 0.0))]
     pub hold_s: f64,
 }
 

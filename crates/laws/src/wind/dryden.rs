@@ -23,11 +23,15 @@ const SHORT: f64 = 1e-3;
 /// u blows along the horizontal part of the mean wind (along x where there is none), v across it and w up. The air is frozen
 /// and carried past vehicles at the mean wind's speed V, and at 1 m/s at least. Correlations over a time t, with
 /// x = V|t|/L: sigma^2 e^-x of u, sigma^2 e^-x (1 - x/2) of v and w.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, serde::Deserialize, PartialEq, serde::Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(description = "How strong turbulence is, and how large its eddies are.")]
 pub struct Dryden {
-    /// Wind speed W20, 20 feet above the ground \[m/s\].
+    /// Wind speed 20 feet above the ground in m/s: a tenth of it is the standard deviation of the vertical part.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_20ft_m_s: f64,
-    /// Height h above the ground \[m\].
+    /// Height above the ground in m.
+    #[schemars(range(min = 3.048, max = 304.8))]
     pub height_m: f64,
 }
 

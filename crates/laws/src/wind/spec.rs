@@ -3,22 +3,31 @@
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::dryden::Dryden;
 
 /// Standard deviations of turbulence that are taken for the most of it where an estimate must do.
 const SIGMAS: f64 = 4.0;
 
-/// What blows.
-#[derive(Clone, Debug, PartialEq)]
+/// Moving air. Points feel it if they have a drag (`vehicle.drag_per_s`).
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct WindSpec {
-    /// Velocity of the air that never changes \[m/s\].
+    /// Constant velocity of the air in m/s; none unless given.
+    #[serde(with = "point")]
+    #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3, "default" = [0.0, 0.0, 0.0]))]
     pub mean_m_s: Vector3<f64>,
-    /// What is added to it for a time.
+    /// Gusts, which add up.
+    #[serde(rename = "gust", skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("default" = []))]
     pub gusts: Vec<Gust>,
-    /// Random air about that.
+    /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed, and at 1 m/s at least.
+    #[serde(rename = "dryden", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Dryden")]
     pub turbulence: Option<Dryden>,
-    /// Whether all vehicles are in the same turbulence, and not each in its own.
+    /// Whether all vehicles are in the same turbulence. Otherwise each vehicle has its own.
     pub shared: bool,
 }
 
@@ -39,29 +48,83 @@ impl Default for WindSpec {
 ///
 /// Without a hold and with equal slopes it is the gust of airworthiness rules, a whole period of 1 - cos; one that holds to
 /// the end of the flight is that of MIL-F-8785C, which rises and stays.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(description = "Air that rises to a velocity as 1 - cos, holds it, and falls back in the same way.")]
 pub struct Gust {
-    /// When it begins \[s\].
+    /// Start time in s.
+    #[schemars(extend("minimum" = 0))]
     pub at_s: f64,
-    /// How long it rises \[s\].
+    /// Rise time in s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub rise_s: f64,
-    /// How long it stays \[s\].
+    /// Hold time in s.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
     pub hold_s: f64,
-    /// How long it falls \[s\].
-    pub fall_s: f64,
-    /// At its height \[m/s\].
+    /// Fall time in s; the rise time unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
+    pub fall_s: Option<f64>,
+    /// Velocity that the gust adds to the wind at its height in m/s.
+    #[serde(with = "point")]
+    #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
     pub velocity_m_s: Vector3<f64>,
-    /// Whom it meets, from 0 and in order; all without a list.
+    /// The vehicles that it meets, counted from 1 in files and from 0 here, in ascending order; all unless given.
+    #[serde(default, with = "vehicles", skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Vec<u64>", inner(range(min = 1)))]
     pub vehicles: Option<Vec<usize>>,
 }
 
+/// A vector as a list of x, y and, unless it is 0, z.
+mod point {
+    use nalgebra::Vector3;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(vector: &Vector3<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+        <[f64; 3]>::from(*vector).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vector3<f64>, D::Error> {
+        match Vec::deserialize(deserializer)?[..] {
+            [x, y] => Ok(Vector3::new(x, y, 0.0)),
+            [x, y, z] => Ok(Vector3::new(x, y, z)),
+            ref other => Err(D::Error::invalid_length(other.len(), &"2 or 3 numbers")),
+        }
+    }
+}
+
+/// Vehicles, counted from 1 in files and from 0 in memory.
+mod vehicles {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(met: &Option<Vec<usize>>, serializer: S) -> Result<S::Ok, S::Error> {
+        met.as_ref().map(|met| met.iter().map(|&vehicle| vehicle as u64 + 1).collect::<Vec<_>>()).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<usize>>, D::Error> {
+        let numbers = Vec::<usize>::deserialize(deserializer)?.into_iter();
+        let indices = numbers.map(|number| number.checked_sub(1).ok_or_else(|| D::Error::custom("vehicle 0")));
+        let mut met = indices.collect::<Result<Vec<_>, _>>()?;
+        met.sort_unstable();
+        met.dedup();
+        Ok(Some(met))
+    }
+}
+
 impl Gust {
+    /// Fall time \[s\].
+    #[must_use]
+    pub fn fall_s(&self) -> f64 {
+        self.fall_s.unwrap_or(self.rise_s)
+    }
+
     /// The instants at which it begins to rise, to hold, to fall, and ends \[s\].
     #[must_use]
     pub fn corners_s(&self) -> [f64; 4] {
         let full_s = self.at_s + self.rise_s;
         let falls_s = full_s + self.hold_s;
-        [self.at_s, full_s, falls_s, falls_s + self.fall_s]
+        [self.at_s, full_s, falls_s, falls_s + self.fall_s()]
     }
 
     /// What part of its velocity blows at a time \[s\].
@@ -76,7 +139,7 @@ impl Gust {
         } else if time_s <= falls_s {
             1.0
         } else {
-            1.0 - slope((time_s - falls_s) / self.fall_s)
+            1.0 - slope((time_s - falls_s) / self.fall_s())
         }
     }
 
@@ -116,7 +179,7 @@ mod tests {
 
     fn gust() -> Gust {
         let velocity_m_s = Vector3::new(3.0, -4.0, 0.0);
-        Gust { at_s: 2.0, rise_s: 1.0, hold_s: 0.5, fall_s: 2.0, velocity_m_s, vehicles: None }
+        Gust { at_s: 2.0, rise_s: 1.0, hold_s: 0.5, fall_s: Some(2.0), velocity_m_s, vehicles: None }
     }
 
     #[test]

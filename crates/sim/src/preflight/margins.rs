@@ -41,7 +41,7 @@ pub enum Bound {
 
 const KNOWN_LATE: &str = "sensing.latency_s";
 const HEARD_LATE: &str = "network.latency_s";
-const COMMANDED: &str = "actuation.control_hz";
+const COMMANDED: &str = "time.control_hz";
 
 /// What linear theory predicts for the first formation; nothing where the law's modes are not known, nor for vehicles that are
 /// more than points, whose own lag the theory does not know.

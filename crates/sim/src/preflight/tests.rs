@@ -395,8 +395,8 @@ fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_a
     let value = |key: &str, state: Near| margin(&found, key, state).expect(key).value.expect("a bound");
     assert!((value("sensing.latency_s", Near::Free) - 0.711).abs() < 5e-4);
     assert!((value("sensing.latency_s", Near::InContact) - 0.0811).abs() < 5e-5);
-    assert!((value("actuation.control_hz", Near::Free) - 0.5).abs() < 1e-9, "2 s between commands");
-    assert!(value("actuation.control_hz", Near::InContact) > 5.0);
+    assert!((value("time.control_hz", Near::Free) - 0.5).abs() < 1e-9, "2 s between commands");
+    assert!(value("time.control_hz", Near::InContact) > 5.0);
     assert!(value("network.latency_s", Near::Free) > 3.0, "others are a fifth of what is heard each");
     let text = found.text();
     assert!(text.contains("sensing.latency_s up to 0.711, up to 0.0811 in contact"), "{text}");
@@ -414,8 +414,8 @@ fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_a
         ("sensing.latency_s=0.70", false),
         ("sensing.latency_s=0.72", true),
         ("network.latency_s=0.72", false),
-        ("actuation.control_hz=0.6", false),
-        ("actuation.control_hz=0.4", true),
+        ("time.control_hz=0.6", false),
+        ("time.control_hz=0.4", true),
     ] {
         let codes = codes(&scenario("pentagon", &[sets[0], sets[1], set]));
         assert_eq!(codes.contains(&Code::BeyondMargin), is_beyond, "{set}");

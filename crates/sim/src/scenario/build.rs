@@ -5,29 +5,32 @@
 //! it; [`super::validate`] judges the rest.
 
 use super::chance;
-use super::document::{Document, PlantKind, StartShape, StartTable};
+use super::document::{Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::graph::{edge_count, graph};
 use super::legs::{check_slots, legs, listed_slots};
 use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory};
 use super::reference::ReferenceTable;
 use super::slots::is_flat;
-use super::spec::{PlantSpec, Scenario, Space};
+use super::spec::{Safety, Scenario, Space};
 use super::start;
+use super::text::Text;
+use super::time::bounded_record_hz;
 use super::values::{PerVehicle, Point, rows};
+use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
-use tautline_laws::wind::WindSpec;
 
 /// Completes a scenario. It still has to be validated.
-pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
+pub(super) fn scenario(document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
     check_memory(count, edge_count(&document.graph.kind, document.law.kind.keeps_edges(), count))?;
     check_lists(&document, count)?;
     let space = space(&document)?;
     let (a22_per_s, of_velocity_per_s) = (document.a22_per_s(), document.velocity_coefficient_per_s());
-    let (delta_m, safety) = document.safety.resolve(document.law.delta_m)?;
+    let safety = document.safety.shape;
+    let delta_m = delta_m(document.law.delta_m, safety)?;
     let law = document.law.kind.complete(of_velocity_per_s);
     let reference = document.reference.map(|table| table.guidance(count, document.time.duration_s)).transpose()?;
     let mut start = start(&document.start, count, space, delta_m)?;
@@ -46,29 +49,31 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
+    let (gives_step, gives_halvings) = (text.gives("time.dt_s"), text.gives("time.max_halvings"));
     let mut time = document.time;
-    time.control_hz = document.actuation.control_hz(time.control_hz)?;
-    let (gives_step, gives_halvings) = (time.gives_step(), time.gives_halvings());
-    let time = time.complete(count, document.arrival.hold_s, &airframe);
+    if !text.gives("time.record_hz") {
+        time.record_hz = bounded_record_hz(count, time.duration_s, document.arrival.hold_s);
+    }
+    if airframe.quadrotor().is_some() {
+        time.dt_s = if gives_step { time.dt_s } else { QUADROTOR_DT_S };
+        time.control_hz = time.control_hz.or(Some(QUADROTOR_CONTROL_HZ));
+    }
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(mass_kg, count),
         hull_radius_m,
         a22_per_s,
         drag_per_s: document.vehicle.drag_per_s,
-        wind: document.wind.map_or_else(|| Ok(WindSpec::default()), |table| table.wind(count))?,
+        wind: document.wind,
         legs: Vec::new(),
         obstacles,
         reference,
         graph: graph(&document.graph.kind, count)?,
-        plant: match document.plant.kind {
-            PlantKind::Rapier => PlantSpec::Rapier,
-            PlantKind::Ideal => PlantSpec::Ideal,
-        },
+        plant: document.plant.kind,
         time,
         sensing: document.sensing,
         network: document.network,
-        actuation: document.actuation.spec(),
+        actuation: document.actuation,
         failures: document.failure,
         arrival: document.arrival,
         breathing: document.breathing,
@@ -88,6 +93,18 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         scenario.choose_halvings();
     }
     Ok(scenario)
+}
+
+/// The safety distance \[m\]: as given, or else the width of the ellipsoid.
+fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
+    match (given_m, safety) {
+        (Some(delta_m), _) => Ok(delta_m),
+        (None, Safety::Ellipsoid { half_axes_m: [a_m, ..] }) => Ok(2.0 * a_m),
+        (None, Safety::Ball) => Err(ScenarioError::new("missing key `delta_m`")
+            .coded("scenario/missing-key")
+            .with_help("give the safety distance")
+            .at("law")),
+    }
 }
 
 /// Number of vehicles: as given, or else as many as there are points, start before formation.
@@ -169,7 +186,7 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
                 .at("start"));
         }
     };
-    start::jitter(&mut positions_m, table.jitter_m, space, &mut random)?;
+    start::jitter(&mut positions_m, table.jitter_m, space, &mut random);
     let velocities_m_s = table.velocities_m_s.as_deref().map_or_else(|| Rows::zeros(count), rows);
     let mut swarm = Swarm { positions_m, velocities_m_s };
     if table.shuffle {

@@ -6,6 +6,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use super::error::ScenarioError;
 use super::files::bytes;
+use super::limits::LARGEST;
 
 /// Characters of a wrong field that a message shows.
 const SHOWN_CHARS: usize = 40;
@@ -61,7 +62,11 @@ impl Columns {
                 let said = format!("{} columns where the first line has {}", fields.len(), columns.len());
                 return Err(refused(line, &said));
             }
-            rows.push((line, numbers(&fields, &columns).map_err(|said| refused(line, &said))?));
+            let numbers = numbers(&fields, &columns).map_err(|said| refused(line, &said))?;
+            if let Some(number) = numbers.iter().find(|number| !(number.abs() <= LARGEST)) {
+                return Err(refused(line, &format!("{number:e} must be finite and at most {LARGEST:e} in magnitude")));
+            }
+            rows.push((line, numbers));
         }
         if rows.is_empty() { Err(refused(1, "there is no point")) } else { Ok(rows) }
     }

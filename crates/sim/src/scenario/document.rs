@@ -6,25 +6,23 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::actuation::ActuationTable;
+use super::actuation::ActuationSpec;
 use super::failure::Failure;
 use super::graph::GraphTable;
 use super::laws::Laws;
 use super::network::NetworkSpec;
-use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
-use super::safety::SafetyTable;
 use super::sensing::SensingSpec;
 use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
 use super::shapes::{HelixKeys, SpacingKeys, VKeys};
-use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG};
-use super::time_table::TimeTable;
+use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety};
+use super::time::TimeSpec;
 use super::values::{LegStart, PerVehicle, Point};
 use super::vehicle_table::VehicleTable;
-use super::wind::WindTable;
 use tautline_laws::law::LawSpec;
 use tautline_laws::target::{Arrival, Breathing};
+use tautline_laws::wind::WindSpec;
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
 /// entries of every list, are counted from 1.
@@ -42,9 +40,8 @@ pub(super) struct Document {
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) vehicle: VehicleTable,
     /// Air that moves.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "WindTable")]
-    pub(super) wind: Option<WindTable>,
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub(super) wind: WindSpec,
     /// What must stay empty around each: a ball unless given.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) safety: SafetyTable,
@@ -75,9 +72,9 @@ pub(super) struct Document {
     #[serde(default)]
     pub(super) plant: PlantTable,
     /// Duration and rates.
-    pub(super) time: TimeTable,
+    pub(super) time: TimeSpec,
     /// What counts as a reached formation.
-    #[serde(default, rename(serialize = "judge"))]
+    #[serde(default)]
     pub(super) arrival: Arrival,
     /// When slots are spread for a while, so that vehicles that stand in each other's way get past; under the displacement
     /// law.
@@ -91,7 +88,7 @@ pub(super) struct Document {
     pub(super) network: NetworkSpec,
     /// How commands become accelerations.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub(super) actuation: ActuationTable,
+    pub(super) actuation: ActuationSpec,
     /// Vehicles of which a part fails.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) failure: Vec<Failure>,
@@ -141,7 +138,7 @@ pub(super) struct StartTable {
     /// Largest random offset along each axis in m, uniform, added to every position. Along z only in three
     /// dimensions.
     #[serde(default, skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = 0.0))]
+    #[schemars(extend("minimum" = 0, "default" = 0.0))]
     pub(super) jitter_m: f64,
     /// Seed of the random numbers (`ChaCha8`, the same on every machine).
     #[serde(default, skip_serializing_if = "is_default")]
@@ -163,28 +160,34 @@ pub(super) enum StartShape {
     /// Vehicles 1, 2, ... along x.
     Line {
         /// Distance between neighbours in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         spacing_m: f64,
     },
     /// A near-square grid in the plane z = 0, row by row.
     Grid {
         /// Distance between neighbours in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         spacing_m: f64,
     },
     /// A circle in the plane z = 0.
     Circle {
         /// Radius in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
     /// Points spread evenly over a sphere.
     Sphere {
         /// Radius in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
     /// Uniformly random positions in a square, or in a cube in three dimensions, that keep a distance.
     Random {
         /// Half the side of the square or cube around the origin in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         half_extent_m: f64,
         /// Smallest distance between two vehicles in m: more than `law.delta_m`, and 1.5 times that unless given.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         min_separation_m: Option<f64>,
     },
 }
@@ -199,7 +202,7 @@ pub(super) struct FormationTable {
     pub(super) assignment: Assignment,
     /// The slots are scaled by this about their centre.
     #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[schemars(extend("default" = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
     pub(super) scale: f64,
     /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -228,7 +231,7 @@ pub(super) struct LegTable {
     pub(super) assignment: Assignment,
     /// The slots are scaled by this about their centre.
     #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[schemars(extend("default" = 1.0))]
+    #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
     pub(super) scale: f64,
     /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
     #[serde(default, skip_serializing_if = "is_default")]
@@ -266,27 +269,31 @@ pub(super) enum FormationShape {
     /// Five slots: the corners of a house of side d, (0,0) (d,0) (d/2, sqrt3 d/2) (0, sqrt3 d) (d, sqrt3 d).
     Pentagon {
         /// Side d in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         side_m: f64,
     },
     /// Equal angles on a circle in the plane z = 0.
-    #[serde(alias = "ring")]
     Circle {
         /// Radius in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
     /// Along x.
     Line {
         /// Distance between neighbours in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         spacing_m: f64,
     },
     /// A near-square grid in the plane z = 0, row by row.
     Grid {
         /// Distance between neighbours in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         spacing_m: f64,
     },
     /// Points spread evenly over a sphere.
     Sphere {
         /// Radius in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
     /// Two arms that meet at the first slot, in the plane z = 0.
@@ -304,10 +311,8 @@ pub(super) enum FormationShape {
     /// An SVG drawing, in the plane z = 0.
     Svg(SvgKeys),
     /// The dark or opaque part of a picture, in the plane z = 0.
-    #[serde(alias = "mask")]
     Image(ImageKeys),
     /// A list of slots in a file.
-    #[serde(alias = "points-file")]
     File(FileKeys),
     /// A list of slots.
     Points {
@@ -316,9 +321,6 @@ pub(super) enum FormationShape {
     },
 }
 
-/// The kinds of tables that name none.
-pub(super) const DEFAULT_KINDS: [(&str, &str); 2] = [("law", "edge-tension"), ("reference", "rest")];
-
 /// The control law and the safety distance.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -326,27 +328,34 @@ pub(super) struct LawTable {
     #[schemars(flatten)]
     pub(super) kind: LawSpec,
     /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "f64")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) delta_m: Option<f64>,
 }
 
 /// The bodies that carry out the commands.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct PlantTable {
     /// What moves the vehicles.
-    pub(super) kind: PlantKind,
+    pub(super) kind: PlantSpec,
 }
 
-/// A plant.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum PlantKind {
-    /// Rapier rigid bodies, the command held over each step.
-    Rapier,
-    /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
-    Ideal,
+/// What must stay empty around each vehicle.
+#[derive(Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SafetyTable {
+    #[schemars(flatten)]
+    pub(super) shape: Safety,
+}
+
+/// Random numbers in flight: wind, sensors, radio.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct NoiseTable {
+    /// Seed of every random number that is drawn in flight (`ChaCha8`, the same on every machine). The start has a seed of
+    /// its own.
+    pub(super) seed: u64,
 }
 
 impl Document {
@@ -365,12 +374,6 @@ impl Default for SwarmTable {
             hull_radius_m: PerVehicle::All(DEFAULT_HULL_RADIUS_M),
             a22_per_s: 0.0,
         }
-    }
-}
-
-impl Default for PlantTable {
-    fn default() -> Self {
-        Self { kind: PlantKind::Rapier }
     }
 }
 

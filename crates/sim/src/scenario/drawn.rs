@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::ScenarioError;
 use super::files;
-use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, positive, rounded_up};
+use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, rounded_up};
 use super::shapes::{ImageKeys, SvgKeys, TextKeys};
 use tautline_core::swarm::Pair;
 use tautline_laws::formation::{Drawing, DrawingError, Formation, MAX_DRAWN_SLOTS};
@@ -41,13 +41,10 @@ fn size(
     delta_m: f64,
 ) -> Result<Size, ScenarioError> {
     match (height_m, width_m, spacing_m) {
-        (Some(height_m), None, None) => Ok(Size::Of(HEIGHT, positive(HEIGHT.key, "the height", height_m)?)),
-        (None, Some(width_m), None) => Ok(Size::Of(WIDTH, positive(WIDTH.key, "the width", width_m)?)),
-        (None, None, Some(spacing_m)) => Ok(Size::Spacing(positive(SPACING, "the spacing", spacing_m)?)),
-        (None, None, None) => {
-            let delta_m = positive("law.delta_m", "the safety distance delta", delta_m)?;
-            Ok(Size::Spacing(DEFAULT_SPACING * delta_m))
-        }
+        (Some(height_m), None, None) => Ok(Size::Of(HEIGHT, height_m)),
+        (None, Some(width_m), None) => Ok(Size::Of(WIDTH, width_m)),
+        (None, None, Some(spacing_m)) => Ok(Size::Spacing(spacing_m)),
+        (None, None, None) => Ok(Size::Spacing(DEFAULT_SPACING * delta_m)),
         _ => {
             let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
             let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")

@@ -8,7 +8,6 @@ use toml::{Table, Value};
 
 use super::error::ScenarioError;
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
-use super::validate::check_gains;
 use tautline_laws::law::LawSpec;
 
 /// `[laws.NAME]` by name.
@@ -57,7 +56,6 @@ pub(super) fn check(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
                 .at("law.kind");
             return Err((name, error));
         }
-        check_gains(law).map_err(|error| (&**name, error))?;
     }
     Ok(())
 }

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 
 use super::document::{Assignment, FormationShape, FormationTable, LegTable};
 use super::error::ScenarioError;
-use super::limits::{positive, require_finite};
 use super::slots::formation;
 use super::spec::Scenario;
 use super::values::{LegStart, Point};
@@ -25,7 +24,7 @@ struct Placement {
 /// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
 pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
     let (count, delta_m) = (scenario.count(), scenario.delta_m);
-    let placement = Placement::of(0, (first.scale, first.yaw_deg, first.move_m))?;
+    let placement = Placement::of(first.scale, first.yaw_deg, first.move_m);
     let leg = placement.place(Leg::first(formation(&first.shape, count, delta_m)?));
     scenario.legs.push(leg);
     let mut assignments = std::iter::once(first.assignment).chain(later.iter().map(|leg| leg.assignment));
@@ -37,7 +36,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     let assign = |leg: &mut Leg, by: Assignment, from_m: &Rows| assign(leg, by, from_m, (freedom, leader));
     assign(&mut scenario.legs[0], first.assignment, &starts_m);
     for (number, table) in later.iter().enumerate() {
-        let placement = Placement::of(number + 1, (table.scale, table.yaw_deg, table.move_m))?;
+        let placement = Placement::of(table.scale, table.yaw_deg, table.move_m);
         let before = scenario.legs[number].formation.clone();
         let formation = table
             .shape
@@ -107,15 +106,9 @@ fn assign(leg: &mut Leg, by: Assignment, from_m: &Rows, (freedom, leader): (Opti
 }
 
 impl Placement {
-    /// As leg `number`, from 0, has it.
-    fn of(number: usize, (scale, yaw_deg, move_m): (f64, f64, Option<Point>)) -> Result<Self, ScenarioError> {
-        let offset_m: Vector3<f64> = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
-        positive("formation.scale", "the scale", scale).map_err(|error| error.on_leg(number))?;
-        require_finite("the turn", yaw_deg).map_err(|error| error.at_leg(number, "formation.yaw_deg"))?;
-        for x in offset_m.iter() {
-            require_finite("a coordinate of the move", *x).map_err(|error| error.at_leg(number, "formation.move_m"))?;
-        }
-        Ok(Self { scale, yaw_rad: yaw_deg.to_radians(), offset_m })
+    fn of(scale: f64, yaw_deg: f64, move_m: Option<Point>) -> Self {
+        let offset_m = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
+        Self { scale, yaw_rad: yaw_deg.to_radians(), offset_m }
     }
 
     fn place(&self, leg: Leg) -> Leg {

@@ -118,37 +118,7 @@ pub(super) fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> 
     (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
 }
 
-/// The number, if it is positive and within the limits.
-pub(super) fn positive(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
-    require_positive(what, number).map_err(|error| error.at(key))
-}
-
-pub(super) fn at_least_zero(key: &'static str, what: &str, number: f64) -> Result<f64, ScenarioError> {
-    let required = require_finite(what, number).and_then(|number| match number {
-        0.0.. => Ok(number),
-        _ => Err(ScenarioError::out_of_range(format!("{what} is {number}")).with_help("it must be at least 0")),
-    });
-    required.map_err(|error| error.at(key))
-}
-
-pub(super) fn require_positive(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    require_finite(&what, number)?;
-    require_more_than_zero(&what, number)?;
-    if number < SMALLEST {
-        return Err(ScenarioError::out_of_range(format!("{what} is {number:e}, too small to compute with"))
-            .with_help(format!("the least is {SMALLEST:e}")));
-    }
-    Ok(number)
-}
-
-pub(super) fn require_more_than_zero(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    if number > 0.0 && number.is_finite() {
-        return Ok(number);
-    }
-    let shown = not_finite(number).map_or_else(|| number.to_string(), str::to_owned);
-    Err(ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("it must be finite and more than 0"))
-}
-
+/// Refuses a number that is not finite, or too large to compute with.
 pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
     if number.abs() <= LARGEST {
         return Ok(number);

@@ -57,9 +57,8 @@ pub struct ObstacleTable {
     /// Its place in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_m: Option<[f64; 3]>,
-    /// Times in s and places in m of one that moves, which a scenario has none of.
+    /// Times in s and places in m, `[t, x, y, z]`, of an obstacle that moves: for `tautline audit --obstacles` alone.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(skip)]
     path: Option<Vec<[f64; 4]>>,
     /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02
     /// m more than the radius of the largest hull where that is more.
@@ -72,6 +71,7 @@ pub struct ObstacleTable {
 #[serde(deny_unknown_fields)]
 struct Ball {
     /// Its radius in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     radius_m: f64,
 }
 
@@ -96,6 +96,7 @@ struct Capsule {
     /// The other end in m.
     to_m: [f64; 3],
     /// The radius in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     radius_m: f64,
 }
 

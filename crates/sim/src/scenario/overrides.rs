@@ -11,25 +11,6 @@ use super::error::{Place, ScenarioError};
 /// What the text of an override is called in messages.
 const SOURCE: &str = "--set";
 
-/// The table of what counts as a reached formation, and the name that it had.
-pub(super) const ARRIVAL: &str = "arrival";
-pub(super) const OLD_ARRIVAL: &str = "judge";
-
-/// Tables, other names of their keys, and the names that these are read under; tables of the file itself first.
-pub(super) const OTHER_NAMES: [(Option<&str>, &str, &str); 5] = [
-    (None, OLD_ARRIVAL, ARRIVAL),
-    (Some("formation"), "offset_m", "move_m"),
-    (Some("leg"), "offset_m", "move_m"),
-    (Some("leg"), "start", "start_s"),
-    (Some("breathing"), "when", "mode"),
-];
-
-/// The name that a key is read under, of the file itself or of a table of it.
-fn name_of<'a>(table: Option<&str>, key: &'a str) -> &'a str {
-    let found = OTHER_NAMES.iter().find(|(of, other, _)| *of == table && *other == key);
-    found.map_or(key, |&(_, _, name)| name)
-}
-
 /// One key of the scenario set to another value, whatever the file says.
 ///
 /// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
@@ -112,17 +93,8 @@ impl Override {
     pub(super) fn apply<'a>(&'a self, root: &mut Spanned<DeValue<'a>>, base: usize) -> Result<(), ScenarioError> {
         let value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
         let mut target = root;
-        let table = name_of(None, &self.text[self.path[0].clone()]);
-        // The entries of a list of tables are tables, whose keys are one deeper.
-        let depth_of_keys =
-            if target.get_ref().get(table).is_some_and(|table| table.get_ref().is_array()) { 2 } else { 1 };
-        for (depth, part) in self.path.iter().enumerate() {
-            let written = &self.text[part.clone()];
-            let name = match depth {
-                0 => table,
-                _ if depth == depth_of_keys => name_of(Some(table), written),
-                _ => written,
-            };
+        for part in &self.path {
+            let name = &self.text[part.clone()];
             target = match target.get_mut() {
                 DeValue::Table(table) => {
                     let span = base + part.start..base + part.end;

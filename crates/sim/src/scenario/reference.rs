@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::limits::{SMALLEST, at_least_zero, positive, require_finite};
+use super::limits::SMALLEST;
 use super::values::{All, Point, Vehicles};
 use tautline_laws::graph::Pinning;
 use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
@@ -66,6 +66,7 @@ pub(super) enum ReferenceKind {
         #[serde(default = "origin")]
         centre_m: Point,
         /// Radius in m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
         /// Time of one turn in s; below zero clockwise.
         period_s: f64,
@@ -79,6 +80,7 @@ pub(super) enum ReferenceKind {
         /// takes as long as `speed_m_s` asks.
         times_s: Option<Vec<f64>>,
         /// Largest speed on a way in m/s, in the place of `times_s`.
+        #[schemars(extend("exclusiveMinimum" = 0))]
         speed_m_s: Option<f64>,
     },
     /// Through points without a stop: a natural cubic spline in time, from time 0 or before to the end of the flight.
@@ -172,26 +174,19 @@ impl ReferenceKind {
 
     fn motion(&self, duration_s: f64) -> Result<ReferenceMotion, ScenarioError> {
         Ok(match self {
-            &Self::Rest { position_m } => {
-                ReferenceMotion::Rest { position_m: place("reference.position_m", position_m)? }
-            }
+            &Self::Rest { position_m } => ReferenceMotion::Rest { position_m: position_m.coordinates().into() },
             &Self::Velocity { position_m, velocity_m_s } => ReferenceMotion::Velocity {
-                from_m: place("reference.position_m", position_m)?,
-                velocity_m_s: place("reference.velocity_m_s", velocity_m_s)?,
+                from_m: position_m.coordinates().into(),
+                velocity_m_s: velocity_m_s.coordinates().into(),
             },
             &Self::Circle { centre_m, radius_m, period_s } => {
-                require_finite("the time of a turn", period_s).map_err(|error| error.at("reference.period_s"))?;
                 if period_s.abs() < SMALLEST {
                     return Err(ScenarioError::new(format!("one turn in {period_s} s is too fast to compute with"))
                         .coded("scenario/out-of-range")
                         .with_help(format!("a turn takes at least {SMALLEST:e} s; below zero it is clockwise"))
                         .at("reference.period_s"));
                 }
-                ReferenceMotion::Circle {
-                    centre_m: place("reference.centre_m", centre_m)?,
-                    radius_m: positive("reference.radius_m", "the radius", radius_m)?,
-                    period_s,
-                }
+                ReferenceMotion::Circle { centre_m: centre_m.coordinates().into(), radius_m, period_s }
             }
             Self::WayPoints { points_m, times_s, speed_m_s } => {
                 let mut points_m = places(points_m)?;
@@ -201,9 +196,7 @@ impl ReferenceKind {
                 }
                 let times_s = match (times_s, speed_m_s) {
                     (Some(times_s), None) => times_s.clone(),
-                    (None, Some(speed_m_s)) => {
-                        timed(&points_m, positive("reference.speed_m_s", "the speed", *speed_m_s)?)
-                    }
+                    (None, Some(speed_m_s)) => timed(&points_m, *speed_m_s),
                     _ => {
                         return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
                             .coded("scenario/missing-key")
@@ -231,13 +224,6 @@ impl ReferenceKind {
     }
 }
 
-fn place(key: &'static str, point: Point) -> Result<Vector3<f64>, ScenarioError> {
-    for (axis, x) in ["x", "y", "z"].into_iter().zip(point.coordinates()) {
-        require_finite(format_args!("{axis} of the reference"), x).map_err(|error| error.at(key))?;
-    }
-    Ok(point.coordinates().into())
-}
-
 fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     if points_m.is_empty() {
         return Err(ScenarioError::new("the reference has no points")
@@ -245,7 +231,7 @@ fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
             .with_help("give points_m = [[x, y], ...]")
             .at("reference.points_m"));
     }
-    points_m.iter().map(|&point| place("reference.points_m", point)).collect()
+    Ok(points_m.iter().map(|point| point.coordinates().into()).collect())
 }
 
 /// When each point is reached at this largest speed \[s\]: each at another place than the one before.
@@ -270,8 +256,6 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
             .at("reference.points_m"));
     }
     for (k, &time_s) in times_s.iter().enumerate() {
-        require_finite(format_args!("time {} of the reference", k + 1), time_s)
-            .map_err(|error| error.at_entry("reference.times_s", k))?;
         if k > 0 && time_s <= times_s[k - 1] {
             let (before_s, moves) = (times_s[k - 1], points_m[k] != points_m[k - 1]);
             let said = if time_s == before_s && moves {
@@ -291,7 +275,6 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
 /// Refuses a curve that does not cover the flight.
 fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), ScenarioError> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(()) };
-    at_least_zero("time.duration_s", "the duration", duration_s)?;
     if first.0 > 0.0 || last.0 < duration_s {
         return Err(ScenarioError::new(format!(
             "the reference is given from {} to {} s, and the flight lasts from 0 to {duration_s} s",

@@ -7,19 +7,16 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, PlantKind, PlantTable, StartTable,
-    SwarmTable,
+    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, NoiseTable, PlantTable, SafetyTable,
+    StartTable, SwarmTable,
 };
 use super::graph::{GraphKind, GraphTable};
 use super::laws::Laws;
-use super::noise::NoiseTable;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
-use super::safety::SafetyTable;
-use super::spec::{PlantSpec, Scenario, Space};
+use super::spec::{Scenario, Space};
 use super::values::{Edge, LegStart, PerVehicle, Point};
 use super::vehicle_table::VehicleTable;
-use super::wind::WindTable;
 use tautline_core::swarm::Rows;
 use tautline_laws::target::{Begins, Leg};
 
@@ -74,10 +71,6 @@ impl Scenario {
 impl From<&Scenario> for Document {
     fn from(scenario: &Scenario) -> Self {
         let law = scenario.law.clone().complete(scenario.velocity_coefficient_per_s());
-        let kind = match scenario.plant {
-            PlantSpec::Rapier => PlantKind::Rapier,
-            PlantSpec::Ideal => PlantKind::Ideal,
-        };
         Self {
             name: Some(scenario.name.clone()),
             swarm: SwarmTable {
@@ -88,8 +81,8 @@ impl From<&Scenario> for Document {
                 a22_per_s: scenario.a22_per_s,
             },
             vehicle: VehicleTable::from(scenario),
-            wind: WindTable::of(&scenario.wind),
-            safety: SafetyTable::of(scenario),
+            wind: scenario.wind.clone(),
+            safety: SafetyTable { shape: scenario.safety },
             start: StartTable {
                 positions_m: Some(scenario.points(&scenario.start.positions_m)),
                 velocities_m_s: Some(scenario.points(&scenario.start.velocities_m_s)),
@@ -118,13 +111,13 @@ impl From<&Scenario> for Document {
                     GraphKind::Edges { edges }
                 },
             },
-            plant: PlantTable { kind },
-            time: scenario.time.into(),
+            plant: PlantTable { kind: scenario.plant },
+            time: scenario.time,
             arrival: scenario.arrival,
             breathing: scenario.breathing,
             sensing: scenario.sensing,
             network: scenario.network.clone(),
-            actuation: scenario.actuation.into(),
+            actuation: scenario.actuation,
             failure: scenario.failures.clone(),
             noise: NoiseTable { seed: scenario.noise_seed },
         }

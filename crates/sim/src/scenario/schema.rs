@@ -1,79 +1,41 @@
-//! The JSON Schema of the scenario file, and where a key belongs as it says.
+//! The JSON Schema of the scenario file: the one statement of its keys, their types, bounds, defaults and units.
+//!
+//! The types of `document` give the schema, doc comments included. [`check`](super::check) reads files by it.
 
-use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use serde_json::{Value, json};
+use toml::Spanned;
+use toml::de::DeValue;
 
-use super::document::{DEFAULT_KINDS, Document};
-use super::overrides::OTHER_NAMES;
-use tautline_laws::law::LawSpec;
+use super::document::Document;
+use super::overrides::Override;
+use super::source::Source;
+use super::text::Text;
 
-/// Keys, of any table, whose number is positive.
-const POSITIVE: [&str; 18] = [
-    "delta_m",
-    "disagreement_m_s",
-    "dt_s",
-    "duration_s",
-    "edge_error_m",
-    "half_extent_m",
-    "height_m",
-    "min_separation_m",
-    "PerVehicle",
-    "pitch_m",
-    "radius_m",
-    "range_m",
-    "record_hz",
-    "scale",
-    "side_m",
-    "spacing_m",
-    "turns",
-    "width_m",
-];
-/// Keys, of any table, whose number is 0 or positive.
-const FROM_ZERO: [&str; 3] = ["hold_s", "jitter_m", "margin_m"];
+/// Tables with the kind that holds where the file names none.
+const DEFAULT_KINDS: [(&str, &str); 3] =
+    [("LawTable", "edge-tension"), ("ReferenceTable", "rest"), ("SafetyTable", "ball")];
 
-/// Definitions, the key of theirs that holds a choice, choices and other names of these.
-const OTHER_CHOICES: [(&str, &str, &str, &str); 10] = [
-    ("FormationTable", "shape", "circle", "ring"),
-    ("FormationTable", "shape", "image", "mask"),
-    ("FormationTable", "shape", "file", "points-file"),
-    ("LegTable", "shape", "circle", "ring"),
-    ("LegTable", "shape", "image", "mask"),
-    ("LegTable", "shape", "file", "points-file"),
-    ("ReferenceTable", "kind", "way-points", "waypoints"),
-    ("BreathingMode", "", "auto", "stalled"),
-    ("BreathingMode", "", "start", "always"),
-    ("BreathingMode", "", "off", "never"),
-];
+static SCHEMA: LazyLock<Value> = LazyLock::new(generate);
 
 /// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
 pub fn schema() -> Value {
+    SCHEMA.clone()
+}
+
+fn generate() -> Value {
     let mut schema = schemars::schema_for!(Document).to_value();
-    let gains = LawSpec::all().into_iter().flat_map(|law| law.complete(0.0).gains());
-    let gains = gains.map(|gain| (gain.key.trim_start_matches("law."), gain.may_be_zero));
-    let bounds = POSITIVE.map(|key| (key, false)).into_iter().chain(FROM_ZERO.map(|key| (key, true))).chain(gains);
-    tidy(&mut schema, &bounds.collect());
-    for (table, other, name) in OTHER_NAMES {
-        let of = match table {
-            None => &mut schema,
-            Some("formation") => &mut schema["$defs"]["FormationTable"],
-            Some("leg") => &mut schema["$defs"]["LegTable"],
-            Some(_) => &mut schema["$defs"]["Breathing"],
-        };
-        add_name(of, name, other);
-    }
-    for (definition, tag, name, other) in OTHER_CHOICES {
-        add_choice(&mut schema["$defs"][definition], tag, name, other);
-    }
-    for (table, (_, default)) in ["LawTable", "ReferenceTable"].into_iter().zip(DEFAULT_KINDS) {
+    tidy(&mut schema);
+    for (table, default) in DEFAULT_KINDS {
         for kind in schema["$defs"][table]["oneOf"].as_array_mut().into_iter().flatten() {
-            if kind["properties"]["kind"]["const"] == default {
+            if ["kind", "shape"].iter().any(|tag| kind["properties"][tag]["const"] == default) {
                 kind["required"] = json!([]);
             }
         }
     }
-    // The name of `[laws.NAME]` stands for a kind that is not given.
+    // The name of `[laws.NAME]` is the kind where none is given.
     if let Some(law) = schema["$defs"]["OtherLaw"].as_object_mut()
         && let Some(mut kinds) = law.remove("oneOf")
     {
@@ -83,43 +45,8 @@ pub fn schema() -> Value {
     schema
 }
 
-/// Another name of a key, which is not given beside it.
-fn add_name(table: &mut Value, name: &str, other: &str) {
-    let Some(mut key) = table["properties"].get(name).cloned() else { return };
-    key["deprecated"] = true.into();
-    key["description"] = format!("Another name of `{name}`.").into();
-    table["properties"][other] = key;
-    let both = json!({ "required": [name, other] });
-    match table.pointer_mut("/not/anyOf").and_then(Value::as_array_mut) {
-        Some(refused) => refused.push(both),
-        None => table["not"] = json!({ "anyOf": [both] }),
-    }
-}
-
-/// Another name of a choice: a choice like it.
-fn add_choice(value: &mut Value, tag: &str, name: &str, other: &str) {
-    for alternative in value.get_mut("anyOf").and_then(Value::as_array_mut).into_iter().flatten() {
-        add_choice(alternative, tag, name, other);
-    }
-    let Some(choices) = value.get_mut("oneOf").and_then(Value::as_array_mut) else { return };
-    let word = if tag.is_empty() { "/const".to_owned() } else { format!("/properties/{tag}/const") };
-    let is_it = |choice: &&mut Value| choice.pointer(&word).is_some_and(|word| word == name);
-    let Some(choice) = choices.iter_mut().find(is_it) else { return };
-    let mut another = choice.clone();
-    if let Some(Value::String(description)) = choice.get_mut("description") {
-        *description = format!("{description} `{other}` is another name of it.");
-    }
-    if let Some(word) = another.pointer_mut(&word) {
-        *word = other.into();
-    }
-    another["deprecated"] = true.into();
-    another["description"] = format!("Another name of `{name}`.").into();
-    choices.push(another);
-}
-
-/// TOML has no null: a key that may be left out has the type that it has when it is there. The defaults of a table stand
-/// at its keys, and so do bounds: whether a number may be 0.
-fn tidy(schema: &mut Value, bounds: &BTreeMap<&str, bool>) {
+/// Removes what TOML has no form for: null as a type and as a default, and defaults of whole tables.
+fn tidy(schema: &mut Value) {
     match schema {
         Value::Object(object) => {
             object.retain(|key, value| key != "default" || !(value.is_null() || value.is_object()));
@@ -131,63 +58,173 @@ fn tidy(schema: &mut Value, bounds: &BTreeMap<&str, bool>) {
                             *value = only.take();
                         }
                     }
-                    _ => tidy(value, bounds),
-                }
-                if let Some(&may_be_zero) = bounds.get(key.as_str()) {
-                    bound(value, if may_be_zero { "minimum" } else { "exclusiveMinimum" });
+                    _ => tidy(value),
                 }
             }
         }
-        Value::Array(list) => list.iter_mut().for_each(|value| tidy(value, bounds)),
+        Value::Array(list) => list.iter_mut().for_each(tidy),
         _ => {}
     }
 }
 
-/// Sets 0 as the bound of a number, or of those within.
-fn bound(schema: &mut Value, bound: &str) {
-    match schema {
-        Value::Object(object) if object.get("type").is_some_and(|of| of == "number") => {
-            object.insert(bound.to_owned(), 0.into());
-        }
-        // The least whole number that is more than 0 is 1.
-        Value::Object(object) if object.get("type").is_some_and(|of| of == "integer") => {
-            object.insert("minimum".to_owned(), u8::from(bound != "minimum").into());
-        }
-        Value::Object(object) => object.values_mut().for_each(|value| self::bound(value, bound)),
-        Value::Array(list) => list.iter_mut().for_each(|value| self::bound(value, bound)),
-        _ => {}
+/// A part of the schema, for one value of the file.
+#[derive(Clone, Copy)]
+pub(super) struct Node {
+    schema: &'static Value,
+    /// What the key is, where a key has the part.
+    about: Option<&'static str>,
+}
+
+impl Node {
+    /// The part for the whole file.
+    pub(super) fn root() -> Self {
+        Self::of(&SCHEMA)
     }
+
+    /// The part that a reference leads to. The description of the key comes before that of its type.
+    fn of(schema: &'static Value) -> Self {
+        let about = schema["description"].as_str();
+        let definition = schema["$ref"].as_str().and_then(|path| SCHEMA.pointer(path.trim_start_matches('#')));
+        definition.map_or(Self { schema, about }, |definition| {
+            let of = Self::of(definition);
+            Self { about: about.or(of.about), ..of }
+        })
+    }
+
+    /// A part of the same key, which has the key's description unless it has its own.
+    fn part(self, schema: &'static Value) -> Self {
+        let part = Self::of(schema);
+        Self { about: part.about.or(self.about), ..part }
+    }
+
+    /// What the key or the type means, in one sentence or more.
+    pub(super) fn about(self) -> Option<&'static str> {
+        self.about
+    }
+
+    /// The value of a keyword, such as `minimum`.
+    pub(super) fn keyword(self, name: &str) -> &'static Value {
+        &self.schema[name]
+    }
+
+    /// The name of its type, such as `number`; empty for one of several types.
+    pub(super) fn kind(self) -> &'static str {
+        self.schema["type"].as_str().unwrap_or_default()
+    }
+
+    /// Part for a key of a table, alternatives apart.
+    pub(super) fn property(self, key: &str) -> Option<Self> {
+        self.schema["properties"].get(key).map(Self::of)
+    }
+
+    /// The keys of a table, alternatives apart.
+    pub(super) fn keys(self) -> impl Iterator<Item = &'static str> {
+        self.schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys().map(String::as_str))
+    }
+
+    /// Part for every value of a table whose keys are free.
+    pub(super) fn values(self) -> Option<Self> {
+        self.schema["additionalProperties"].is_object().then(|| Self::of(&self.schema["additionalProperties"]))
+    }
+
+    /// Part for the entries of a list.
+    pub(super) fn items(self) -> Option<Self> {
+        self.schema["items"].is_object().then(|| self.part(&self.schema["items"]))
+    }
+
+    /// Whether a table needs a key.
+    pub(super) fn requires(self, key: &str) -> bool {
+        self.required().any(|name| name == key)
+    }
+
+    /// The keys that a table needs.
+    pub(super) fn required(self) -> impl Iterator<Item = &'static str> {
+        self.schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str)
+    }
+
+    /// The parts of which one applies, nested ones included.
+    pub(super) fn alternatives(self) -> Vec<Self> {
+        let listed = ["oneOf", "anyOf"].into_iter().filter_map(|of| self.schema[of].as_array()).flatten();
+        let parts = listed.filter(|part| part.as_object().is_some_and(|part| !part.is_empty()));
+        let parts = parts.map(|part| self.part(part));
+        let is_nested = |part: &Self| part.schema["oneOf"].is_array() && part.words().is_empty();
+        parts.flat_map(|part| if is_nested(&part) { part.alternatives() } else { vec![part] }).collect()
+    }
+
+    /// The words of which one is the value; empty for other values.
+    pub(super) fn words(self) -> Vec<&'static str> {
+        let words = |part: Self| part.schema["const"].as_str();
+        self.schema["oneOf"].as_array().into_iter().flatten().filter_map(|part| words(Self::of(part))).collect()
+    }
+
+    /// Whether it is for a table.
+    pub(super) fn is_table(self) -> bool {
+        self.kind() == "object"
+            || self.schema["properties"].is_object()
+            || self.alternatives().iter().any(|part| part.tag().is_some())
+    }
+
+    /// The key whose constant value tells an alternative apart, and that value.
+    pub(super) fn tag(self) -> Option<(&'static str, &'static str)> {
+        let keys = self.schema["properties"].as_object()?;
+        keys.iter().find_map(|(key, value)| Some((key.as_str(), value["const"].as_str()?)))
+    }
+
+    /// The alternative that a table of the file takes, by its tag.
+    pub(super) fn alternative_of(self, table: &DeValue<'_>) -> Option<Self> {
+        self.alternatives().into_iter().find(|part| {
+            part.tag().is_some_and(|(key, name)| match table.get(key) {
+                Some(value) => value.get_ref().as_str() == Some(name),
+                None => !part.requires(key),
+            })
+        })
+    }
+
+    /// The part below for a key or the number of an entry, in a value of the file.
+    fn below(self, value: Option<&Spanned<DeValue<'_>>>, key: &str) -> Option<Self> {
+        if let Some(part) = self.property(key).or_else(|| self.values()).or_else(|| self.items()) {
+            return Some(part);
+        }
+        let chosen = value.and_then(|value| self.alternative_of(value.get_ref()));
+        let of_lists = || self.alternatives().into_iter().find_map(Self::items);
+        chosen.and_then(|chosen| chosen.property(key)).or_else(of_lists)
+    }
+}
+
+/// Whether a key of a scenario takes integers only, as its type says. False for a key that does not exist.
+#[must_use]
+pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
+    let Ok((name, toml)) = source.text() else { return false };
+    let Ok(tree) = (Text { name: &name, toml: &toml, overrides }).tree() else { return false };
+    let mut at = (Some(Node::root()), Some(&tree));
+    for part in key.split('.') {
+        let (node, value) = at;
+        let node = node.and_then(|node| node.below(value, part));
+        let entry = || part.parse::<usize>().ok()?.checked_sub(1);
+        let value = value.and_then(|value| match value.get_ref() {
+            DeValue::Array(list) => list.get(entry()?),
+            table => table.get(part),
+        });
+        at = (node, value);
+    }
+    at.0.is_some_and(|node| node.kind() == "integer")
 }
 
 /// The tables of the scenario file that have a key of this name: `[swarm]`, or `[law] with kind = "laplacian"`.
 pub(super) fn tables_with(key: &str) -> Vec<String> {
-    let schema = schema();
-    let Some(tables) = schema["properties"].as_object() else { return Vec::new() };
     let mut found = Vec::new();
-    for (table, place) in tables.iter().filter(|(_, place)| place["deprecated"] != true) {
-        let definition = place["$ref"].as_str().and_then(|path| schema.pointer(path.trim_start_matches('#')));
-        if let Some(definition) = definition {
-            collect(definition, key, table, &mut found);
+    for table in Node::root().keys() {
+        let Some(node) = Node::root().property(table) else { continue };
+        let node = node.items().unwrap_or(node);
+        if node.property(key).is_some() {
+            found.push(format!("[{table}]"));
+        }
+        for part in node.alternatives().into_iter().filter(|part| part.property(key).is_some()) {
+            let chosen = part.tag().filter(|(tag, _)| *tag != key);
+            found.push(chosen.map_or(format!("[{table}]"), |(tag, name)| format!("[{table}] with {tag} = \"{name}\"")));
         }
     }
     found
-}
-
-/// Adds the places of a key in a table, or in one of its choices.
-fn collect(definition: &Value, key: &str, table: &str, found: &mut Vec<String>) {
-    if definition["properties"].get(key).is_some_and(|key| key["deprecated"] != true) {
-        found.push(format!("[{table}]{}", chosen(&definition["properties"])));
-    }
-    let alternatives = ["oneOf", "anyOf"].iter().filter_map(|of| definition[of].as_array()).flatten();
-    for alternative in alternatives.filter(|alternative| alternative["deprecated"] != true) {
-        collect(alternative, key, table, found);
-    }
-}
-
-/// The choice that these keys belong to, if they belong to one.
-fn chosen(keys: &Value) -> String {
-    let choice = keys.as_object().into_iter().flatten().find_map(|(key, value)| Some((key, value["const"].as_str()?)));
-    choice.map_or_else(String::new, |(key, value)| format!(" with {key} = \"{value}\""))
 }
 
 #[cfg(test)]
@@ -195,25 +232,52 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_more_than_0_is_bounded_by_0_and_what_is_counted_by_1() {
-        let schema = schema();
-        let mut law = schema["$defs"]["LawTable"]["oneOf"].as_array().into_iter().flatten();
-        let orca = law.find(|law| law["properties"]["kind"]["const"] == "orca").expect("orca");
-        let key = |name: &str| {
-            let keys =
-                orca["$ref"].as_str().map_or(orca, |path| &schema["$defs"][path.rsplit('/').next().expect("a name")]);
-            keys["properties"][name].clone()
-        };
-        assert_eq!((&key("neighbours_max")["minimum"], &key("speed_m_s")["exclusiveMinimum"]), (&json!(1), &json!(0)));
-        assert_eq!((&key("margin_m")["minimum"], &key("margin_m")["exclusiveMinimum"]), (&json!(0), &Value::Null));
-    }
-
-    #[test]
-    fn a_key_is_found_in_its_table_and_in_each_choice_that_has_it() {
+    fn a_key_is_found_in_its_table_and_in_each_alternative_that_has_it() {
         assert_eq!(tables_with("count"), ["[swarm]"]);
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("spacing_m").len(), 13);
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
+    }
+
+    fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        takes_integers_only(&Source::Builtin(builtin.to_owned()), &overrides, key)
+    }
+
+    #[test]
+    fn keys_that_count_take_integers_only() {
+        for (key, sets) in [
+            ("start.seed", &[][..]),
+            ("noise.seed", &[]),
+            ("time.max_halvings", &[]),
+            ("swarm.count", &[]),
+            ("law.neighbours_max", &["law.kind=orca"]),
+            ("failure.1.vehicle", &["failure=[{vehicle=1, kind=\"silent\", at_s=1}]"]),
+            ("failure.1.rotor", &["failure=[{vehicle=1, kind=\"rotor\", rotor=1, at_s=1}]"]),
+            ("graph.edges.1.2", &["graph={kind=\"edges\", edges=[[1, 2], [2, 3], [3, 4], [4, 5]]}"]),
+            ("reference.known_by.1", &["reference={known_by=[1, 2]}"]),
+        ] {
+            assert!(takes_integers("pentagon", sets, key), "{key}");
+        }
+    }
+
+    #[test]
+    fn keys_that_measure_take_any_number() {
+        for (builtin, key) in [
+            ("crazyflies", "sensing.latency_s"),
+            ("crazyflies", "time.control_hz"),
+            ("pentagon", "time.record_hz"),
+            ("pentagon", "time.dt_s"),
+            ("pentagon", "law.alpha"),
+            ("pentagon", "start.positions_m.2.x"),
+            ("pentagon", "wind.mean_m_s"),
+            ("gusts", "wind.mean_m_s.1"),
+            ("pentagon", "law.kind"),
+            ("pentagon", "law.alfa"),
+            ("pentagon", "law..alpha"),
+            ("pentagon", "law.neighbours_max"),
+        ] {
+            assert!(!takes_integers(builtin, &[], key), "{builtin} {key}");
+        }
     }
 }

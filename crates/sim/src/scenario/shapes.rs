@@ -12,6 +12,7 @@ use tautline_laws::formation::Ink;
 #[serde(deny_unknown_fields)]
 pub(super) struct VKeys {
     /// Distance between neighbours on an arm in m, and of the nearest slots; 1.5 times `law.delta_m` unless given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
     /// Angle between the arms in degrees, from 60 to 180.
     #[serde(default = "right_angle_deg")]
@@ -28,6 +29,7 @@ fn right_angle_deg() -> f64 {
 #[serde(deny_unknown_fields)]
 pub(super) struct SpacingKeys {
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
 
@@ -36,13 +38,17 @@ pub(super) struct SpacingKeys {
 #[serde(deny_unknown_fields)]
 pub(super) struct HelixKeys {
     /// Radius in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) radius_m: f64,
     /// Rise of a full turn in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) pitch_m: f64,
     /// Distance between neighbours in m, and of the nearest slots; 1.5 times `law.delta_m` unless this or `turns` is
     /// given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
     /// Turns from the first slot to the last, in place of `spacing_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) turns: Option<f64>,
 }
 
@@ -54,10 +60,13 @@ pub(super) struct TextKeys {
     #[schemars(length(min = 1, max = 1000))]
     pub(super) text: String,
     /// Height of all that is written in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
     /// Width of all that is written in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
 
@@ -73,10 +82,13 @@ pub(super) struct SvgKeys {
     #[serde(default)]
     pub(super) filled: bool,
     /// Height of the drawing in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
     /// Width of the drawing in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
 
@@ -91,10 +103,13 @@ pub(super) struct ImageKeys {
     #[schemars(with = "Ink")]
     pub(super) ink: Option<Ink>,
     /// Height of what is drawn in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
     /// Width of what is drawn in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
 

@@ -2,24 +2,23 @@
 
 use super::document::FormationShape;
 use super::error::ScenarioError;
-use super::limits::{DEFAULT_SPACING, positive, require_finite, rounded_up};
-use super::shapes::{HelixKeys, VKeys};
+use super::limits::{DEFAULT_SPACING, rounded_up};
+use super::shapes::HelixKeys;
 use super::values::rows;
-use tautline_laws::formation::{Formation, NARROWEST_V_RAD};
+use tautline_laws::formation::Formation;
 
 /// The formation of a shape.
 pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let radius = |radius_m| positive("formation.radius_m", "the radius", radius_m);
     Ok(match shape {
-        &FormationShape::Pentagon { side_m } => Formation::pentagon(positive("formation.side_m", "the side", side_m)?),
-        &FormationShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
-        &FormationShape::Line { spacing_m } => Formation::line(count, spacing(Some(spacing_m), delta_m)?),
-        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing(Some(spacing_m), delta_m)?),
-        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
-        FormationShape::V(keys) => v(keys, count, delta_m)?,
-        FormationShape::Wedge(keys) => Formation::wedge(count, spacing(keys.spacing_m, delta_m)?),
-        FormationShape::Rings(keys) => Formation::rings(count, spacing(keys.spacing_m, delta_m)?),
-        FormationShape::Cube(keys) => Formation::cube(count, spacing(keys.spacing_m, delta_m)?),
+        &FormationShape::Pentagon { side_m } => Formation::pentagon(side_m),
+        &FormationShape::Circle { radius_m } => Formation::circle(count, radius_m),
+        &FormationShape::Line { spacing_m } => Formation::line(count, spacing_m),
+        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing_m),
+        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius_m),
+        FormationShape::V(keys) => Formation::v(count, spacing(keys.spacing_m, delta_m), keys.angle_deg.to_radians()),
+        FormationShape::Wedge(keys) => Formation::wedge(count, spacing(keys.spacing_m, delta_m)),
+        FormationShape::Rings(keys) => Formation::rings(count, spacing(keys.spacing_m, delta_m)),
+        FormationShape::Cube(keys) => Formation::cube(count, spacing(keys.spacing_m, delta_m)),
         FormationShape::Helix(keys) => helix(keys, count, delta_m)?,
         FormationShape::Points { points_m } => Formation::points(rows(points_m)),
         FormationShape::Text(keys) => super::drawn::text(keys, count, delta_m)?,
@@ -52,23 +51,8 @@ pub(super) fn is_flat(shape: &FormationShape) -> bool {
     }
 }
 
-fn spacing(spacing_m: Option<f64>, delta_m: f64) -> Result<f64, ScenarioError> {
-    let default_m =
-        || positive("law.delta_m", "the safety distance delta", delta_m).map(|delta_m| DEFAULT_SPACING * delta_m);
-    spacing_m.map_or_else(default_m, |spacing_m| positive("formation.spacing_m", "the spacing", spacing_m))
-}
-
-fn v(keys: &VKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let angle_deg = require_finite("the angle", keys.angle_deg).map_err(|error| error.at("formation.angle_deg"))?;
-    let angle_rad = angle_deg.to_radians();
-    // As many degrees as there are in its least angle are not less than it.
-    if angle_rad < NARROWEST_V_RAD * (1.0 - f64::EPSILON) || angle_deg > 180.0 {
-        return Err(ScenarioError::new(format!("a V with an angle of {angle_deg} degrees"))
-            .coded("scenario/out-of-range")
-            .with_help("it must be from 60, so that the arms keep the spacing, to 180")
-            .at("formation.angle_deg"));
-    }
-    Ok(Formation::v(count, spacing(keys.spacing_m, delta_m)?, angle_rad))
+fn spacing(spacing_m: Option<f64>, delta_m: f64) -> f64 {
+    spacing_m.unwrap_or(DEFAULT_SPACING * delta_m)
 }
 
 /// Part of the spacing by which rounding may bring slots of a helix nearer.
@@ -78,8 +62,7 @@ const ROUNDING: f64 = 1e-12;
 const STEEPER: f64 = 1.01;
 
 fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let radius_m = positive("formation.radius_m", "the radius", keys.radius_m)?;
-    let pitch_m = positive("formation.pitch_m", "the pitch", keys.pitch_m)?;
+    let HelixKeys { radius_m, pitch_m, .. } = *keys;
     if let Some(turns) = keys.turns {
         if keys.spacing_m.is_some() {
             return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
@@ -88,11 +71,10 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
                 .at("formation.turns")
                 .at("formation.spacing_m"));
         }
-        let turns = positive("formation.turns", "the number of turns", turns)?;
         let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
         return Ok(Formation::helix(count, radius_m, pitch_m, step_rad));
     }
-    let spacing_m = spacing(keys.spacing_m, delta_m)?;
+    let spacing_m = spacing(keys.spacing_m, delta_m);
     let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
         return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
             .coded("scenario/shape")

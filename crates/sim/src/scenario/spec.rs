@@ -2,6 +2,9 @@
 
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::actuation::ActuationSpec;
 use super::failure::Failure;
 use super::network::NetworkSpec;
@@ -80,14 +83,18 @@ pub struct Scenario {
 }
 
 /// What must stay empty around a vehicle, delta wide.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[schemars(tag = "shape")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum Safety {
-    /// A ball.
+    /// A ball of half of `law.delta_m`.
+    #[default]
     Ball,
-    /// An upright ellipsoid.
+    /// An upright ellipsoid. Separation above and below counts for more, for example because of downwash.
     Ellipsoid {
-        /// Half of its height \[m\].
-        half_height_m: f64,
+        /// Half axes in m. The two level ones are the same, and `law.delta_m`, if given, is twice that.
+        #[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
+        half_axes_m: [f64; 3],
     },
 }
 
@@ -112,11 +119,13 @@ impl Space {
 }
 
 /// Which plant flies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum PlantSpec {
-    /// Rapier rigid bodies.
+    /// Rapier rigid bodies, the command held over each step.
+    #[default]
     Rapier,
-    /// The equation of motion solved in continuous time with the law inside.
+    /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
     Ideal,
 }
 
@@ -213,7 +222,9 @@ impl Scenario {
     pub fn metric(&self) -> Metric {
         match self.safety {
             Safety::Ball => Metric::default(),
-            Safety::Ellipsoid { half_height_m } => Metric::of_ratio(half_height_m / (0.5 * self.delta_m)),
+            Safety::Ellipsoid { half_axes_m: [.., half_height_m] } => {
+                Metric::of_ratio(half_height_m / (0.5 * self.delta_m))
+            }
         }
     }
 
@@ -222,7 +233,9 @@ impl Scenario {
     pub fn half_axes_m(&self) -> Option<[f64; 3]> {
         match self.safety {
             Safety::Ball => None,
-            Safety::Ellipsoid { half_height_m } => Some([0.5 * self.delta_m, 0.5 * self.delta_m, half_height_m]),
+            Safety::Ellipsoid { half_axes_m: [.., half_height_m] } => {
+                Some([0.5 * self.delta_m, 0.5 * self.delta_m, half_height_m])
+            }
         }
     }
 

@@ -6,7 +6,6 @@ use rand_chacha::ChaCha8Rng;
 use super::chance::{below, unit};
 use super::document::StartShape;
 use super::error::ScenarioError;
-use super::limits::positive;
 use super::spec::Space;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::formation::Formation;
@@ -26,17 +25,13 @@ pub(super) fn positions(
     delta_m: f64,
     random: &mut ChaCha8Rng,
 ) -> Result<Rows, ScenarioError> {
-    let radius = |radius_m| positive("start.radius_m", "the radius", radius_m);
-    let spacing = |spacing_m| positive("start.spacing_m", "the spacing", spacing_m);
     let formation = match *shape {
-        StartShape::Line { spacing_m } => Formation::line(count, spacing(spacing_m)?),
-        StartShape::Grid { spacing_m } => Formation::grid(count, spacing(spacing_m)?),
-        StartShape::Circle { radius_m } => Formation::circle(count, radius(radius_m)?),
-        StartShape::Sphere { radius_m } => Formation::sphere(count, radius(radius_m)?),
+        StartShape::Line { spacing_m } => Formation::line(count, spacing_m),
+        StartShape::Grid { spacing_m } => Formation::grid(count, spacing_m),
+        StartShape::Circle { radius_m } => Formation::circle(count, radius_m),
+        StartShape::Sphere { radius_m } => Formation::sphere(count, radius_m),
         StartShape::Random { half_extent_m, min_separation_m } => {
-            let half_extent_m = positive("start.half_extent_m", "the half extent", half_extent_m)?;
             let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
-            let min_separation_m = positive("start.min_separation_m", "the smallest separation", min_separation_m)?;
             if min_separation_m <= delta_m {
                 return Err(ScenarioError::new(format!(
                     "a smallest separation of {min_separation_m} m is not more than delta = {delta_m} m"
@@ -53,21 +48,14 @@ pub(super) fn positions(
 }
 
 /// Adds a uniform offset of at most `jitter_m` along each axis, along z only in space.
-pub(super) fn jitter(
-    positions_m: &mut Rows,
-    jitter_m: f64,
-    space: Space,
-    random: &mut ChaCha8Rng,
-) -> Result<(), ScenarioError> {
+pub(super) fn jitter(positions_m: &mut Rows, jitter_m: f64, space: Space, random: &mut ChaCha8Rng) {
     if jitter_m == 0.0 {
-        return Ok(());
+        return;
     }
-    let jitter_m = positive("start.jitter_m", "the jitter", jitter_m)?;
     for i in 0..positions_m.nrows() {
         let moved = row(positions_m, i) + offset(jitter_m, space, random);
         set_row(positions_m, i, moved);
     }
-    Ok(())
 }
 
 /// Puts the vehicles into a random order, every one as likely as any other, each with its position and velocity.

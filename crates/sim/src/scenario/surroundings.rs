@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::error::ScenarioError;
-use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, require_finite, require_positive};
+use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::space::{Obstacle, Shape, least_room};
@@ -91,9 +91,9 @@ impl Scenario {
     }
 }
 
-/// A solid with a name, lengths and a place.
+/// A solid with a name that is no vehicle's, and a normal with a direction.
 fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
-    let Obstacle { name, place_m, shape, clearance_m } = obstacle;
+    let Obstacle { name, shape, .. } = obstacle;
     if name.trim().is_empty() {
         return Err(ScenarioError::new("the name of an obstacle is empty")
             .coded("scenario/name")
@@ -104,31 +104,12 @@ fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
             .coded("scenario/name")
             .with_help("give it a name that is no number"));
     }
-    let lengths = |what: &str, numbers: &[f64]| {
-        numbers
-            .iter()
-            .try_for_each(|&number| require_positive(format_args!("{what} of obstacle `{name}`"), number).map(|_| ()))
-    };
-    let finite = |what: &str, numbers: &[f64]| {
-        numbers
-            .iter()
-            .try_for_each(|&number| require_finite(format_args!("{what} of obstacle `{name}`"), number).map(|_| ()))
-    };
-    lengths("the clearance", &[*clearance_m])?;
-    finite("a coordinate of the place", place_m.as_slice())?;
     match shape {
-        Shape::Ball { radius_m } => lengths("the radius", &[*radius_m]),
-        Shape::Box { half_m, yaw_deg } => {
-            lengths("a length", (half_m * 2.0).as_slice()).and_then(|()| finite("the yaw", &[*yaw_deg]))
+        Shape::HalfSpace { normal } if normal.norm() < SMALLEST => {
+            Err(ScenarioError::new(format!("the normal of obstacle `{name}` has the length {}", normal.norm()))
+                .coded("scenario/out-of-range")
+                .with_help("give the direction that points out of the half-space, such as [0, 0, 1]"))
         }
-        Shape::Capsule { from_m, to_m, radius_m } => {
-            finite("an end", from_m.as_slice())?;
-            finite("an end", to_m.as_slice())?;
-            lengths("the radius", &[*radius_m])
-        }
-        Shape::HalfSpace { normal } => {
-            finite("the normal", normal.as_slice())?;
-            lengths("the length of the normal", &[normal.norm()])
-        }
+        _ => Ok(()),
     }
 }

@@ -1,22 +1,64 @@
 //! Duration and rates of a flight.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::limits::{MAX_HALVINGS, MAX_STEPS};
+use super::spec::Scenario;
+use tautline_laws::law::{Law, LawSpec, RateQuery};
+
+/// Numbers of a recording whose rate is not given, at most \[bytes\].
+const RECORDING_BYTES: f64 = (1_u64 << 30) as f64;
+
 /// Duration and rates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct TimeSpec {
-    /// Length of the flight \[s\].
+    /// Length of the flight in s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub duration_s: f64,
-    /// Physics step \[s\]; the law is asked once a step. A step that is too long for the law is flown in parts.
+    /// Physics step in s; the law is evaluated once a step. A step that is too long for the law is flown in parts. Unless given
+    /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links require, if the law is
+    /// evaluated that often and a flight of such parts has at most 1e9.
+    #[serde(default = "default_dt_s")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub dt_s: f64,
-    /// Samples recorded per second of flight \[Hz\], at most one a step.
+    /// Samples recorded per second of flight in Hz, at most one a step. Unless given 60, or less for a large swarm, so that its
+    /// recording holds at most 1 GiB of numbers; arrivals are still detected.
+    #[serde(default = "default_record_hz")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub record_hz: f64,
     /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
-    /// step as it is.
+    /// step as it is. Under `potential` the default rises up to 20, as the rate of the law at the certified distance requires.
+    #[serde(default = "default_max_halvings")]
+    #[schemars(range(max = 20))]
     pub max_halvings: u32,
     /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
+    #[serde(default = "default_max_rate_dt")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_rate_dt: f64,
-    /// How often the law is asked \[Hz\], at most once a step, where vehicles hold each command in between as a real
-    /// controller makes them do. Unless given, commands stand for continuous control.
+    /// How often the law is evaluated in Hz, at most once a step; vehicles hold each command in between, as a real
+    /// controller makes them do. Unless given, commands of points stand for continuous control, and quadrotors get 100 a
+    /// second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub control_hz: Option<f64>,
+}
+
+fn default_dt_s() -> f64 {
+    TimeSpec::DEFAULT_DT_S
+}
+
+fn default_record_hz() -> f64 {
+    TimeSpec::DEFAULT_RECORD_HZ
+}
+
+fn default_max_halvings() -> u32 {
+    TimeSpec::DEFAULT_MAX_HALVINGS
+}
+
+fn default_max_rate_dt() -> f64 {
+    TimeSpec::DEFAULT_MAX_RATE_DT
 }
 
 impl TimeSpec {
@@ -101,6 +143,80 @@ impl TimeSpec {
         let periods = |k: u64| (k as f64 * periods_per_step + Self::ROUNDING).floor();
         step == 0 || periods(step) > periods(step - 1)
     }
+
+    /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
+    /// energy.
+    #[must_use]
+    pub fn honest_rate_dt(&self) -> f64 {
+        self.max_rate_dt.min(Self::DEFAULT_MAX_RATE_DT)
+    }
+
+    /// The shortest part of a step \[s\].
+    #[must_use]
+    pub fn shortest_step_s(&self) -> f64 {
+        self.dt_s * 0.5_f64.powi(i32::try_from(self.max_halvings).unwrap_or(i32::MAX))
+    }
+}
+
+impl Scenario {
+    /// Longest step that a law's links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
+    #[must_use]
+    pub fn links_step_s(&self, law: &dyn Law) -> Option<f64> {
+        let rate_per_s =
+            law.rates(&RateQuery::new(self.velocity_coefficient_per_s(), Some(f64::INFINITY))).fastest_per_s?;
+        (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.honest_rate_dt() / rate_per_s)
+    }
+
+    /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
+    /// of no use: where the law is asked less often than that, and where a flight may not have so many parts of steps. What is wrong
+    /// with law or times is left for [`super::validate`] to refuse.
+    pub(super) fn choose_step(&mut self) {
+        let Ok(law) = self.law() else { return };
+        let Some(needed_s) = self.links_step_s(law.as_ref()).filter(|&needed_s| needed_s > 0.0) else { return };
+        let is_asked_in_time = self.time.control_hz.is_none_or(|control_hz| control_hz * needed_s >= 1.0);
+        if !is_asked_in_time {
+            return;
+        }
+        let mut chosen = self.time;
+        while chosen.shortest_step_s() > needed_s {
+            chosen.dt_s *= 0.5;
+        }
+        if chosen.duration_s <= MAX_STEPS * chosen.shortest_step_s() {
+            self.time = chosen;
+        }
+    }
+
+    /// Raises the number of halvings until the shortest part of a step resolves the potential field at the certified distance.
+    ///
+    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to the
+    /// certified distance.
+    pub(super) fn choose_halvings(&mut self) {
+        let LawSpec::Potential(_) = self.law else { return };
+        let Ok(law) = self.law() else { return };
+        let certified_m = self.certificate(law.as_ref()).certified_m;
+        let query = RateQuery::new(self.velocity_coefficient_per_s(), certified_m);
+        let Some(rate_per_s) = law.rates(&query).fastest_per_s else { return };
+        while self.time.max_halvings < MAX_HALVINGS
+            && self.time.shortest_step_s() * rate_per_s > self.time.honest_rate_dt()
+        {
+            self.time.max_halvings += 1;
+        }
+    }
+}
+
+/// Recording rate \[Hz\] that keeps the recording of so many vehicles bounded: whole hertz where that is one or more; at least
+/// two samples while an arrival is held.
+pub(super) fn bounded_record_hz(count: usize, duration_s: f64, hold_s: f64) -> f64 {
+    const SAMPLES_HELD: f64 = 2.0;
+    let most_hz = RECORDING_BYTES / (TimeSpec::BYTES_PER_VEHICLE as f64 * count as f64 * duration_s);
+    let bounded_hz = if most_hz >= 1.0 { most_hz.floor() } else { most_hz };
+    let told_hz = if hold_s > 0.0 { SAMPLES_HELD / hold_s } else { 0.0 };
+    // A duration that is refused later on may be anything.
+    if bounded_hz.max(told_hz) < TimeSpec::DEFAULT_RECORD_HZ {
+        bounded_hz.max(told_hz)
+    } else {
+        TimeSpec::DEFAULT_RECORD_HZ
+    }
 }
 
 #[cfg(test)]
@@ -175,6 +291,25 @@ mod tests {
         for first in [0, 1_000_000, 999_000_000] {
             let samples = (first + 1..=first + 4000).filter(|&step| time.records(step)).count();
             assert_eq!(samples, 1000, "from step {first}");
+        }
+    }
+
+    #[test]
+    fn many_vehicles_are_recorded_less_often_and_few_at_sixty_hertz() {
+        for (count, duration_s, hold_s, expected) in [
+            (5, 120.0, 1.0, 60.0),
+            (1000, 120.0, 1.0, 60.0),
+            (10_000, 60.0, 1.0, 24.0),
+            (100_000, 60.0, 1.0, 2.0),
+            (100_000, 600.0, 1.0, 2.0),
+            (100_000, 600.0, 0.0, 0.248_551_348_148_148_15),
+            (100_000, 10.0, 0.1, 20.0),
+        ] {
+            assert_eq!(bounded_record_hz(count, duration_s, hold_s), expected, "{count} {duration_s} {hold_s}");
+        }
+        for (duration_s, hold_s) in [(f64::NAN, 1.0), (-1.0, 1.0), (0.0, 0.0), (1.0, f64::NAN), (1.0, 1e-300)] {
+            let hz = bounded_record_hz(100_000, duration_s, hold_s);
+            assert!(hz <= TimeSpec::DEFAULT_RECORD_HZ, "{hz}");
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What a scenario must be for unicycles to be flown.
 
 use super::error::ScenarioError;
-use super::limits::positive;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::vehicle::{Heading, Unicycle};
 use tautline_core::swarm::row;
@@ -13,11 +12,7 @@ impl Scenario {
     /// Limits that are some, and a start in the plane that keeps to them.
     pub(super) fn check_unicycle(&self) -> Result<(), ScenarioError> {
         let Some(unicycle) = self.airframe.unicycle() else { return Ok(()) };
-        let Unicycle { min_speed_m_s, max_speed_m_s, max_turn_rad_s, max_accel_m_s2 } = *unicycle;
-        positive("vehicle.min_speed_m_s", "the least speed", min_speed_m_s)?;
-        positive("vehicle.max_speed_m_s", "the largest speed", max_speed_m_s)?;
-        positive("vehicle.max_turn_rad_s", "the largest rate of the heading", max_turn_rad_s)?;
-        positive("vehicle.max_accel_m_s2", "the largest acceleration", max_accel_m_s2)?;
+        let Unicycle { min_speed_m_s, max_speed_m_s, .. } = *unicycle;
         if min_speed_m_s > max_speed_m_s {
             return Err(ScenarioError::new(format!(
                 "the least speed of {min_speed_m_s} m/s is more than the largest of {max_speed_m_s} m/s"

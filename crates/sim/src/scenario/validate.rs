@@ -1,16 +1,17 @@
 //! What a scenario must be for it to be flown.
 
+use super::check::conform;
 use super::error::ScenarioError;
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_HALVINGS, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, at_least_zero, check_count,
-    check_lengths, check_memory, first_within, may_be_in_a_name, positive, require_finite, require_more_than_zero,
-    require_positive,
+    CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
+    first_within, may_be_in_a_name, require_finite,
 };
 use super::spec::{Scenario, Space};
+use super::text::Text;
 use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
-use tautline_laws::law::{Controls, Gain, LawSpec, ParameterError};
+use tautline_laws::law::{Controls, LawSpec, ParameterError};
 use tautline_laws::target::{Begins, Guidance, Leg};
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
@@ -36,15 +37,23 @@ impl Scenario {
     /// [`ScenarioError`] for the first that does not hold, with the key that says so and the remedy, and without a
     /// place in a text.
     pub fn validate(&self) -> Result<(), ScenarioError> {
+        self.check_noise()?;
+        let resolved = self.resolved_toml();
+        let mut tree = Text { name: &self.name, toml: &resolved, overrides: &[] }.tree()?;
+        self.check_lengths()?;
+        conform(&mut tree, resolved.len() + 1).map_err(|misfit| misfit.without_text())?;
+        self.check()
+    }
+
+    /// Checks what depends on several keys. The schema has checked each by itself.
+    pub(super) fn check(&self) -> Result<(), ScenarioError> {
         check_name(&self.name)?;
         check_count(self.count())?;
         self.check_legs()?;
         self.check_lengths()?;
         let takes_none = self.graph.is_complete() && !self.law.keeps_edges();
         check_memory(self.count(), if takes_none { 0 } else { self.graph.edge_count() as u128 })?;
-        self.check_law()?;
         self.check_safety()?;
-        self.check_vehicles()?;
         self.check_airframe()?;
         self.check_motion()?;
         self.check_separations()?;
@@ -56,7 +65,6 @@ impl Scenario {
         self.check_wind()?;
         self.check_arrival()?;
         self.check_breathing()?;
-        self.check_noise()?;
         self.check_sensing()?;
         self.check_network()?;
         self.check_actuation()?;
@@ -75,9 +83,6 @@ impl Scenario {
 
     fn check_arrival(&self) -> Result<(), ScenarioError> {
         let (arrival, time) = (self.arrival, self.time);
-        positive("arrival.edge_error_m", "the edge error", arrival.edge_error_m)?;
-        positive("arrival.disagreement_m_s", "the disagreement", arrival.disagreement_m_s)?;
-        at_least_zero("arrival.hold_s", "the hold time", arrival.hold_s)?;
         if arrival.hold_s > time.duration_s {
             return Err(ScenarioError::new(format!(
                 "the formation is to be held for {} s in a flight of {} s",
@@ -220,27 +225,7 @@ impl Scenario {
         )
     }
 
-    fn check_law(&self) -> Result<(), ScenarioError> {
-        positive("law.delta_m", "the safety distance delta", self.delta_m)?;
-        check_gains(&self.law)
-    }
-
-    fn check_vehicles(&self) -> Result<(), ScenarioError> {
-        let numbers = [
-            ("swarm.mass_kg", "the mass", &self.mass_kg),
-            ("swarm.hull_radius_m", "the hull radius", &self.hull_radius_m),
-        ];
-        for (key, what, numbers) in numbers {
-            for (i, &number) in numbers.iter().enumerate() {
-                require_positive(format_args!("{what} of vehicle {}", i + 1), number)
-                    .map_err(|error| error.at_entry(key, i))?;
-            }
-        }
-        Ok(())
-    }
-
     fn check_motion(&self) -> Result<(), ScenarioError> {
-        require_finite("a22", self.a22_per_s).map_err(|error| error.at("swarm.a22_per_s"))?;
         let start = [
             ("start.positions_m", "the start position", &self.start.positions_m),
             ("start.velocities_m_s", "the start velocity", &self.start.velocities_m_s),
@@ -347,9 +332,7 @@ impl Scenario {
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {
-        let TimeSpec { duration_s, dt_s, record_hz, max_halvings, max_rate_dt, control_hz } = self.time;
-        positive("time.dt_s", "the time step", dt_s)?;
-        require_more_than_zero("the duration", duration_s).map_err(|error| error.at("time.duration_s"))?;
+        let TimeSpec { duration_s, dt_s, control_hz, .. } = self.time;
         if dt_s > duration_s {
             return Err(ScenarioError::new(format!(
                 "one step of {dt_s} s is longer than the flight of {duration_s} s"
@@ -378,10 +361,7 @@ impl Scenario {
             .at("swarm.a22_per_s")
             .at("time.dt_s"));
         }
-        positive("time.record_hz", "the recording rate", record_hz)?;
-        positive("time.max_rate_dt", "the largest product of step and rate", max_rate_dt)?;
         if let Some(control_hz) = control_hz {
-            positive("time.control_hz", "the control rate", control_hz)?;
             if control_hz * dt_s > 1.0 + 1e-6 {
                 return Err(ScenarioError::new(format!(
                     "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
@@ -392,28 +372,8 @@ impl Scenario {
                 .at("time.dt_s"));
             }
         }
-        if max_halvings > MAX_HALVINGS {
-            return Err(ScenarioError::new(format!(
-                "a step is halved at most {MAX_HALVINGS} times, not {max_halvings}"
-            ))
-            .coded("scenario/out-of-range")
-            .with_help("the default is 10")
-            .at("time.max_halvings"));
-        }
         Ok(())
     }
-}
-
-/// Refuses numbers among a law's keys that it cannot have.
-pub(super) fn check_gains(law: &LawSpec) -> Result<(), ScenarioError> {
-    for Gain { key, name, value, may_be_zero } in law.gains() {
-        if may_be_zero {
-            at_least_zero(key, name, value)?
-        } else {
-            positive(key, name, value)?
-        };
-    }
-    Ok(())
 }
 
 fn check_name(name: &str) -> Result<(), ScenarioError> {

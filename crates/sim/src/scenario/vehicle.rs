@@ -1,7 +1,6 @@
 //! What a scenario must be for bodies that are more than points to be flown.
 
 use super::error::ScenarioError;
-use super::limits::positive;
 use super::spec::{Scenario, Space};
 use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor};
 use tautline_laws::space::{Obstacle, Shape};
@@ -55,7 +54,6 @@ impl Scenario {
             };
             ScenarioError::new(message).with_help(help).at(key).at("vehicle.attitude_damping").at("vehicle.model")
         };
-        positive("vehicle.attitude_hz", "the rate of the attitude loop", *attitude_hz)?;
         model.check().map_err(refuse)?;
         if attitude_hz * self.time.dt_s > 1.0 + ROUNDING {
             return Err(ScenarioError::new(format!(

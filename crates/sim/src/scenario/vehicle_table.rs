@@ -1,16 +1,12 @@
 //! The table `[vehicle]`: what kind of body a vehicle is.
 
-use std::fmt;
 use std::path::Path;
 
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{MapAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 use super::error::{Place, ScenarioError};
 use super::files;
-use super::limits::positive;
 use super::spec::Scenario;
 use super::suggest::suggest;
 use super::vehicle::DEFAULT_ATTITUDE_HZ;
@@ -74,7 +70,7 @@ fn is_none(drag_per_s: &f64) -> bool {
 }
 
 /// A model by name, by file, or with all of its keys.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum ModelKey {
     /// A built-in model, or the path of a file.
@@ -86,30 +82,6 @@ enum ModelKey {
 impl Default for ModelKey {
     fn default() -> Self {
         Self::Named(POINT.to_owned())
-    }
-}
-
-impl<'de> Deserialize<'de> for ModelKey {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct ModelVisitor;
-
-        impl<'de> Visitor<'de> for ModelVisitor {
-            type Value = ModelKey;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a model, the path of its file, or a table of its keys")
-            }
-
-            fn visit_str<E>(self, name: &str) -> Result<ModelKey, E> {
-                Ok(ModelKey::Named(name.to_owned()))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<ModelKey, A::Error> {
-                Model::deserialize(MapAccessDeserializer::new(keys)).map(|model| ModelKey::Given(Box::new(model)))
-            }
-        }
-
-        deserializer.deserialize_any(ModelVisitor)
     }
 }
 
@@ -131,7 +103,6 @@ impl VehicleTable {
 
     /// The body that it describes.
     pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
-        self.check_numbers()?;
         match &self.model {
             ModelKey::Named(name) if name == POINT => {
                 self.without_rotors("a point")?;
@@ -184,21 +155,6 @@ impl VehicleTable {
             ground_effect: self.ground_effect.unwrap_or_default(),
             downwash: self.downwash.unwrap_or_default(),
         })))
-    }
-
-    /// Refuses numbers that no kind of vehicle can have.
-    fn check_numbers(&self) -> Result<(), ScenarioError> {
-        let numbers = [
-            ("vehicle.attitude_hz", "the rate of the attitude loop", self.attitude_hz),
-            ("vehicle.attitude_rad_s", "the frequency of the attitude loop", self.attitude_rad_s),
-            ("vehicle.attitude_damping", "the damping ratio of the attitude loop", self.attitude_damping),
-            ("vehicle.min_speed_m_s", "the least speed", self.min_speed_m_s),
-            ("vehicle.max_speed_m_s", "the largest speed", self.max_speed_m_s),
-            ("vehicle.max_turn_rad_s", "the largest rate of the heading", self.max_turn_rad_s),
-            ("vehicle.max_accel_m_s2", "the largest acceleration", self.max_accel_m_s2),
-        ];
-        let mut given = numbers.into_iter().filter_map(|(key, what, number)| Some((key, what, number?)));
-        given.try_for_each(|(key, what, number)| positive(key, what, number).map(|_| ()))
     }
 
     /// Refuses what only quadrotors have.

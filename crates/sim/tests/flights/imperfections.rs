@@ -23,7 +23,7 @@ const ALL: [&str; 16] = [
     "network.loss_burst=3",
     "network.rate_hz=50",
     "network.missing=extrapolate",
-    "actuation.control_hz=60",
+    "time.control_hz=60",
     "actuation.max_accel_m_s2=2",
     "actuation.lag_s=0.05",
     "law.kind=displacement",
@@ -108,7 +108,7 @@ fn certificates_are_void_with_the_reason() {
         ("network.rate_hz=50", Void::HeardLate),
         ("actuation.max_accel_m_s2=1", Void::AccelerationLimited),
         ("actuation.lag_s=0.01", Void::AccelerationLate),
-        ("actuation.control_hz=60", Void::CommandsHeld),
+        ("time.control_hz=60", Void::CommandsHeld),
         ("failure=[{vehicle=1, at_s=0.5, kind=\"dead\"}]", Void::VehicleFails),
     ] {
         let (flight, _) = fly(&builtin("pentagon", &["time.duration_s=1", set]));
@@ -335,7 +335,6 @@ fn a_wrong_imperfection_is_refused_at_its_place() {
         (&["network.rate_hz=1e8"], "scenario/step-too-long"),
         (&["actuation.max_accel_m_s2=0"], "scenario/out-of-range"),
         (&["actuation.lag_s=0.1", ideal], "scenario/unsupported-by-plant"),
-        (&["actuation.control_hz=50", "time.control_hz=60"], "scenario/exclusive-keys"),
         (&[&failure("vehicle=6, at_s=1, kind=\"dead\"")], "scenario/unknown-vehicle"),
         (&[&failure("vehicle=1, at_s=500, kind=\"dead\"")], "scenario/outside-flight"),
         (&[&failure("vehicle=1, at_s=5, kind=\"silent\"")], "scenario/missing-key"),

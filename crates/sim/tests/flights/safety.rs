@@ -65,8 +65,10 @@ fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
         slots.swap_rows(1, 4);
         let start =
             Swarm { positions_m: cloud(0), velocities_m_s: Rows::from_fn(6, |i, k| random(400 + 3 * i + k) - 0.5) };
-        let mut scenario =
-            Scenario { safety: Safety::Ellipsoid { half_height_m: 0.5 * ratio }, ..five_seconds(start, slots) };
+        let mut scenario = Scenario {
+            safety: Safety::Ellipsoid { half_axes_m: [0.5, 0.5, 0.5 * ratio] },
+            ..five_seconds(start, slots)
+        };
         scenario.hull_radius_m.fill(0.1);
         scenario.validate().expect("a scenario that can be flown");
         let (flight, log) = fly(&scenario);
@@ -115,7 +117,7 @@ fn what_is_no_ellipsoid_or_cannot_be_kept_is_refused_with_its_remedy() {
     for (sets, code) in [
         (&["safety.shape=egg"][..], "scenario/unknown-choice"),
         (&["safety.shape=ellipsoid"], "scenario/missing-key"),
-        (&[axes], "scenario/inconsistent"),
+        (&[axes], "scenario/unknown-key"),
         (&["safety.shape=ellipsoid", "safety.half_axes_m=[0.5, 0.4, 1.0]"], "scenario/inconsistent"),
         (&["safety.shape=ellipsoid", "safety.half_axes_m=[0.5, 0.5, -1.0]"], "scenario/out-of-range"),
         (&["safety.shape=ellipsoid", "safety.half_axes_m=[0.6, 0.6, 1.0]"], "scenario/inconsistent"),

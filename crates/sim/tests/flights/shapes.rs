@@ -158,7 +158,7 @@ fn a_file_of_points_may_name_its_columns_and_gives_the_number_of_vehicles() {
         ("0,0\n3\n", "scenario/file"),
         ("0,0,0,0\n", "scenario/file"),
         ("7\n8\n", "scenario/file"),
-        ("0,0\n3,nan\n", "scenario/out-of-range"),
+        ("0,0\n3,nan\n", "scenario/file"),
         ("0,0\n1,0\n", "scenario/within-delta"),
     ] {
         let error = read(wrong).expect_err(wrong);

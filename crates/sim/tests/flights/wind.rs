@@ -30,7 +30,7 @@ fn settled(more: &str) -> Scenario {
 }
 
 fn gust(at_s: f64, velocity_m_s: Vector, vehicles: Option<Vec<usize>>) -> Gust {
-    Gust { at_s, rise_s: 1.0, hold_s: 0.5, fall_s: 1.5, velocity_m_s, vehicles }
+    Gust { at_s, rise_s: 1.0, hold_s: 0.5, fall_s: Some(1.5), velocity_m_s, vehicles }
 }
 
 /// Distances of all pairs at all samples.
@@ -232,7 +232,7 @@ fn what_is_certified_of_a_wind_is_certified_for_as_long_as_it_is() {
     assert_eq!(held.certified_until_s, Some(30.0));
     assert!(held.certified_m < certificate(rest).certified_m);
     let passing =
-        certificate(&format!("{rest}[wind]\ngust = {{ at_s = 3.0, rise_s = 1.0, velocity_m_s = [2.0, 0.0] }}\n"));
+        certificate(&format!("{rest}[wind]\ngust = [{{ at_s = 3.0, rise_s = 1.0, velocity_m_s = [2.0, 0.0] }}]\n"));
     assert!(passing.certified_until_s.is_none() && passing.certified_m < certificate(rest).certified_m);
 
     let turbulent = |shared: bool| format!("dryden = {{ speed_20ft_m_s = 5.0, height_m = 10.0 }}\nshared = {shared}\n");
@@ -256,7 +256,7 @@ fn a_windy_scenario_is_written_back_and_read_again_bit_for_bit() {
     let scenario = builtin("gusts", &[]);
     let again = read(&scenario.resolved_toml());
     assert_eq!(again, scenario);
-    assert_eq!(again.wind.gusts[0].fall_s, 1.5, "as long as it rises");
+    assert_eq!(again.wind.gusts[0].fall_s(), 1.5, "as long as it rises");
     let own = read(&builtin("gusts", &["wind.shared=false"]).resolved_toml());
     assert!(!own.wind.shared);
 }
@@ -284,9 +284,9 @@ fn a_wind_that_cannot_be_flown_in_is_refused_with_its_place_and_remedy() {
         assert!(error.help().is_some() && (error.place().is_some() || error.field().is_some()), "{error}");
         error
     };
-    let gust = |keys: &str| format!("wind.gust={{at_s = 1.0, rise_s = 1.0, velocity_m_s = [1.0, 0.0], {keys}}}");
+    let gust = |keys: &str| format!("wind.gust=[{{at_s = 1.0, rise_s = 1.0, velocity_m_s = [1.0, 0.0], {keys}}}]");
     let gust_of = |at_s: f64, rise_s: f64| {
-        format!("wind.gust={{at_s = {at_s:?}, rise_s = {rise_s:?}, velocity_m_s = [1.0, 0.0]}}")
+        format!("wind.gust=[{{at_s = {at_s:?}, rise_s = {rise_s:?}, velocity_m_s = [1.0, 0.0]}}]")
     };
     for (set, code) in [
         ("vehicle.drag_per_s=-0.1", "scenario/out-of-range"),

@@ -4,7 +4,7 @@ use super::bounds::{Bound, Variation};
 use super::method::Method;
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::as_toml;
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, takes_whole_numbers_alone};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, takes_integers_only};
 use tautline_sim::sim::SimError;
 
 /// A place between two bounds, neither an end nor the middle, at which a key is tried.
@@ -262,7 +262,7 @@ impl Plan {
     fn bound(&self, variation: &Variation) -> Result<(Bound, Scenario), AttackError> {
         let Variation { ref key, low, high } = *variation;
         let read = |value: f64| self.with(&[format!("{key}={}", as_toml(value))]);
-        let whole = takes_whole_numbers_alone(&self.source, &self.overrides, key);
+        let whole = takes_integers_only(&self.source, &self.overrides, key);
         let refused = |value: f64| move |error| AttackError::Scenario { set: format!("{key} = {value}"), error };
         if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
             read(end).map_err(refused(end))?;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::search::Range;
 use tautline_core::text::as_toml;
 use tautline_sim::preflight::{PredictedMargin, Preflight};
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_whole_numbers_alone};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
 use tautline_sim::sim::SimError;
 
 /// Where neither start nor flight has randomness, a start that is flown more than once is moved by up to this part of delta along
@@ -126,7 +126,7 @@ impl Plan {
         let (overrides, key) = (overrides.to_vec(), key.to_owned());
         let mut plan = Self { source, overrides, template, key, range, whole: false, asked, jitter: None, predicted };
         let ends = [plan.scenario(range.from, 0)?, plan.scenario(range.to, 0)?];
-        plan.whole = takes_whole_numbers_alone(&plan.source, &plan.overrides, &plan.key);
+        plan.whole = takes_integers_only(&plan.source, &plan.overrides, &plan.key);
         let is_random = plan.template.start_is_random() || ends.iter().any(Scenario::is_random_in_flight);
         let moves = asked.runs > 1 && !is_random;
         plan.jitter = moves.then(|| format!("start.jitter_m={:?}", JITTER * plan.own().delta_m));
@@ -209,7 +209,7 @@ impl Plan {
 
 /// Whether two keys are one: how often commands are given has two names.
 fn is_same(key: &str, other: &str) -> bool {
-    let name = |key: &str| if key == "time.control_hz" { "actuation.control_hz".to_owned() } else { key.to_owned() };
+    let name = |key: &str| if key == "time.control_hz" { "time.control_hz".to_owned() } else { key.to_owned() };
     name(key) == name(other)
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::wind::WindSpec;
 
 fn gust(velocity_m_s: Vector3<f64>, vehicles: Option<Vec<usize>>) -> Gust {
-    Gust { at_s: 1.0, rise_s: 2.0, hold_s: 1.0, fall_s: 2.0, velocity_m_s, vehicles }
+    Gust { at_s: 1.0, rise_s: 2.0, hold_s: 1.0, fall_s: Some(2.0), velocity_m_s, vehicles }
 }
 
 fn blown(wind: &WindSpec) -> Blown<'_> {

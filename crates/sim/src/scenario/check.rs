@@ -1,0 +1,361 @@
+//! Checks the tree of a file against the schema, and brings it into the form that serde reads.
+//!
+//! Every key, type, word and bound is checked here and nowhere else; what depends on several keys is checked in
+//! `validate`. TOML writes a table whose keys depend on a choice (`kind`, `shape`) flat; serde reads the choice as
+//! `kind = { NAME = { keys } }`.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::ScenarioError;
+use super::limits::{LARGEST, SMALLEST};
+use super::schema::{Node, tables_with};
+use super::suggest::suggest;
+
+/// Longest part of an unknown name that a message repeats \[characters\].
+const NAME_CHARS: usize = 40;
+
+/// A value that the schema does not admit: the error, without a place, and the offending bytes.
+pub(super) struct Misfit {
+    pub(super) error: ScenarioError,
+    pub(super) span: Range<usize>,
+    /// Keys and entries down to the value, innermost first.
+    path: Vec<String>,
+}
+
+impl Misfit {
+    fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Box<Self> {
+        let error = ScenarioError::new(message).coded(code).with_help(help);
+        Box::new(Self { error, span, path: Vec::new() })
+    }
+
+    fn below(mut self: Box<Self>, key: impl ToString) -> Box<Self> {
+        self.path.push(key.to_string());
+        self
+    }
+
+    /// The error with its dotted path as its key, for a scenario without a text.
+    pub(super) fn without_text(self) -> ScenarioError {
+        let path: Vec<_> = self.path.into_iter().rev().collect();
+        self.error.at(path.join("."))
+    }
+}
+
+/// Checks a file against the schema and nests its choices. Spans from `overridden_from` on are those of overrides: a choice that an
+/// override makes drops the keys of the file that belong to another choice.
+pub(super) fn conform(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), Box<Misfit>> {
+    Check { overridden_from }.value(file, Node::root(), "scenario", None)
+}
+
+struct Check {
+    overridden_from: usize,
+}
+
+impl Check {
+    /// Checks a value. `name` is its key; `own_name` stands for a tag that is not given.
+    fn value(
+        &self,
+        value: &mut Spanned<DeValue<'_>>,
+        node: Node,
+        name: &str,
+        own_name: Option<(&str, Range<usize>)>,
+    ) -> Result<(), Box<Misfit>> {
+        let span = value.span();
+        if let (Some(node), DeValue::Table(table)) = (node.values(), value.get_mut()) {
+            return table.iter_mut().try_for_each(|(key, value)| {
+                let name = &**key.get_ref();
+                self.value(value, node, name, Some((name, key.span()))).map_err(|misfit| misfit.below(name))
+            });
+        }
+        if node.is_table() {
+            return match value.get_mut() {
+                DeValue::Table(table) => self.table(table, node, &span, own_name),
+                other => Err(wrong_type(name, node, other, span)),
+            };
+        }
+        let words = node.words();
+        if !words.is_empty() {
+            return match value.get_ref().as_str() {
+                Some(word) if words.contains(&word) => Ok(()),
+                Some(word) => Err(unknown_choice(word, &words, span)),
+                None => Err(wrong_type(name, node, value.get_ref(), span)),
+            };
+        }
+        let alternatives = node.alternatives();
+        if !alternatives.is_empty() {
+            let Some(node) = alternatives.into_iter().find(|part| admits(*part, value.get_ref())) else {
+                return Err(wrong_type(name, node, value.get_ref(), span));
+            };
+            return self.value(value, node, name, None);
+        }
+        if !admits(node, value.get_ref()) {
+            return Err(wrong_type(name, node, value.get_ref(), span));
+        }
+        if let DeValue::Array(list) = value.get_ref() {
+            let of = |keyword: &str| node.keyword(keyword).as_u64();
+            let lengths = of("minItems").unwrap_or(0)..=of("maxItems").unwrap_or(u64::MAX);
+            if !lengths.contains(&(list.len() as u64)) {
+                return Err(wrong_type(name, node, value.get_ref(), span));
+            }
+        }
+        match value.get_mut() {
+            DeValue::Array(list) => {
+                let Some(node) = node.items() else { return Ok(()) };
+                list.iter_mut().enumerate().try_for_each(|(entry, value)| {
+                    self.value(value, node, name, None).map_err(|misfit| misfit.below(entry + 1))
+                })
+            }
+            number @ (DeValue::Integer(_) | DeValue::Float(_)) => in_range(name, node, number, span),
+            _ => Ok(()),
+        }
+    }
+
+    fn table(
+        &self,
+        table: &mut DeTable<'_>,
+        node: Node,
+        span: &Range<usize>,
+        own_name: Option<(&str, Range<usize>)>,
+    ) -> Result<(), Box<Misfit>> {
+        let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
+        let chosen = match alternatives.first().and_then(|part| part.tag()) {
+            Some((tag, _)) => self.chosen(table, tag, &alternatives, span, own_name, node)?,
+            None => None,
+        };
+        let known = |key: &str| node.property(key).or_else(|| chosen?.property(key));
+        for (key, value) in table.iter_mut() {
+            let name = key.get_ref();
+            let Some(node) = known(name) else {
+                let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
+                return Err(unknown_key(name, known, key.span()));
+            };
+            // The tag is known already.
+            if node.keyword("const").is_null() {
+                self.value(value, node, name, None).map_err(|misfit| misfit.below(name))?;
+            }
+        }
+        let required = node.required().chain(chosen.into_iter().flat_map(Node::required));
+        if let Some(missing) = required.into_iter().find(|key| !table.contains_key(*key)) {
+            let help = format!("`{missing}` is {}", known(missing).map_or_else(String::new, expected));
+            let misfit = Misfit::new("scenario/missing-key", format!("missing key `{missing}`"), help, span.clone());
+            return Err(misfit);
+        }
+        if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
+            nest(table, node, chosen, tag);
+        }
+        Ok(())
+    }
+
+    /// The alternative that a table takes by its tag, which is completed where it has a default.
+    fn chosen(
+        &self,
+        table: &mut DeTable<'_>,
+        tag: &'static str,
+        alternatives: &[Node],
+        span: &Range<usize>,
+        own_name: Option<(&str, Range<usize>)>,
+        node: Node,
+    ) -> Result<Option<Node>, Box<Misfit>> {
+        let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
+        let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
+        let (name, at) = match (table.get(tag), &own_name, default) {
+            (Some(value), ..) => match value.get_ref().as_str() {
+                Some(name) => (name.to_owned(), value.span()),
+                None => {
+                    let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
+                    return Err(Misfit::new("scenario/wrong-type", message, about(node), value.span()).below(tag));
+                }
+            },
+            (None, Some((own, at)), _) => ((*own).to_owned(), at.clone()),
+            (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
+            // A table may do without, as `[[leg]]` does.
+            (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
+            (None, None, None) => {
+                let help = format!("give one of {}", listed(&names));
+                return Err(Misfit::new("scenario/missing-key", format!("missing key `{tag}`"), help, span.clone()));
+            }
+        };
+        let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
+            let mut misfit = unknown_choice(&name, &names, at);
+            if own_name.is_some() && !table.contains_key(tag) {
+                let help = format!(
+                    "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
+                    misfit.error.help().unwrap_or_default()
+                );
+                misfit.error = misfit.error.with_help(help);
+            }
+            return Err(misfit.below(tag));
+        };
+        if at.start >= self.overridden_from {
+            let is_left = |key: &str, value: &Spanned<DeValue<'_>>| {
+                value.span().start < self.overridden_from
+                    && node.property(key).is_none()
+                    && chosen.property(key).is_none()
+                    && alternatives.iter().any(|part| part.property(key).is_some())
+            };
+            let left = table.iter().filter(|(key, value)| is_left(key.get_ref(), value));
+            let left: Vec<_> = left.map(|(key, _)| key.get_ref().to_string()).collect();
+            for key in left {
+                table.remove(&*key);
+            }
+        }
+        let name = DeValue::String(Cow::Owned(name));
+        table.entry(Spanned::new(at.clone(), tag.into())).or_insert(Spanned::new(at, name));
+        Ok(Some(chosen))
+    }
+}
+
+/// Moves the keys of a choice into a table of its name, below its tag.
+fn nest(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
+    let Some((tag_key, name)) = table.remove_entry(tag) else { return };
+    let span = name.span();
+    let DeValue::String(name) = name.into_inner() else { return };
+    let mut keys = DeTable::new();
+    for key in chosen.keys().filter(|key| node.property(key).is_none()) {
+        if let Some((key, value)) = table.remove_entry(key) {
+            keys.insert(key, value);
+        }
+    }
+    let mut choice = DeTable::new();
+    choice.insert(Spanned::new(span.clone(), name), Spanned::new(span.clone(), DeValue::Table(keys)));
+    table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
+}
+
+/// Whether a value is of the type of a part.
+fn admits(node: Node, value: &DeValue<'_>) -> bool {
+    match value {
+        DeValue::Table(_) => node.is_table(),
+        DeValue::Array(_) => node.kind() == "array",
+        DeValue::String(_) => node.kind() == "string" || !node.words().is_empty(),
+        DeValue::Boolean(_) => node.kind() == "boolean",
+        DeValue::Integer(_) => matches!(node.kind(), "integer" | "number"),
+        DeValue::Float(_) => node.kind() == "number",
+        DeValue::Datetime(_) => false,
+    }
+}
+
+/// Refuses a number that is not finite, too large or small to compute with, or out of the bounds of the schema.
+fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), Box<Misfit>> {
+    let (written, number) = match number {
+        DeValue::Integer(written) => {
+            let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
+                let message = format!("`{name}` must be at most {}, got {}", i64::MAX, written.as_str());
+                return Err(Misfit::new("scenario/out-of-range", message, about(node), span));
+            };
+            (whole.to_string(), whole as f64)
+        }
+        DeValue::Float(written) => {
+            let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
+            (if number.is_finite() { number.to_string() } else { written.as_str().to_owned() }, number)
+        }
+        _ => return Ok(()),
+    };
+    let bound = |keyword: &str| node.keyword(keyword).as_f64();
+    let refuse = |must: String| {
+        let message = format!("`{name}` must be {must}, got {written}");
+        Err(Misfit::new("scenario/out-of-range", message, about(node), span.clone()))
+    };
+    if !number.is_finite() {
+        return refuse("a finite number".to_owned());
+    }
+    match (bound("exclusiveMinimum"), bound("minimum"), bound("maximum")) {
+        (Some(least), ..) if number <= least => return refuse(format!("more than {least}")),
+        (_, Some(least), Some(most)) if number < least || number > most => {
+            return refuse(format!("from {least} to {most}"));
+        }
+        (_, Some(least), _) if number < least => return refuse(format!("at least {least}")),
+        (_, _, Some(most)) if number > most => return refuse(format!("at most {most}")),
+        _ => {}
+    }
+    if node.kind() == "integer" {
+        return Ok(());
+    }
+    if number.abs() > LARGEST {
+        return refuse(format!("at most {LARGEST:e} in magnitude"));
+    }
+    if bound("exclusiveMinimum") == Some(0.0) && number < SMALLEST {
+        return refuse(format!("at least {SMALLEST:e}"));
+    }
+    Ok(())
+}
+
+fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> Box<Misfit> {
+    known.sort_unstable();
+    known.dedup();
+    let help = match tables_with(name)[..] {
+        [] => suggest(name, &known),
+        ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
+    };
+    Misfit::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).below(name)
+}
+
+fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> Box<Misfit> {
+    let message = format!("unknown choice `{}`", short(name));
+    Misfit::new("scenario/unknown-choice", message, suggest(name, known), span)
+}
+
+fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> Box<Misfit> {
+    let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
+    Misfit::new("scenario/wrong-type", message, about(node), span)
+}
+
+/// A value in words.
+fn found(value: &DeValue<'_>) -> String {
+    match value {
+        DeValue::String(text) => format!("the text \"{}\"", short(text)),
+        DeValue::Integer(number) => number.as_str().to_owned(),
+        DeValue::Float(number) => number.as_str().to_owned(),
+        DeValue::Boolean(flag) => flag.to_string(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(list) => format!("a list of {}", list.len()),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}
+
+/// The type of a part in words.
+fn expected(node: Node) -> String {
+    let words = node.words();
+    if !words.is_empty() {
+        return listed(&words);
+    }
+    if node.is_table() {
+        return "a table".to_owned();
+    }
+    match node.kind() {
+        "number" => "a number".to_owned(),
+        "integer" => "a whole number".to_owned(),
+        "boolean" => "true or false".to_owned(),
+        "string" => "text".to_owned(),
+        "array" => {
+            let of = node.items().map_or_else(String::new, |items| match items.kind() {
+                "number" => " numbers".to_owned(),
+                "integer" => " whole numbers".to_owned(),
+                "array" => " lists".to_owned(),
+                _ => " entries".to_owned(),
+            });
+            match (node.keyword("minItems").as_u64(), node.keyword("maxItems").as_u64()) {
+                (Some(least), Some(most)) if least == most => format!("a list of {least}{of}"),
+                (Some(least), Some(most)) => format!("a list of {least} to {most}{of}"),
+                _ => format!("a list of{of}"),
+            }
+        }
+        _ => node.alternatives().into_iter().map(expected).collect::<Vec<_>>().join(" or "),
+    }
+}
+
+/// What a key means, in the first sentence of its description.
+fn about(node: Node) -> String {
+    let about = node.about().unwrap_or("`tautline schema` describes every key");
+    about.split_once(". ").map_or(about, |(first, _)| first).replace('\n', " ")
+}
+
+fn listed(names: &[&str]) -> String {
+    names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ")
+}
+
+fn short(name: &str) -> String {
+    name.chars().take(NAME_CHARS).collect()
+}
