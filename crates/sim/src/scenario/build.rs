@@ -4,19 +4,18 @@
 //! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
 //! it; [`super::validate`] judges the rest.
 
-use super::chance;
 use super::document::{Document, StartShape, StartTable};
+use super::document::{PerVehicle, Point, rows};
 use super::error::ScenarioError;
+use super::formation::is_flat;
+use super::formation::{check_slots, legs, listed_slots};
 use super::graph::{edge_count, graph};
-use super::legs::{check_slots, legs, listed_slots};
 use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memory};
 use super::reference::ReferenceTable;
-use super::slots::is_flat;
 use super::spec::{Safety, Scenario, Space};
 use super::start;
 use super::text::Text;
 use super::time::bounded_record_hz;
-use super::values::{PerVehicle, Point, rows};
 use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
@@ -168,7 +167,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
 
 /// Positions and velocities at time 0.
 fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
-    let mut random = chance::random(table.seed);
+    let mut random = super::start::random(table.seed);
     let mut positions_m = match (&table.positions_m, &table.shape) {
         (Some(points), None) => rows(points),
         (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,

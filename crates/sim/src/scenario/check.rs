@@ -11,9 +11,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::ScenarioError;
+use super::error::suggest;
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
-use super::suggest::suggest;
 
 /// Longest part of an unknown name that a message repeats \[characters\].
 const NAME_CHARS: usize = 40;

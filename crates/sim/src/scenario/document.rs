@@ -3,25 +3,26 @@
 //! Read by `deserializer`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
 //! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::actuation::ActuationSpec;
 use super::failure::Failure;
 use super::graph::GraphTable;
-use super::laws::Laws;
 use super::network::NetworkSpec;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::sensing::SensingSpec;
-use super::shapes::{FileKeys, ImageKeys, SvgKeys, TextKeys};
-use super::shapes::{HelixKeys, SpacingKeys, VKeys};
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety};
+use super::template::Laws;
 use super::time::TimeSpec;
-use super::values::{LegStart, PerVehicle, Point};
-use super::vehicle_table::VehicleTable;
+use super::vehicle::VehicleTable;
+use tautline_core::swarm::{Rows, set_row};
+use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;
-use tautline_laws::target::{Arrival, Breathing};
+use tautline_laws::target::{Arrival, Begins, Breathing};
 use tautline_laws::wind::WindSpec;
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
@@ -388,4 +389,209 @@ fn is_unscaled(scale: &f64) -> bool {
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
+}
+
+/// Keys of `shape = "v"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct VKeys {
+    /// Distance between neighbours on an arm in m, and of the nearest slots; 1.5 times `law.delta_m` unless given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+    /// Angle between the arms in degrees, from 60 to 180.
+    #[serde(default = "right_angle_deg")]
+    #[schemars(range(min = 60, max = 180))]
+    pub(super) angle_deg: f64,
+}
+
+fn right_angle_deg() -> f64 {
+    90.0
+}
+
+/// Keys of a shape that has a spacing alone.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SpacingKeys {
+    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+}
+
+/// Keys of `shape = "helix"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HelixKeys {
+    /// Radius in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) radius_m: f64,
+    /// Rise of a full turn in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) pitch_m: f64,
+    /// Distance between neighbours in m, and of the nearest slots; 1.5 times `law.delta_m` unless this or `turns` is
+    /// given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+    /// Turns from the first slot to the last, in place of `spacing_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) turns: Option<f64>,
+}
+
+/// Keys of `shape = "text"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TextKeys {
+    /// What is written; a line break begins a line below.
+    #[schemars(length(min = 1, max = 1000))]
+    pub(super) text: String,
+    /// Height of all that is written in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) height_m: Option<f64>,
+    /// Width of all that is written in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) width_m: Option<f64>,
+    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+}
+
+/// Keys of `shape = "svg"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SvgKeys {
+    /// Path data, as the attribute `d` of SVG has it.
+    pub(super) path: Option<String>,
+    /// An SVG file, in place of `path`; relative to the folder of the scenario file.
+    pub(super) file: Option<PathBuf>,
+    /// Whether slots fill what the lines surround, instead of standing on them.
+    #[serde(default)]
+    pub(super) filled: bool,
+    /// Height of the drawing in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) height_m: Option<f64>,
+    /// Width of the drawing in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) width_m: Option<f64>,
+    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+}
+
+/// Keys of `shape = "image"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ImageKeys {
+    /// A PNG picture; relative to the folder of the scenario file.
+    pub(super) file: PathBuf,
+    /// Which pixels are drawn: the opaque ones of a picture that has others, or else the dark ones, unless given.
+    #[serde(default)]
+    #[schemars(with = "Ink")]
+    pub(super) ink: Option<Ink>,
+    /// Height of what is drawn in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) height_m: Option<f64>,
+    /// Width of what is drawn in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) width_m: Option<f64>,
+    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+}
+
+/// Keys of `shape = "file"`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FileKeys {
+    /// A text file with a line for each slot: x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
+    /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
+    pub(super) file: PathBuf,
+}
+
+/// One number for all vehicles or a list with one for each.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum PerVehicle {
+    /// The same for all.
+    All(#[schemars(extend("exclusiveMinimum" = 0))] f64),
+    /// One for each.
+    Each(#[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))] Vec<f64>),
+}
+
+/// x, y and, unless it is 0, z.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
+#[serde(untagged)]
+pub(super) enum Point {
+    /// In the plane z = 0.
+    Plane([f64; 2]),
+    /// In space.
+    Space([f64; 3]),
+}
+
+/// Two vehicles, counted from 1.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub(super) struct Edge(#[schemars(inner(range(min = 1)))] pub(super) [u64; 2]);
+
+impl Point {
+    /// x, y and z.
+    pub(super) fn coordinates(self) -> [f64; 3] {
+        match self {
+            Self::Plane([x, y]) => [x, y, 0.0],
+            Self::Space(coordinates) => coordinates,
+        }
+    }
+}
+
+/// Some vehicles, counted from 1, or all of them.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Vehicles {
+    /// All of them.
+    All(All),
+    /// These.
+    Listed(#[schemars(inner(range(min = 1)))] Vec<u64>),
+}
+
+/// The word `all`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum All {
+    /// All of them.
+    All,
+}
+
+/// When a leg begins.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum LegStart {
+    /// Once the one before it is reached.
+    When(Reached),
+    /// At this time in s.
+    At(f64),
+}
+
+/// The word `reached`.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Reached {
+    /// Once the one before it is reached.
+    Reached,
+}
+
+impl LegStart {
+    pub(super) fn begins(self) -> Begins {
+        match self {
+            Self::When(Reached::Reached) => Begins::Reached,
+            Self::At(start_s) => Begins::At(start_s),
+        }
+    }
+}
+
+/// A row for each point.
+pub(super) fn rows(points: &[Point]) -> Rows {
+    let mut rows = Rows::zeros(points.len());
+    for (i, point) in points.iter().enumerate() {
+        set_row(&mut rows, i, point.coordinates().into());
+    }
+    rows
 }

@@ -3,10 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chance;
+use super::document::Edge;
 use super::error::ScenarioError;
 use super::limits::pair_count;
-use super::values::Edge;
 use tautline_laws::graph::{Graph, GraphError};
 
 /// Links of a vehicle of a random graph, in the mean, unless given.
@@ -120,8 +119,8 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
             .at("graph.degree"));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);
-    let mut numbers = chance::random(seed);
-    Ok(Graph::random(count, edges, |end| chance::below(end as u64, &mut numbers)))
+    let mut numbers = super::start::random(seed);
+    Ok(Graph::random(count, edges, |end| super::start::below(end as u64, &mut numbers)))
 }
 
 fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {

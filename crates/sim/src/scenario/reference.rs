@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::document::{All, Point, Vehicles};
 use super::error::ScenarioError;
 use super::limits::SMALLEST;
-use super::values::{All, Point, Vehicles};
 use tautline_laws::graph::Pinning;
 use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
 
@@ -168,7 +168,7 @@ impl ReferenceTable {
 
 impl ReferenceKind {
     fn of_file(file: &Path) -> Result<Self, ScenarioError> {
-        let (times_s, points_m) = super::points::places(file)?;
+        let (times_s, points_m) = super::files::places(file)?;
         Ok(Self::Spline { points_m, times_s })
     }
 

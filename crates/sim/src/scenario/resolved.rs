@@ -10,13 +10,13 @@ use super::document::{
     Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, NoiseTable, PlantTable, SafetyTable,
     StartTable, SwarmTable,
 };
+use super::document::{Edge, LegStart, PerVehicle, Point};
 use super::graph::{GraphKind, GraphTable};
-use super::laws::Laws;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
 use super::spec::{Scenario, Space};
-use super::values::{Edge, LegStart, PerVehicle, Point};
-use super::vehicle_table::VehicleTable;
+use super::template::Laws;
+use super::vehicle::VehicleTable;
 use tautline_core::swarm::Rows;
 use tautline_laws::target::{Begins, Leg};
 

@@ -5,13 +5,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
+use super::error::suggest;
 use super::error::{Place, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
 use super::overrides::Override;
 use super::spec::Scenario;
-use super::suggest::suggest;
 use super::text::Text;
-use super::{build, builtin, laws};
+use super::{build, builtin, template};
 
 /// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
 /// each. Reading takes about 45 times the length of the file in memory.
@@ -118,7 +118,7 @@ pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, Scenar
 pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
-    laws::check(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
+    template::check_laws(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
     let scenario = build::scenario(document, text).map_err(|error| text.place(error))?;
     scenario.check().map_err(|error| text.place(error))?;
     Ok(scenario)
@@ -126,13 +126,13 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
 
 /// Finds the files that shapes of the scenario and its reference name, from a folder.
 fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
-    super::slots::found_from(folder, &mut document.formation.shape)?;
+    super::formation::found_from(folder, &mut document.formation.shape)?;
     if let Some(reference) = &mut document.reference {
         reference.found_from(folder)?;
     }
     for (number, leg) in document.leg.iter_mut().enumerate() {
         if let Some(shape) = &mut leg.shape {
-            super::slots::found_from(folder, shape).map_err(|error| error.on_leg(number + 1))?;
+            super::formation::found_from(folder, shape).map_err(|error| error.on_leg(number + 1))?;
         }
     }
     Ok(())

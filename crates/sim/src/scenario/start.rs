@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::chance::{below, unit};
 use super::document::StartShape;
 use super::error::ScenarioError;
 use super::spec::Space;
@@ -105,4 +105,28 @@ pub fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) -> Vect
     let mut along = || half_extent_m * (2.0 * unit(random) - 1.0);
     let (x, y) = (along(), along());
     Vector3::new(x, y, if space == Space::Volume { along() } else { 0.0 })
+}
+
+/// The random numbers of a seed.
+#[must_use]
+pub fn random(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// A whole number below `end`, each as likely as any other: words that would favour the smaller ones are drawn again.
+#[expect(clippy::cast_possible_truncation, reason = "it is below a number of vehicles")]
+pub(super) fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
+    let fair = u64::MAX - u64::MAX % end;
+    loop {
+        let word = random.next_u64();
+        if word < fair {
+            return (word % end) as usize;
+        }
+    }
+}
+
+/// Uniform in \[0, 1), a multiple of 2^-53.
+pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
+    const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
+    (random.next_u64() >> 11) as f64 * SCALE
 }

@@ -6,13 +6,13 @@ use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
     first_within, may_be_in_a_name, require_finite,
 };
-use super::spec::{Scenario, Space};
+use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
 use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
-use tautline_laws::target::{Begins, Guidance, Leg};
+use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg};
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
@@ -407,4 +407,65 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
     .coded("scenario/disconnected")
     .with_help("add edges until every vehicle can be reached from every other")
     .at("graph.edges"))
+}
+
+impl Scenario {
+    pub(super) fn check_breathing(&self) -> Result<(), ScenarioError> {
+        let hold_s = self.breathing.hold_s;
+        if hold_s >= self.time.duration_s {
+            let duration_s = self.time.duration_s;
+            return Err(ScenarioError::new(format!(
+                "spread slots are held for {hold_s} s of a flight of {duration_s} s"
+            ))
+            .coded("scenario/outside-flight")
+            .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
+            .at("breathing.hold_s")
+            .at("time.duration_s"));
+        }
+        if self.breathing.mode == BreathingMode::Start
+            && let Ok(law) = self.law()
+            && law.capabilities().settling.is_none()
+        {
+            return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
+                .coded("scenario/unsupported-by-law")
+                .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
+                .at("breathing.mode")
+                .at("law.kind"));
+        }
+        Ok(())
+    }
+}
+
+/// Two safety distances that differ by less than this part are the same.
+const ROUNDING: f64 = 1e-9;
+
+impl Scenario {
+    /// An ellipsoid of revolution as wide as delta, under a law that keeps ellipsoids apart.
+    pub(super) fn check_safety(&self) -> Result<(), ScenarioError> {
+        let Safety::Ellipsoid { half_axes_m: [a_m, b_m, _] } = self.safety else { return Ok(()) };
+        let key = "safety.half_axes_m";
+        if a_m != b_m {
+            return Err(ScenarioError::new(format!("an ellipsoid with level half axes of {a_m} m and {b_m} m"))
+                .with_help("vehicles turn: give both the same, the larger one")
+                .at(key));
+        }
+        let (delta_m, width_m) = (self.delta_m, 2.0 * a_m);
+        if (delta_m - width_m).abs() > ROUNDING * width_m {
+            return Err(ScenarioError::new(format!(
+                "a safety distance of {delta_m} m, and ellipsoids that touch side by side at {width_m} m"
+            ))
+            .with_help("leave law.delta_m out: it is twice the level half axes")
+            .at("law.delta_m")
+            .at(key));
+        }
+        let Ok(law) = self.law() else { return Ok(()) };
+        if law.capabilities().uses_ellipsoid_metric {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))
+            .coded("scenario/unsupported-by-law")
+            .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
+            .at("safety.shape")
+            .at("law.kind"))
+    }
 }

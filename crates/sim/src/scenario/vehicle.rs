@@ -1,9 +1,256 @@
-//! What a scenario must be for bodies that are more than points to be flown.
+//! The table `[vehicle]`: what kind of body a vehicle is.
 
-use super::error::ScenarioError;
-use super::spec::{Scenario, Space};
-use crate::vehicle::{Airframe, Fleet, Ground, ModelError, Quadrotor};
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::suggest;
+use super::error::{Place, ScenarioError};
+use super::files;
+use super::spec::{PlantSpec, Scenario, Space};
+use crate::vehicle::{self, Airframe, Fleet, Ground, Heading, MODELS, Misread, Model, ModelError, Quadrotor, Unicycle};
+use tautline_core::swarm::row;
 use tautline_laws::space::{Obstacle, Shape};
+
+const MODEL: &str = "vehicle.model";
+const POINT: &str = "point";
+const UNICYCLE: &str = "unicycle";
+
+/// What kind of body a vehicle is.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct VehicleTable {
+    /// `point`, which carries out accelerations exactly; `unicycle`, which goes where it looks and cannot stop; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
+    /// in TOML that holds one, or its keys as a table.
+    model: ModelKey,
+    /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    attitude_hz: Option<f64>,
+    /// Frequency that its attitude loop asks for in rad/s, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    attitude_rad_s: Option<f64>,
+    /// Damping ratio that it asks for, in the place of the model's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    attitude_damping: Option<f64>,
+    /// Whether a quadrotor's thrust grows near a ground: a half-space among the obstacles. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ground_effect: Option<bool>,
+    /// Whether its rotors blow on vehicles below. Not unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    downwash: Option<bool>,
+    /// Least speed of a unicycle in m/s, which cannot stop: 0.2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    min_speed_m_s: Option<f64>,
+    /// Its largest speed in m/s: 3 unless given. At the least one its speed never changes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    max_speed_m_s: Option<f64>,
+    /// Largest rate of its heading in rad/s: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    max_turn_rad_s: Option<f64>,
+    /// Its largest acceleration along its heading in m/s^2: 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    max_accel_m_s2: Option<f64>,
+    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
+    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    #[serde(skip_serializing_if = "is_none")]
+    #[schemars(extend("minimum" = 0))]
+    pub(super) drag_per_s: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_none(drag_per_s: &f64) -> bool {
+    *drag_per_s == 0.0
+}
+
+/// A model by name, by file, or with all of its keys.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+enum ModelKey {
+    /// A built-in model, or the path of a file.
+    Named(String),
+    /// Its keys.
+    Given(Box<Model>),
+}
+
+impl Default for ModelKey {
+    fn default() -> Self {
+        Self::Named(POINT.to_owned())
+    }
+}
+
+impl VehicleTable {
+    /// Reads the file of a model that is named by one, relative to a folder.
+    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        if let ModelKey::Named(name) = &self.model
+            && name.contains(['/', '\\', '.'])
+        {
+            self.model = ModelKey::Given(Box::new(read(&folder.join(name))?));
+        }
+        Ok(())
+    }
+
+    /// Whether vehicles are points.
+    pub(super) fn is_point(&self) -> bool {
+        matches!(&self.model, ModelKey::Named(name) if name == POINT)
+    }
+
+    /// The body that it describes.
+    pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
+        match &self.model {
+            ModelKey::Named(name) if name == POINT => {
+                self.without_rotors("a point")?;
+                self.without_limits("a point")?;
+                Ok(Airframe::Point)
+            }
+            ModelKey::Named(name) if name == UNICYCLE => {
+                self.without_rotors("a unicycle")?;
+                Ok(Airframe::Unicycle(self.unicycle()))
+            }
+            _ => {
+                self.without_limits("a quadrotor")?;
+                self.quadrotor()
+            }
+        }
+    }
+
+    fn unicycle(&self) -> Unicycle {
+        let Unicycle { min_speed_m_s, max_speed_m_s, max_turn_rad_s, max_accel_m_s2 } = Unicycle::default();
+        Unicycle {
+            min_speed_m_s: self.min_speed_m_s.unwrap_or(min_speed_m_s),
+            max_speed_m_s: self.max_speed_m_s.unwrap_or(max_speed_m_s),
+            max_turn_rad_s: self.max_turn_rad_s.unwrap_or(max_turn_rad_s),
+            max_accel_m_s2: self.max_accel_m_s2.unwrap_or(max_accel_m_s2),
+        }
+    }
+
+    fn quadrotor(&self) -> Result<Airframe, ScenarioError> {
+        let mut model = match &self.model {
+            ModelKey::Given(model) => Model::clone(model),
+            ModelKey::Named(name) => {
+                let known = MODELS.map(|(known, _)| known);
+                let found =
+                    MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
+                found.ok_or_else(|| {
+                    let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
+                    let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
+                    ScenarioError::new(format!("there is no model `{name}`"))
+                        .coded("scenario/unknown-choice")
+                        .with_help(help)
+                        .at(MODEL)
+                })?
+            }
+        };
+        model.attitude_rad_s = self.attitude_rad_s.unwrap_or(model.attitude_rad_s);
+        model.attitude_damping = self.attitude_damping.unwrap_or(model.attitude_damping);
+        Ok(Airframe::Quadrotor(Box::new(Quadrotor {
+            model,
+            attitude_hz: self.attitude_hz.unwrap_or(DEFAULT_ATTITUDE_HZ),
+            ground_effect: self.ground_effect.unwrap_or_default(),
+            downwash: self.downwash.unwrap_or_default(),
+        })))
+    }
+
+    /// Refuses what only quadrotors have.
+    fn without_rotors(&self, what: &str) -> Result<(), ScenarioError> {
+        let given = [
+            ("vehicle.attitude_hz", self.attitude_hz.is_some()),
+            ("vehicle.attitude_rad_s", self.attitude_rad_s.is_some()),
+            ("vehicle.attitude_damping", self.attitude_damping.is_some()),
+            ("vehicle.ground_effect", self.ground_effect.is_some()),
+            ("vehicle.downwash", self.downwash.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has neither attitude nor rotors"))
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses what only unicycles have.
+    fn without_limits(&self, what: &str) -> Result<(), ScenarioError> {
+        let given = [
+            ("vehicle.min_speed_m_s", self.min_speed_m_s.is_some()),
+            ("vehicle.max_speed_m_s", self.max_speed_m_s.is_some()),
+            ("vehicle.max_turn_rad_s", self.max_turn_rad_s.is_some()),
+            ("vehicle.max_accel_m_s2", self.max_accel_m_s2.is_some()),
+        ];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(ScenarioError::new(format!("{what} has no such limit"))
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("leave this key out, or set vehicle.model to \"unicycle\"")
+                .at(key)
+                .at(MODEL)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What was read stands there: a built-in model by its name, another one with its keys.
+impl From<&Scenario> for VehicleTable {
+    fn from(scenario: &Scenario) -> Self {
+        let drag_per_s = scenario.drag_per_s;
+        let quadrotor = match &scenario.airframe {
+            Airframe::Point => return Self { drag_per_s, ..Self::default() },
+            Airframe::Unicycle(unicycle) => return Self { drag_per_s, ..Self::from(unicycle) },
+            Airframe::Quadrotor(quadrotor) => quadrotor,
+        };
+        let model = &quadrotor.model;
+        let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
+        let is_it = |(_, other): &(&str, Model)| {
+            let (attitude_rad_s, attitude_damping) = (model.attitude_rad_s, model.attitude_damping);
+            Model { attitude_rad_s, attitude_damping, ..other.clone() } == *model
+        };
+        let name = built_in.into_iter().find(is_it).map(|(name, _)| name.to_owned());
+        Self {
+            model: name.map_or_else(|| ModelKey::Given(Box::new(model.clone())), ModelKey::Named),
+            attitude_hz: Some(quadrotor.attitude_hz),
+            attitude_rad_s: Some(model.attitude_rad_s),
+            attitude_damping: Some(model.attitude_damping),
+            ground_effect: Some(quadrotor.ground_effect),
+            downwash: Some(quadrotor.downwash),
+            drag_per_s,
+            ..Self::default()
+        }
+    }
+}
+
+impl From<&Unicycle> for VehicleTable {
+    fn from(unicycle: &Unicycle) -> Self {
+        Self {
+            model: ModelKey::Named(UNICYCLE.to_owned()),
+            min_speed_m_s: Some(unicycle.min_speed_m_s),
+            max_speed_m_s: Some(unicycle.max_speed_m_s),
+            max_turn_rad_s: Some(unicycle.max_turn_rad_s),
+            max_accel_m_s2: Some(unicycle.max_accel_m_s2),
+            ..Self::default()
+        }
+    }
+}
+
+/// Reads the file of a model.
+fn read(path: &Path) -> Result<Model, ScenarioError> {
+    let shown = path.display().to_string();
+    let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
+        ScenarioError::new(format!("{shown} is not UTF-8"))
+            .coded("scenario/file")
+            .with_help("save the file as UTF-8 text")
+            .at(MODEL)
+    })?;
+    vehicle::read(&text).map_err(|Misread { message, help, span }| {
+        ScenarioError::new(message).coded("scenario/file").with_help(help).with_place(Place::new(&shown, &text, span))
+    })
+}
 
 /// Default rate of the attitude loop \[Hz\].
 pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
@@ -70,5 +317,68 @@ impl Scenario {
             .at("time.dt_s"));
         }
         model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at("vehicle.attitude_hz"))
+    }
+}
+
+/// A start may be off a limit of speed by this part of it, which is rounding.
+const SPEED_ROUNDING: f64 = 1e-9;
+
+impl Scenario {
+    /// Limits that are some, and a start in the plane that keeps to them.
+    pub(super) fn check_unicycle(&self) -> Result<(), ScenarioError> {
+        let Some(unicycle) = self.airframe.unicycle() else { return Ok(()) };
+        let Unicycle { min_speed_m_s, max_speed_m_s, .. } = *unicycle;
+        if min_speed_m_s > max_speed_m_s {
+            return Err(ScenarioError::new(format!(
+                "the least speed of {min_speed_m_s} m/s is more than the largest of {max_speed_m_s} m/s"
+            ))
+            .with_help("reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s")
+            .at("vehicle.min_speed_m_s")
+            .at("vehicle.max_speed_m_s"));
+        }
+        if self.space != Space::Plane {
+            return Err(ScenarioError::new("unicycles move in the plane z = 0, and this swarm lives in space")
+                .coded("scenario/plane")
+                .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
+                .at("vehicle.model")
+                .at("swarm.dimensions"));
+        }
+        if !matches!(self.plant, PlantSpec::Rapier) {
+            return Err(ScenarioError::new("the ideal plant flies points and quadrotors, no unicycles")
+                .coded("scenario/unsupported-by-plant")
+                .with_help("leave out plant.kind: the way of a unicycle is solved in closed form")
+                .at("plant.kind")
+                .at("vehicle.model"));
+        }
+        if self.a22_per_s != 0.0 {
+            return Err(ScenarioError::new("a unicycle has no velocity coefficient a22")
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("leave out swarm.a22_per_s")
+                .at("swarm.a22_per_s")
+                .at("vehicle.model"));
+        }
+        if self.drag_per_s != 0.0 || !self.wind.is_still() {
+            let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
+            return Err(ScenarioError::new("a unicycle does not feel the air")
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
+                .at(key)
+                .at("vehicle.model"));
+        }
+        for i in 0..self.count() {
+            let speed_m_s = Heading::of(row(&self.start.velocities_m_s, i)).speed_m_s;
+            let (least, most) = (min_speed_m_s * (1.0 - SPEED_ROUNDING), max_speed_m_s * (1.0 + SPEED_ROUNDING));
+            if !(least..=most).contains(&speed_m_s) {
+                return Err(ScenarioError::new(format!(
+                    "vehicle {} starts at {speed_m_s} m/s, and a unicycle here goes at {min_speed_m_s} to {max_speed_m_s} m/s",
+                    i + 1
+                )).coded("scenario/out-of-range")
+                .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
+                .at_entry("start.velocities_m_s", i)
+                .at("vehicle.min_speed_m_s")
+                .at("vehicle.model"));
+            }
+        }
+        Ok(())
     }
 }

@@ -1,0 +1,451 @@
+//! `[formation]` and `[[leg]]` of the scenario file as legs: shapes into slots, placed and assigned one after the other.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::document::{Assignment, FormationShape, FormationTable, LegTable};
+use super::document::{HelixKeys, ImageKeys, SvgKeys, TextKeys};
+use super::document::{LegStart, Point, rows};
+use super::error::ScenarioError;
+use super::files;
+use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, rounded_up};
+use super::spec::Scenario;
+use tautline_core::swarm::{Pair, Rows, row, set_row};
+use tautline_laws::formation::{
+    Drawing, DrawingError, Formation, Freedom, MAX_DRAWN_SLOTS, most_assigned, optimal_slots, optimal_slots_around,
+};
+use tautline_laws::target::{Begins, Leg};
+
+/// Slots of the pentagon.
+const PENTAGON_COUNT: usize = 5;
+
+/// How slots are placed.
+struct Placement {
+    scale: f64,
+    yaw_rad: f64,
+    offset_m: Vector3<f64>,
+}
+
+/// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
+pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
+    let (count, delta_m) = (scenario.count(), scenario.delta_m);
+    let placement = Placement::of(first.scale, first.yaw_deg, first.move_m);
+    let leg = placement.place(Leg::first(formation(&first.shape, count, delta_m)?));
+    scenario.legs.push(leg);
+    let mut assignments = std::iter::once(first.assignment).chain(later.iter().map(|leg| leg.assignment));
+    let freedom = if assignments.any(|by| by != Assignment::Given) { freedom(scenario)? } else { None };
+    let is_interchangeable = interchangeable(scenario, 0, first.assignment)?;
+    scenario.legs[0].interchangeable = is_interchangeable;
+    let starts_m = scenario.start.positions_m.clone();
+    let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+    let assign = |leg: &mut Leg, by: Assignment, from_m: &Rows| assign(leg, by, from_m, (freedom, leader));
+    assign(&mut scenario.legs[0], first.assignment, &starts_m);
+    for (number, table) in later.iter().enumerate() {
+        let placement = Placement::of(table.scale, table.yaw_deg, table.move_m);
+        let before = scenario.legs[number].formation.clone();
+        let formation = table
+            .shape
+            .as_ref()
+            .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
+            .map_err(|error| error.on_leg(number + 1))?;
+        let begins = table.start_s.map_or(Begins::Reached, LegStart::begins);
+        let interchangeable = interchangeable(scenario, number + 1, table.assignment)?;
+        let mut leg = placement.place(Leg { formation, begins, interchangeable });
+        assign(&mut leg, table.assignment, &before.slots_m);
+        scenario.legs.push(leg);
+    }
+    anchor(scenario);
+    Ok(())
+}
+
+/// How formations may be moved under the law of the scenario, where vehicles may be assigned to them.
+fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
+    let Ok(law) = scenario.law() else { return Ok(None) };
+    let leads = scenario.reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
+    // Wherever a leader is, slots are moved there.
+    let freedom = if leads { Freedom::Translation } else { law.capabilities().controls.freedom() };
+    let most = most_assigned(freedom);
+    if scenario.count() > most {
+        return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
+            .coded("scenario/out-of-range")
+            .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
+            .at("formation.assignment")
+            .at("swarm.count"));
+    }
+    Ok(Some(freedom))
+}
+
+/// Whether a leg's vehicles may be given other slots where they are stalled. Nobody tells whether they are under a law that
+/// is not given spread slots then either, or where breathing is off.
+fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> Result<bool, ScenarioError> {
+    if assignment == Assignment::Given {
+        return Ok(false);
+    }
+    let Ok(law) = scenario.law() else { return Ok(false) };
+    let why = match (law.capabilities().settling, scenario.breathing.is_on()) {
+        (Some(_), true) => return Ok(true),
+        (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
+        (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),
+    };
+    if assignment != Assignment::WhenStalled {
+        return Ok(false);
+    }
+    Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
+        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
+        .at_leg(leg, "formation.assignment")
+        .at("law.kind")
+        .at("breathing.mode"))
+}
+
+/// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.
+fn assign(leg: &mut Leg, by: Assignment, from_m: &Rows, (freedom, leader): (Option<Freedom>, Option<usize>)) {
+    let (Assignment::Optimal, Some(freedom)) = (by, freedom) else { return };
+    let slots = match leader {
+        Some(leader) => optimal_slots_around(from_m, &leg.formation, leader),
+        None => optimal_slots(from_m, &leg.formation, freedom),
+    };
+    // What is not finite is told by validation.
+    if let Some(slots) = slots {
+        leg.formation = leg.formation.reordered(&slots);
+    }
+}
+
+impl Placement {
+    fn of(scale: f64, yaw_deg: f64, move_m: Option<Point>) -> Self {
+        let offset_m = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
+        Self { scale, yaw_rad: yaw_deg.to_radians(), offset_m }
+    }
+
+    fn place(&self, leg: Leg) -> Leg {
+        let &Self { scale, yaw_rad, offset_m } = self;
+        if scale == 1.0 && yaw_rad == 0.0 && offset_m == Vector3::zeros() {
+            return leg;
+        }
+        leg.placed(scale, yaw_rad, offset_m)
+    }
+}
+
+/// Moves each leg so that a leader's slot is where the leader is on the reference: it listens to nobody, and so the swarm is
+/// formed around it.
+fn anchor(scenario: &mut Scenario) {
+    let Some(leader) = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader()) else { return };
+    let place_m = row(&scenario.start.positions_m, leader) - scenario.reference_at(0.0).position_m;
+    for leg in &mut scenario.legs {
+        let slots_m = &mut leg.formation.slots_m;
+        let move_m = place_m - row(slots_m, leader);
+        // What is not finite is told of whom it is.
+        if move_m != Vector3::zeros() && move_m.iter().all(|x| x.is_finite()) {
+            (0..slots_m.nrows()).for_each(|i| {
+                let slot_m = row(slots_m, i) + move_m;
+                set_row(slots_m, i, slot_m);
+            });
+            // Not a rounding beside it.
+            set_row(slots_m, leader, place_m);
+        }
+    }
+}
+
+/// Number of slots of a shape that has its own.
+pub(super) fn listed_slots(shape: &FormationShape) -> Option<usize> {
+    match shape {
+        FormationShape::Points { points_m } => Some(points_m.len()),
+        FormationShape::Pentagon { .. } => Some(PENTAGON_COUNT),
+        _ => None,
+    }
+}
+
+/// Refuses a leg whose list of slots is not as long as there are vehicles.
+pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), ScenarioError> {
+    let listed = legs.iter().map(|leg| leg.shape.as_ref().and_then(listed_slots));
+    for (number, slots) in listed.enumerate() {
+        if let Some(slots) = slots.filter(|&slots| slots != count) {
+            return Err(ScenarioError::new(format!("leg {} has {slots} slots for {count} vehicles", number + 2))
+                .coded("scenario/count-mismatch")
+                .with_help("every leg needs a slot for each vehicle")
+                .at_leg(number + 1, "formation.points_m")
+                .at("swarm.count"));
+        }
+    }
+    Ok(())
+}
+
+/// The formation of a shape.
+pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
+    Ok(match shape {
+        &FormationShape::Pentagon { side_m } => Formation::pentagon(side_m),
+        &FormationShape::Circle { radius_m } => Formation::circle(count, radius_m),
+        &FormationShape::Line { spacing_m } => Formation::line(count, spacing_m),
+        &FormationShape::Grid { spacing_m } => Formation::grid(count, spacing_m),
+        &FormationShape::Sphere { radius_m } => Formation::sphere(count, radius_m),
+        FormationShape::V(keys) => Formation::v(count, spacing(keys.spacing_m, delta_m), keys.angle_deg.to_radians()),
+        FormationShape::Wedge(keys) => Formation::wedge(count, spacing(keys.spacing_m, delta_m)),
+        FormationShape::Rings(keys) => Formation::rings(count, spacing(keys.spacing_m, delta_m)),
+        FormationShape::Cube(keys) => Formation::cube(count, spacing(keys.spacing_m, delta_m)),
+        FormationShape::Helix(keys) => helix(keys, count, delta_m)?,
+        FormationShape::Points { points_m } => Formation::points(rows(points_m)),
+        FormationShape::Text(keys) => text(keys, count, delta_m)?,
+        FormationShape::Svg(keys) => svg(keys, count, delta_m)?,
+        FormationShape::Image(keys) => image(keys, count, delta_m)?,
+        FormationShape::File(keys) => Formation::points(rows(&super::files::slots(&keys.file)?)),
+    })
+}
+
+/// Makes a shape's file, named relative to a folder, one that can be opened from where the program runs, and a file of
+/// points a list of them.
+pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
+    match shape {
+        FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),
+        FormationShape::Image(keys) => keys.file = folder.join(&keys.file),
+        FormationShape::File(keys) => {
+            *shape = FormationShape::Points { points_m: super::files::slots(&folder.join(&keys.file))? };
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Whether all slots lie in the plane z = 0.
+pub(super) fn is_flat(shape: &FormationShape) -> bool {
+    match shape {
+        FormationShape::Points { points_m } => points_m.iter().all(|point| point.coordinates()[2] == 0.0),
+        FormationShape::Sphere { .. } | FormationShape::Helix(_) | FormationShape::Cube(_) => false,
+        _ => true,
+    }
+}
+
+fn spacing(spacing_m: Option<f64>, delta_m: f64) -> f64 {
+    spacing_m.unwrap_or(DEFAULT_SPACING * delta_m)
+}
+
+/// Part of the spacing by which rounding may bring slots of a helix nearer.
+const ROUNDING: f64 = 1e-12;
+
+/// How much steeper a helix is tried to be until its turns keep the spacing.
+const STEEPER: f64 = 1.01;
+
+fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
+    let HelixKeys { radius_m, pitch_m, .. } = *keys;
+    if let Some(turns) = keys.turns {
+        if keys.spacing_m.is_some() {
+            return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
+                .coded("scenario/exclusive-keys")
+                .with_help("keep one of them")
+                .at("formation.turns")
+                .at("formation.spacing_m"));
+        }
+        let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
+        return Ok(Formation::helix(count, radius_m, pitch_m, step_rad));
+    }
+    let spacing_m = spacing(keys.spacing_m, delta_m);
+    let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
+        return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
+            .coded("scenario/shape")
+            .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
+            .at("formation.radius_m")
+            .at("formation.spacing_m"));
+    };
+    let keeps = |pitch_m: f64, step_rad: f64| {
+        Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
+    };
+    if !keeps(pitch_m, step_rad) {
+        // With less, a slot is too near to the one above it wherever that is.
+        let flattest_m = pitch_m.max(0.5 * spacing_m);
+        let steeper = std::iter::successors(Some(flattest_m), |pitch_m| Some(pitch_m * STEEPER));
+        let steeper = steeper.take_while(|&pitch_m| pitch_m <= 2.0 * spacing_m);
+        let enough = |&pitch_m: &f64| {
+            Formation::helix_step_rad(radius_m, pitch_m, spacing_m).is_some_and(|step_rad| keeps(pitch_m, step_rad))
+        };
+        let enough_m = steeper.skip(1).find(enough).unwrap_or(2.0 * spacing_m);
+        return Err(ScenarioError::new(format!(
+            "turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m"
+        ))
+        .coded("scenario/shape")
+        .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
+        .at("formation.pitch_m")
+        .at("formation.spacing_m"));
+    }
+    Ok(Formation::helix(count, radius_m, pitch_m, step_rad))
+}
+
+const TEXT: &str = "formation.text";
+const PATH: &str = "formation.path";
+
+/// How large a drawing shall be.
+#[derive(Clone, Copy)]
+enum Size {
+    /// By a dimension of all of it \[m\].
+    Of(Dimension, f64),
+    /// By the distance of the nearest slots \[m\].
+    Spacing(f64),
+}
+
+/// Height or width: its key, what has it, and its axis.
+#[derive(Clone, Copy)]
+struct Dimension {
+    key: &'static str,
+    name: &'static str,
+    axis: usize,
+}
+
+const HEIGHT: Dimension = Dimension { key: "formation.height_m", name: "high", axis: 1 };
+const WIDTH: Dimension = Dimension { key: "formation.width_m", name: "wide", axis: 0 };
+const SPACING: &str = "formation.spacing_m";
+
+/// The size that is asked for, by one key at most.
+fn size(
+    height_m: Option<f64>,
+    width_m: Option<f64>,
+    spacing_m: Option<f64>,
+    delta_m: f64,
+) -> Result<Size, ScenarioError> {
+    match (height_m, width_m, spacing_m) {
+        (Some(height_m), None, None) => Ok(Size::Of(HEIGHT, height_m)),
+        (None, Some(width_m), None) => Ok(Size::Of(WIDTH, width_m)),
+        (None, None, Some(spacing_m)) => Ok(Size::Spacing(spacing_m)),
+        (None, None, None) => Ok(Size::Spacing(DEFAULT_SPACING * delta_m)),
+        _ => {
+            let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
+            let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
+                .coded("scenario/exclusive-keys")
+                .with_help("keep one of them: each decides how large the drawing is");
+            Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
+        }
+    }
+}
+
+/// The letters of a text.
+pub(super) fn text(keys: &TextKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
+    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let drawing = Drawing::text(&keys.text).map_err(|error| refused(&error, TEXT, None))?;
+    sized(&drawing, size, count, delta_m, TEXT)
+}
+
+/// SVG path data or an SVG file.
+pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
+    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let (drawing, key) = match (&keys.path, &keys.file) {
+        (Some(data), None) => (Drawing::path(data, keys.filled).map_err(|error| refused(&error, PATH, None))?, PATH),
+        (None, Some(file)) => {
+            let bytes = files::bytes(file, files::KEY)?;
+            (Drawing::svg(&bytes, keys.filled).map_err(|error| refused(&error, files::KEY, Some(file)))?, files::KEY)
+        }
+        (given, _) => {
+            let (code, said) = if given.is_some() {
+                ("scenario/exclusive-keys", "both `path` and `file` are given")
+            } else {
+                ("scenario/missing-key", "neither `path` nor `file` is given")
+            };
+            return Err(ScenarioError::new(said)
+                .coded(code)
+                .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
+                .at(PATH)
+                .at(files::KEY));
+        }
+    };
+    sized(&drawing, size, count, delta_m, key)
+}
+
+/// A picture.
+pub(super) fn image(keys: &ImageKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
+    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let bytes = files::bytes(&keys.file, files::KEY)?;
+    let drawing = Drawing::png(&bytes, keys.ink).map_err(|error| refused(&error, files::KEY, Some(&keys.file)))?;
+    sized(&drawing, size, count, delta_m, files::KEY)
+}
+
+/// The slots of a drawing, at its size.
+fn sized(
+    drawing: &Drawing,
+    size: Size,
+    count: usize,
+    delta_m: f64,
+    key: &'static str,
+) -> Result<Formation, ScenarioError> {
+    let mut formation = drawing.slots(count).map_err(|error| refused(&error, key, None))?;
+    let (pair, nearest) = formation.min_distance().unwrap_or((Pair::new(0, 1), f64::INFINITY));
+    if nearest == 0.0 {
+        return Err(ScenarioError::new(format!("slots {pair} of what is drawn are the same point"))
+            .coded("scenario/within-delta")
+            .with_help("draw longer lines or larger areas, or fly fewer vehicles")
+            .at(key)
+            .at("swarm.count"));
+    }
+    let scale = match size {
+        Size::Spacing(spacing_m) => spacing_m / nearest,
+        Size::Of(dimension, asked_m) => dimension.scale(drawing, asked_m, count, nearest, delta_m)?,
+    };
+    formation.slots_m *= scale;
+    Ok(formation)
+}
+
+impl Dimension {
+    /// What a drawing, whose nearest slots are this near, is enlarged by to have the dimension that is asked for, if
+    /// its slots then are more than delta apart.
+    fn scale(
+        self,
+        drawing: &Drawing,
+        asked_m: f64,
+        count: usize,
+        nearest: f64,
+        delta_m: f64,
+    ) -> Result<f64, ScenarioError> {
+        let Self { key, name, axis } = self;
+        let drawn = drawing.size()[axis];
+        if drawn == 0.0 {
+            return Err(ScenarioError::new(format!("what is drawn is a straight line, and not {asked_m} m {name}"))
+                .coded("scenario/shape")
+                .with_help("give its other dimension, or spacing_m")
+                .at(key));
+        }
+        let scale = asked_m / drawn;
+        let nearest_m = scale * nearest;
+        if nearest_m >= delta_m * (1.0 + SLOT_MARGIN) {
+            return Ok(scale);
+        }
+        let enough_m = rounded_up(delta_m * (1.0 + SLOT_MARGIN) / nearest * drawn);
+        Err(ScenarioError::new(format!(
+            "in a drawing {asked_m} m {name}, {count} vehicles come as near as {nearest_m} m, not more than delta = \
+             {delta_m} m"
+        ))
+        .coded("scenario/within-delta")
+        .with_help(format!(
+            "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
+             vehicles"
+        ))
+        .at(key)
+        .at("swarm.count")
+        .at("law.delta_m"))
+    }
+}
+
+/// What cannot be drawn, at the key that says it.
+fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> ScenarioError {
+    let help = match error {
+        DrawingError::Glyph(_) => "letters, digits and signs of Latin, Greek and Cyrillic scripts are drawn".to_owned(),
+        DrawingError::Length(_) => "shorten it".to_owned(),
+        DrawingError::Letters { letters, .. } => {
+            format!("fly at least {letters} vehicles, about ten for each letter to be read")
+        }
+        DrawingError::Path(_) => "write it as in SVG, for example path = \"M 0 0 L 4 0 L 2 3 Z\"".to_owned(),
+        DrawingError::Svg(_) => "save the drawing as plain SVG".to_owned(),
+        DrawingError::Nesting(_) => "ungroup its elements".to_owned(),
+        DrawingError::Png(_) => "save the picture as PNG".to_owned(),
+        DrawingError::Pixels { .. } => "save it smaller: slots need few pixels".to_owned(),
+        DrawingError::NotFinite => "draw nearer to the origin".to_owned(),
+        DrawingError::Empty if key == TEXT => "give at least one letter".to_owned(),
+        DrawingError::Empty => {
+            "there must be lines or areas with an extent; in an SVG file letters are to be made paths, in a picture \
+                                `ink` says which pixels count"
+                .to_owned()
+        }
+        DrawingError::Slots(_) => format!("fly at most {MAX_DRAWN_SLOTS} vehicles"),
+    };
+    let shown = file.map_or_else(String::new, |file| format!("{}: ", file.display()));
+    let refused = ScenarioError::new(format!("{shown}{error}")).coded("scenario/shape").with_help(help).at(key);
+    if matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_)) {
+        refused.at("swarm.count")
+    } else {
+        refused
+    }
+}
