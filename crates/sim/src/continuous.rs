@@ -25,7 +25,7 @@ use flow::{Flow, FreeMotion, packed};
 use nalgebra::Vector3;
 
 use crate::feedback::Feedback;
-use crate::plant::{Air, Path};
+use crate::plant::{Air, Path, Plant, PlantError};
 use crate::scenario::Scenario;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
@@ -164,8 +164,10 @@ pub struct Continuous {
     swarm: Swarm,
     /// Drag of the air included.
     a22_per_s: f64,
-    /// What blows, where anything does.
+    /// The wind, if any.
     air: Option<Air>,
+    /// Accelerations that are held where no law is asked, N x 3 \[m/s^2\].
+    held: Rows,
     /// Solver step that the error control came to last.
     step_s: f64,
 }
@@ -175,13 +177,7 @@ impl Continuous {
     #[must_use]
     pub fn new(scenario: &Scenario) -> Self {
         let (a22_per_s, air) = (scenario.velocity_coefficient_per_s(), Air::of(scenario));
-        Self { swarm: scenario.start.clone(), a22_per_s, air, step_s: FIRST_STEP_S }
-    }
-
-    /// Number of vehicles N.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.swarm.count()
+        Self { swarm: scenario.start.clone(), a22_per_s, air, held: Rows::zeros(scenario.count()), step_s: FIRST_STEP_S }
     }
 
     /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
@@ -197,7 +193,7 @@ impl Continuous {
     ///
     /// # Errors
     /// [`IdealError`]; the state is then not to be observed.
-    pub fn advance(
+    pub fn solve(
         &mut self,
         (from_s, dt_s): (f64, f64),
         feedback: &mut dyn Feedback,
@@ -242,32 +238,79 @@ impl Continuous {
         Ok(undefined)
     }
 
-    /// Writes the state.
-    pub fn observe(&self, swarm: &mut Swarm) {
+}
+
+/// Accelerations that do not change over a step.
+struct Held<'a>(&'a Rows);
+
+impl Feedback for Held<'_> {
+    fn command(&mut self, _time_s: f64, _truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
+        command.copy_from(self.0);
+        Ok(())
+    }
+}
+
+impl From<IdealError> for PlantError {
+    fn from(error: IdealError) -> Self {
+        match error {
+            IdealError::Law { source, .. } => Self::Law(source),
+            IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => Self::Stalled,
+        }
+    }
+}
+
+impl Plant for Continuous {
+    fn count(&self) -> usize {
+        self.swarm.count()
+    }
+
+    fn advance(&mut self, dt_s: f64, end: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
+        let held = std::mem::replace(&mut self.held, Rows::zeros(0));
+        let solved = self.solve((0.0, dt_s), &mut Held(&held), end, path);
+        self.held = held;
+        solved?;
+        Ok(())
+    }
+
+    fn holds_commands(&self) -> bool {
+        false
+    }
+
+    fn advance_under(
+        &mut self,
+        feedback: &mut dyn Feedback,
+        interval: (f64, f64),
+        end: &mut Swarm,
+        path: &mut Path,
+    ) -> Result<Option<LawError>, PlantError> {
+        Ok(self.solve(interval, feedback, end, path)?)
+    }
+
+    /// The state is complete: velocities do not jump in continuous time.
+    fn apply(&mut self, command: &Rows, _state: &mut Swarm) {
+        self.held.clone_from(command);
+    }
+
+    fn observe(&self, swarm: &mut Swarm) {
         swarm.clone_from(&self.swarm);
     }
 
-    /// Goes back to a state that was observed before the last step.
-    pub fn restore(&mut self, swarm: &Swarm) {
+    fn restore(&mut self, swarm: &Swarm) {
         self.swarm.clone_from(swarm);
         if let Some(air) = &mut self.air {
             air.undo();
         }
     }
 
-    /// What is recorded beside states, without values yet.
-    #[must_use]
-    pub fn channels(&self) -> Vec<Channel> {
+    fn channels(&self) -> Vec<Channel> {
         self.air.iter().map(|_| Air::channel()).collect()
     }
 
-    /// Writes the present values into [`Continuous::channels`].
-    pub fn write_channels(&self, channels: &mut [Channel]) {
+    fn write_channels(&self, channels: &mut [Channel]) {
         self.air.iter().zip(channels).for_each(|(air, channel)| air.write_channel(channel));
     }
 
-    /// Begins its random numbers anew.
-    pub fn reseed(&mut self, seed: u64) {
+    fn reseed(&mut self, seed: u64) {
         if let Some(air) = &mut self.air {
             air.reseed(seed);
         }
@@ -468,7 +511,7 @@ mod tests {
         let mut end = scenario.start.clone();
         let mut advance = |rate_hz: f64| {
             let mut path = Path::default();
-            Continuous::new(&scenario).advance((0.0, 0.1), &mut Switching(rate_hz), &mut end, &mut path)
+            Continuous::new(&scenario).solve((0.0, 0.1), &mut Switching(rate_hz), &mut end, &mut path)
         };
         assert_eq!(advance(20.0), Ok(None));
         assert!(matches!(advance(1e6), Err(IdealError::Stalled { .. })));

@@ -16,9 +16,13 @@ use std::time::Duration;
 
 use dyn_clone::DynClone;
 
+use crate::continuous::{self, Continuous};
+use crate::feedback::Feedback;
+use crate::scenario::{PlantSpec, Scenario};
 use crate::vehicle::Fleet;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm};
+use tautline_laws::law::LawError;
 
 /// What moves a swarm, however it is realised: p'' = a22 v + u (equation (1)) for the point vehicles.
 ///
@@ -38,6 +42,28 @@ pub trait Plant: DynClone + Send {
     /// # Errors
     /// [`PlantError`]; the plant then holds no state that may be observed.
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError>;
+
+    /// Whether a command is held over a step. Otherwise the plant is one of continuous time, which evaluates the law all the way
+    /// along ([`Plant::advance_under`]).
+    fn holds_commands(&self) -> bool {
+        true
+    }
+
+    /// Like [`Plant::advance`], from the time `from_s` \[s\] on, with commands from `feedback` in the place of the held one, in
+    /// a plant of continuous time. The result is the law's error where vehicles came to its barrier: they then moved on with
+    /// the accelerations that they had there.
+    ///
+    /// # Errors
+    /// [`PlantError`]; the plant then holds no state that may be observed.
+    fn advance_under(
+        &mut self,
+        _feedback: &mut dyn Feedback,
+        (_from_s, dt_s): (f64, f64),
+        end: &mut Swarm,
+        path: &mut Path,
+    ) -> Result<Option<LawError>, PlantError> {
+        self.advance(dt_s, end, path).map(|()| None)
+    }
 
     /// Takes the accelerations u \[m/s^2\], N x 3, to be held over the next step, and changes the velocities of `state` from
     /// what was predicted to what they are; positions stay, for they have been judged. Called again at the same instant it
@@ -77,6 +103,19 @@ pub trait Plant: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Plant);
 
+/// The plant of a scenario, at its start.
+#[must_use]
+pub fn of(scenario: &Scenario) -> Box<dyn Plant> {
+    if let Some(unicycle) = scenario.airframe.unicycle() {
+        return Box::new(Unicycles::new(*unicycle, &scenario.start));
+    }
+    match (scenario.plant, scenario.fleet()) {
+        (PlantSpec::Rapier, _) => rapier::plant(scenario),
+        (PlantSpec::Ideal, Some(fleet)) => Box::new(continuous::Quadrotors::new(fleet)),
+        (PlantSpec::Ideal, None) => Box::new(Continuous::new(scenario)),
+    }
+}
+
 /// A plant of quadrotors.
 pub trait Quadrotors: Plant {
     /// They, as they are now.
@@ -93,7 +132,7 @@ pub struct HullContact {
 }
 
 /// Why a plant could not carry out a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// A position or velocity left the range of the plant's numbers.
     #[error("the state of vehicle {} is no longer a finite number", vehicle + 1)]
@@ -104,4 +143,7 @@ pub enum PlantError {
     /// No step is short enough to solve the equations of motion.
     #[error("the equations of motion cannot be solved to their tolerances")]
     Stalled,
+    /// The law has no command on the way, in a plant of continuous time.
+    #[error(transparent)]
+    Law(#[from] LawError),
 }

@@ -1,7 +1,7 @@
 //! What is recorded of vehicles and link beside states and commands.
 
-use super::motion::Motion;
 use crate::link::Imperfections;
+use crate::plant::Plant;
 use tautline_core::record::Channel;
 
 /// The channels of a flight, vehicles' before link's, in memory that is used again for each sample.
@@ -13,17 +13,17 @@ pub(super) struct Channels {
 }
 
 impl Channels {
-    pub(super) fn of(motion: &Motion, link: &dyn Imperfections) -> Self {
-        let mut all = motion.channels();
+    pub(super) fn of(plant: &dyn Plant, link: &dyn Imperfections) -> Self {
+        let mut all = plant.channels();
         let vehicles = all.len();
         all.extend(link.channels());
         Self { all, vehicles }
     }
 
     /// Takes the present values.
-    pub(super) fn write(&mut self, motion: &Motion, link: &dyn Imperfections) {
+    pub(super) fn write(&mut self, plant: &dyn Plant, link: &dyn Imperfections) {
         let (vehicles, links) = self.all.split_at_mut(self.vehicles);
-        motion.write_channels(vehicles);
+        plant.write_channels(vehicles);
         link.write_channels(links);
     }
 

@@ -1,6 +1,6 @@
 //! The judge's place in the loop: every way is swept, and what it finds is kept for the next sample.
 
-use crate::plant::{HullContact, Path};
+use crate::plant::{HullContact, Path, Plant};
 use crate::scenario::Scenario;
 use tautline_audit::{
     AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Obstacle,
@@ -13,7 +13,6 @@ use tautline_laws::law::Law;
 use tautline_laws::space::{Metric, NearPairs};
 
 use super::ending::SimError;
-use super::motion::Motion;
 use super::obstacles::judged;
 
 /// The auditor with what the loop asks of it from step to step.
@@ -294,9 +293,9 @@ impl Judge {
     }
 
     /// Keeps the pairs whose keep-out balls the engine sees overlap for the first time, in index order.
-    pub(super) fn note_engine_contacts(&mut self, motion: &Motion, time_s: f64, events: &mut Vec<Event>) {
+    pub(super) fn note_engine_contacts(&mut self, plant: &dyn Plant, time_s: f64, events: &mut Vec<Event>) {
         self.contacts_now.clear();
-        motion.keep_out_contacts(&mut self.contacts_now);
+        plant.keep_out_contacts(&mut self.contacts_now);
         for &pair in &self.contacts_now {
             if let Err(place) = self.engine_contacts.binary_search(&pair) {
                 self.engine_contacts.insert(place, pair);
@@ -306,10 +305,10 @@ impl Judge {
     }
 
     /// Keeps the pairs whose hulls begin to push each other in the step that began at `from_s`, in index order.
-    pub(super) fn note_bounces(&mut self, motion: &Motion, from_s: f64, events: &mut Vec<Event>) {
+    pub(super) fn note_bounces(&mut self, plant: &dyn Plant, from_s: f64, events: &mut Vec<Event>) {
         std::mem::swap(&mut self.hulls_now, &mut self.hulls_before);
         self.hulls_now.clear();
-        motion.hull_contacts(&mut self.hulls_now);
+        plant.hull_contacts(&mut self.hulls_now);
         for &HullContact { pair, closing_m_s } in &self.hulls_now {
             if self.hulls_before.binary_search_by_key(&pair, |before| before.pair).is_err() {
                 self.bounces.push(Bounce { pair, time_s: from_s, closing_m_s });

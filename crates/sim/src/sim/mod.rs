@@ -1,8 +1,8 @@
 //! The loop: sense, supervise, command, actuate, move, judge, record.
 //!
 //! A [`Simulation`] is advanced step by step; [`fly`] takes one to its end and hands everything that is recorded to a
-//! [`Sink`]. The law is asked at the beginning of each step; a [`Motion`] either holds its command over the step or
-//! stands for continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
+//! [`Sink`]. The law is asked at the beginning of each step; a [`Plant`](crate::plant::Plant) either holds its command over the step or
+//! is one of continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
 //! shortened too. A step allocates nothing.
 
 mod channels;
@@ -10,7 +10,6 @@ mod controller;
 mod ending;
 mod integration;
 mod judge;
-mod motion;
 mod obstacles;
 mod parts;
 mod resolution;
@@ -21,7 +20,6 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
-pub use motion::Motion;
 pub use obstacles::{judged, judged_shape};
 pub use parts::Parts;
 pub use simulation::{Saved, Simulation};

@@ -1,8 +1,8 @@
 //! What a flight is made of beside its scenario.
 
 use super::ending::SimError;
-use super::motion::Motion;
 use crate::link::{self, Imperfections};
+use crate::plant::{self, Plant};
 use crate::scenario::Scenario;
 use tautline_laws::law::Law;
 use tautline_laws::target::{Schedule, Supervisor};
@@ -12,7 +12,7 @@ pub struct Parts {
     /// The control law.
     pub law: Box<dyn Law>,
     /// What moves the vehicles.
-    pub motion: Motion,
+    pub plant: Box<dyn Plant>,
     /// What lies between truth and law.
     pub link: Box<dyn Imperfections>,
     /// Who changes the target.
@@ -41,6 +41,6 @@ impl Parts {
             }
             None => supervisor,
         };
-        Self { law, motion: Motion::of(scenario), link, supervisor: Box::new(supervisor) }
+        Self { law, plant: plant::of(scenario), link, supervisor: Box::new(supervisor) }
     }
 }

@@ -7,11 +7,10 @@ use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
 use super::integration::IntegrationError;
 use super::judge::{Judge, Judged};
-use super::motion::Motion;
 use super::parts::Parts;
 use super::resolution::Resolution;
 use super::watch::Watch;
-use crate::plant::Path;
+use crate::plant::{Path, Plant};
 use crate::scenario::Scenario;
 use tautline_core::record::{Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
@@ -41,7 +40,7 @@ pub struct Simulation {
     scenario: Scenario,
     resolution: Resolution,
     controller: Controller,
-    motion: Motion,
+    plant: Box<dyn Plant>,
     certificate: Certificate,
     judge: Judge,
     state: Swarm,
@@ -91,10 +90,10 @@ impl Simulation {
     /// # Errors
     /// [`SimError`] where there is no judge.
     pub fn with(scenario: &Scenario, parts: Parts) -> Result<Self, SimError> {
-        let Parts { law, motion, link, supervisor } = parts;
+        let Parts { law, plant, link, supervisor } = parts;
         let count = scenario.count();
-        if motion.count() != count {
-            return Err(SimError::Vehicles { expected: count, found: motion.count() });
+        if plant.count() != count {
+            return Err(SimError::Vehicles { expected: count, found: plant.count() });
         }
         let certificate =
             scenario.certificate(law.as_ref()).void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges);
@@ -102,13 +101,13 @@ impl Simulation {
         let is_told = !scenario.is_exact() && !certificate.void.is_empty();
         let certificate = certificate.void_where(!link.is_exact() && !is_told, Void::InexactLink);
         let mut state = scenario.start.clone();
-        motion.observe(&mut state);
+        plant.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
-        let channels = Channels::of(&motion, link.as_ref());
+        let channels = Channels::of(plant.as_ref(), link.as_ref());
         let mut simulation = Self {
             controller: Controller::new(scenario, law, link, supervisor)?,
-            motion,
+            plant,
             certificate,
             judge: Judge::new(scenario)?,
             next: state.clone(),
@@ -177,7 +176,7 @@ impl Simulation {
             self.overruled = true;
             self.certificate = self.certificate.clone().void_where(true, Void::CommandsFromOutside);
             self.control.clone_from(commands);
-            self.motion.apply(commands, &mut self.state);
+            self.plant.apply(commands, &mut self.state);
         }
         self.step_on();
         Ok(())
@@ -272,7 +271,7 @@ impl Simulation {
         if !std::mem::take(&mut self.sample_is_due) {
             return None;
         }
-        self.channels.write(&self.motion, self.controller.link.as_ref());
+        self.channels.write(self.plant.as_ref(), self.controller.link.as_ref());
         Some(Sample {
             time_s: self.time_s,
             step: self.steps,
@@ -298,7 +297,7 @@ impl Simulation {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
             self.controller.reseed(seed);
-            self.motion.reseed(seed);
+            self.plant.reseed(seed);
         }
     }
 
@@ -324,7 +323,7 @@ impl Simulation {
             assignments: self.watch.assignments,
             traffic: self.controller.link.traffic(),
             last: self.state,
-            performance: Performance { airframe: self.motion.airframe_time(), ..self.performance },
+            performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },
         }
     }
 }

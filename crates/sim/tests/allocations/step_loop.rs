@@ -6,9 +6,9 @@ use stats_alloc::Region;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
-use tautline_sim::plant::{Path, Plant, PlantError};
+use tautline_sim::plant::{self, Path, Plant, PlantError};
 use tautline_sim::scenario::{Override, Scenario, Source};
-use tautline_sim::sim::{self, Motion, Parts};
+use tautline_sim::sim::{self, Parts};
 
 use crate::ALLOCATOR;
 
@@ -76,10 +76,10 @@ fn builtin(name: &str, sets: &[&str]) -> Scenario {
 }
 
 /// How often a flight of so many steps takes memory.
-fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, motion: Motion) -> usize {
+fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, plant: Box<dyn Plant>) -> usize {
     let mut scenario = scenario.clone();
     scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
-    let parts = Parts { motion, ..Parts::under(&scenario, law) };
+    let parts = Parts { plant, ..Parts::under(&scenario, law) };
     let region = Region::new(ALLOCATOR);
     let flown = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()));
     let change = region.change();
@@ -88,8 +88,8 @@ fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, motion: Motio
 }
 
 /// How much more often a long flight takes memory than a short one, once the threads have what they take at first.
-fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, motion: impl Fn() -> Motion) -> usize {
-    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), motion()));
+fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, plant: impl Fn() -> Box<dyn Plant>) -> usize {
+    let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), plant()));
     many.saturating_sub(few)
 }
 
@@ -119,7 +119,7 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
         let law = || scenario.law().expect("a law");
         let euler = || {
             let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
-            Motion::from(Euler { state, held, a22_per_s: scenario.a22_per_s })
+            Box::new(Euler { state, held, a22_per_s: scenario.a22_per_s }) as Box<dyn Plant>
         };
         // Idle threads take some memory now and then; what a step takes is in every attempt.
         let takes_none = |_| threads.install(|| growth(scenario, law, euler)) == 0;
@@ -129,7 +129,7 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
         let grown = threads.install(|| growth(scenario, wasteful, euler));
         assert!(grown >= (MANY - FEW) as usize, "{name}: a law that allocates is seen: {grown}");
 
-        let engine = threads.install(|| growth(scenario, law, || Motion::of(scenario)));
+        let engine = threads.install(|| growth(scenario, law, || plant::of(scenario)));
         println!("{name}: the engine takes memory {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
     }
 }

@@ -8,6 +8,7 @@ use super::super::integration::Part;
 use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;
+use crate::plant::PlantError;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
 use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
@@ -53,7 +54,7 @@ impl Simulation {
     /// Fastest rate of the law at the present state \[1/s\]. It is 0 in continuous time, which chooses its own steps, and
     /// under commands from outside, for which the law is not asked.
     fn rate_per_s(&self, length_s: f64) -> f64 {
-        if self.overruled || !self.motion.holds_commands() {
+        if self.overruled || !self.plant.holds_commands() {
             return 0.0;
         }
         let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
@@ -87,7 +88,7 @@ impl Simulation {
             let bend_m = self.path.bend_m();
             let (is_refused, on_the_way_per_s) = self.refuses(seconds(part), rate_per_s);
             if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
-                self.motion.restore(&self.state);
+                self.plant.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
                 part /= 2;
                 fineness.shortest = part.min(fineness.shortest);
@@ -138,10 +139,19 @@ impl Simulation {
     /// Moves the vehicles from `state` to `next`. The result is why the law had no answer on the way, where they moved on without.
     fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Option<LawError>, Ending> {
         let began = Instant::now();
-        let is_held = self.overruled || self.scenario.time.control_hz.is_some();
-        let held = is_held.then_some(&self.control);
-        let interval = (step, self.time_s, dt_s);
-        let undefined = self.motion.advance(interval, held, &mut self.controller, &mut self.next, &mut self.path)?;
+        self.path.begin();
+        let (interval, is_held) = ((self.time_s, dt_s), self.overruled || self.scenario.time.control_hz.is_some());
+        let Self { plant, controller, next, path, .. } = self;
+        let moved = if is_held {
+            plant.advance(dt_s, next, path).map(|()| None)
+        } else {
+            plant.advance_under(controller, interval, next, path)
+        };
+        let undefined = moved.map_err(|error| match error {
+            PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
+            PlantError::Stalled => Breakdown::Stalled { step }.into(),
+            PlantError::Law(source) => Ending::LawUndefined(source),
+        })?;
         self.performance.physics += began.elapsed();
         match self.next.first_not_finite() {
             Some(vehicle) => Err(Breakdown::StateNotFinite { step, vehicle }.into()),
@@ -160,7 +170,7 @@ impl Simulation {
             path,
             next,
             scenario,
-            motion,
+            plant,
             overruled,
             ..
         } = self;
@@ -169,7 +179,7 @@ impl Simulation {
             return (false, at_start_per_s);
         };
         let moved_m = longest_move_m(state, path, next);
-        if !motion.holds_commands() {
+        if !plant.holds_commands() {
             return (judge.refuses(of, moves, moved_m), at_start_per_s);
         }
         let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
@@ -202,7 +212,7 @@ impl Simulation {
             if !self.overruled && step.is_some() {
                 self.controller.actuate(self.time_s, &mut self.control);
             }
-            self.motion.apply(&self.control, &mut self.state);
+            self.plant.apply(&self.control, &mut self.state);
         }
         let Self { judge, controller, state, control, time_s, events, .. } = self;
         let may_move = !controller.law.capabilities().requires_calling_thread;
@@ -228,8 +238,8 @@ impl Simulation {
         watch.look(scenario, controller, (time_s, state), certificate, events);
         let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
-        self.judge.note_engine_contacts(&self.motion, self.time_s, &mut self.events);
-        self.judge.note_bounces(&self.motion, from_s, &mut self.events);
+        self.judge.note_engine_contacts(self.plant.as_ref(), self.time_s, &mut self.events);
+        self.judge.note_bounces(self.plant.as_ref(), from_s, &mut self.events);
         commanded
     }
 
@@ -254,7 +264,7 @@ impl Simulation {
             (self.control, self.energy) = (Rows::zeros(0), None);
             return checked;
         }
-        self.motion.apply(&self.control, &mut self.state);
+        self.plant.apply(&self.control, &mut self.state);
         if let Some(vehicle) = self.state.first_not_finite() {
             return Err(Breakdown::StateNotFinite { step, vehicle }.into());
         }
