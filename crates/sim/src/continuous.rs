@@ -177,7 +177,13 @@ impl Continuous {
     #[must_use]
     pub fn new(scenario: &Scenario) -> Self {
         let (a22_per_s, air) = (scenario.velocity_coefficient_per_s(), Air::of(scenario));
-        Self { swarm: scenario.start.clone(), a22_per_s, air, held: Rows::zeros(scenario.count()), step_s: FIRST_STEP_S }
+        Self {
+            swarm: scenario.start.clone(),
+            a22_per_s,
+            air,
+            held: Rows::zeros(scenario.count()),
+            step_s: FIRST_STEP_S,
+        }
     }
 
     /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
@@ -237,7 +243,6 @@ impl Continuous {
         end.clone_from(&self.swarm);
         Ok(undefined)
     }
-
 }
 
 /// Accelerations that do not change over a step.

@@ -1,8 +1,50 @@
-//! How commands become accelerations: limited, and late as motors are.
+//! `[actuation]`: how commands become accelerations: limited, and with the lag of motors.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::sensing::SAME_S;
-use crate::scenario::{ActuationSpec, Scenario};
+use super::{ImperfectionSpec, is_off};
+use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, row, set_row};
+use tautline_laws::law::Void;
+
+/// How commands become accelerations: as given and at once unless given.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ActuationSpec {
+    /// Limit of each vehicle's acceleration in m/s^2: longer commands are shortened, in their direction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub max_accel_m_s2: Option<f64>,
+    /// Time constant in s with which the acceleration follows the command, lag a' = u - a, from none at the start.
+    #[serde(skip_serializing_if = "is_off")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub lag_s: f64,
+}
+
+impl ImperfectionSpec for ActuationSpec {
+    fn is_exact(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn check(&self, scenario: &Scenario) -> Result<(), ScenarioError> {
+        if self.lag_s == 0.0 || scenario.plant.holds_commands() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
+            .coded("scenario/unsupported-by-plant")
+            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
+            .at("actuation.lag_s")
+            .at("plant.kind"))
+    }
+
+    fn voids(&self) -> Vec<Void> {
+        let voids =
+            [(self.max_accel_m_s2.is_some(), Void::AccelerationLimited), (self.lag_s > 0.0, Void::AccelerationLate)];
+        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+    }
+}
 
 /// Limits commands, and follows them with a lag.
 #[derive(Clone, Debug)]

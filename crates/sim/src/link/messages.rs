@@ -2,13 +2,12 @@
 
 use std::collections::VecDeque;
 
-use super::ages::Ages;
+use super::failure::FailureKind;
 use super::history::History;
-use super::links::Links;
-use super::loss::Loss;
+use super::network::{NearBy, NetworkSpec};
 use super::noise::{Noise, Source};
 use super::sensing::{SAME_S, Sensing};
-use crate::scenario::{FailureKind, NearBy, NetworkSpec, Scenario};
+use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::Graph;
 use tautline_laws::observation::Neighbour;
@@ -252,5 +251,207 @@ impl Down {
         let [a, b] = self.ends;
         let is_this = (sender, hearer) == (a, b) || (sender, hearer) == (b, a);
         is_this && (self.from_s..self.to_s).contains(&(sent_s + SAME_S))
+    }
+}
+
+/// Least age that is told from none \[s\].
+const LEAST_S: f64 = 1e-5;
+/// Ratio of the ends of a class: a quantile is known to a hundredth.
+const RATIO: f64 = 1.01;
+/// Classes, up to an age of 4 weeks.
+const CLASSES: usize = 2600;
+
+/// Ages that were counted.
+#[derive(Clone, Debug)]
+pub(super) struct Ages {
+    counts: Vec<u64>,
+    total: u64,
+}
+
+impl Default for Ages {
+    fn default() -> Self {
+        Self { counts: vec![0; CLASSES], total: 0 }
+    }
+}
+
+impl Ages {
+    /// Counts an age \[s\].
+    pub(super) fn take(&mut self, age_s: f64) {
+        let class = (libm::log(age_s.max(LEAST_S) / LEAST_S) / libm::log(RATIO)).ceil();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; what is more is cut")]
+        let class = (class as usize).min(CLASSES - 1);
+        self.counts[class] += 1;
+        self.total += 1;
+    }
+
+    /// The age that this share of them does not exceed \[s\], to a hundredth; none where none was counted.
+    pub(super) fn quantile_s(&self, share: f64) -> Option<f64> {
+        let wanted = share * self.total as f64;
+        let mut counted = 0;
+        let class = self.counts.iter().position(|count| {
+            counted += count;
+            counted > 0 && counted as f64 >= wanted
+        })?;
+        #[expect(clippy::cast_precision_loss, reason = "some thousands")]
+        let power = class as f64;
+        Some(if class == 0 { 0.0 } else { LEAST_S * libm::pow(RATIO, power) })
+    }
+}
+
+/// The links of a graph, each of them twice, in the order of who sends and then of who hears.
+#[derive(Clone, Debug)]
+pub(super) struct Links {
+    count: usize,
+    /// Who hears vehicle j: `hearers[offsets[j]..offsets[j + 1]]`, ascending.
+    offsets: Vec<usize>,
+    hearers: Vec<usize>,
+}
+
+impl Links {
+    pub(super) fn of(graph: &Graph) -> Self {
+        let count = graph.count();
+        let mut offsets = vec![0; count + 1];
+        for (i, j) in graph.edges() {
+            offsets[i + 1] += 1;
+            offsets[j + 1] += 1;
+        }
+        (0..count).for_each(|i| offsets[i + 1] += offsets[i]);
+        let (mut next, mut hearers) = (offsets.clone(), vec![0; 2 * graph.edge_count()]);
+        for (i, j) in graph.edges() {
+            for (from, to) in [(i, j), (j, i)] {
+                hearers[next[from]] = to;
+                next[from] += 1;
+            }
+        }
+        // Edges come in row order: whoever is before a vehicle was put down before whoever is after it.
+        Self { count, offsets, hearers }
+    }
+
+    /// Number of links one way.
+    pub(super) fn len(&self) -> usize {
+        self.hearers.len()
+    }
+
+    /// Number of vehicles.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The links on which a vehicle sends, with who hears it there.
+    pub(super) fn from(&self, sender: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + '_ {
+        let places = self.offsets[sender]..self.offsets[sender + 1];
+        places.clone().zip(&self.hearers[places]).map(|(link, &hearer)| (link, hearer))
+    }
+
+    /// The link on which one vehicle hears another.
+    pub(super) fn find(&self, hearer: usize, sender: usize) -> Option<usize> {
+        let from = self.offsets[sender];
+        self.hearers[from..self.offsets[sender + 1]].binary_search(&hearer).ok().map(|place| from + place)
+    }
+}
+
+/// Losses of Gilbert and Elliott: a link is good or bad, all messages are lost while it is bad and none while it is good. It
+/// turns bad with probability p a message and good with r. The share lost is p/(p + r) and a burst has 1/r messages in the
+/// mean; with p + r = 1 each message is lost by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Loss {
+    share: f64,
+    turns_bad: f64,
+    turns_good: f64,
+}
+
+impl Loss {
+    /// Losses of this share, in bursts of so many messages in the mean, or one by one.
+    pub(super) fn new(share: f64, burst: Option<f64>) -> Self {
+        let turns_good = burst.map_or(1.0 - share, |burst| if share < 1.0 { 1.0 / burst } else { 0.0 });
+        let turns_bad = if share < 1.0 { (turns_good * share / (1.0 - share)).min(1.0) } else { 1.0 };
+        Self { share, turns_bad, turns_good }
+    }
+
+    /// Whether a message is lost, after what became of the one before it on the same link; `unit` is uniform in \[0, 1).
+    pub(super) fn next(&self, before: Option<bool>, unit: f64) -> bool {
+        match before {
+            None => unit < self.share,
+            Some(false) => unit < self.turns_bad,
+            Some(true) => unit >= self.turns_good,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::noise::{Noise, Source};
+
+    #[test]
+    fn quantiles_are_known_to_a_hundredth() {
+        let mut ages = Ages::default();
+        assert_eq!(ages.quantile_s(0.95), None);
+        (1..=1000).for_each(|k| ages.take(0.001 * f64::from(k)));
+        for (share, expected) in [(0.5, 0.5), (0.95, 0.95), (1.0, 1.0)] {
+            let found = ages.quantile_s(share).expect("ages");
+            assert!((found / expected - 1.0).abs() < 0.0101, "{share}: {found}");
+        }
+        let mut none = Ages::default();
+        (0..20).for_each(|_| none.take(0.0));
+        assert_eq!(none.quantile_s(0.95), Some(0.0));
+    }
+
+    #[test]
+    fn every_link_is_found_both_ways_and_no_other() {
+        for graph in [Graph::complete(5), Graph::star(5), Graph::ring(6), Graph::path(4)] {
+            let links = Links::of(&graph);
+            assert_eq!((links.len(), links.count()), (2 * graph.edge_count(), graph.count()));
+            let mut met = vec![false; links.len()];
+            for sender in 0..graph.count() {
+                for (link, hearer) in links.from(sender) {
+                    assert!(graph.has_edge(sender, hearer) && links.find(hearer, sender) == Some(link));
+                    met[link] = true;
+                }
+                assert_eq!(links.find(sender, sender), None);
+            }
+            assert!(met.iter().all(|met| *met));
+        }
+        assert_eq!(Links::of(&Graph::star(4)).find(1, 2), None);
+    }
+
+    /// Share lost and mean burst of so many messages on a link.
+    fn measured(loss: Loss, messages: u64) -> (f64, f64) {
+        // In runs, since each draw begins a block of the generator.
+        const RUN: usize = 4096;
+        let noise = Noise::new(3, Source::Radio);
+        let mut draw = noise.draw(0, 0, 0, RUN);
+        let (mut before, mut lost, mut bursts) = (None, 0_u64, 0_u64);
+        for number in 0..messages {
+            if number.is_multiple_of(RUN as u64) {
+                draw = noise.draw(0, 0, number / RUN as u64, RUN);
+            }
+            let is_lost = loss.next(before, draw.unit());
+            bursts += u64::from(is_lost && before != Some(true));
+            lost += u64::from(is_lost);
+            before = Some(is_lost);
+        }
+        (lost as f64 / messages as f64, lost as f64 / bursts as f64)
+    }
+
+    #[test]
+    fn the_share_lost_and_the_mean_burst_are_those_asked_for() {
+        for (share, burst) in [(0.02, None), (0.3, None), (0.1, Some(5.0)), (0.5, Some(20.0)), (0.05, Some(1.0))] {
+            // Standard errors of both are below 1 %.
+            let (lost, length) = measured(Loss::new(share, burst), 1_000_000);
+            let expected = burst.unwrap_or(1.0 / (1.0 - share));
+            assert!((lost / share - 1.0).abs() < 0.02, "{share} {burst:?}: {lost}");
+            assert!((length / expected - 1.0).abs() < 0.02, "{share} {burst:?}: bursts of {length}");
+        }
+        // Losses in bursts are not those one by one.
+        assert!(measured(Loss::new(0.1, None), 100_000).1 < 1.2);
+    }
+
+    #[test]
+    fn nothing_and_everything_can_be_lost() {
+        for burst in [None, Some(3.0)] {
+            assert_eq!(measured(Loss::new(1.0, burst), 1000).0, 1.0);
+            assert_eq!(measured(Loss::new(0.0, burst), 1000).0, 0.0);
+        }
     }
 }

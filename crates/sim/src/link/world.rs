@@ -1,12 +1,12 @@
 //! All imperfections of a scenario in one link.
 
 use super::actuation::Actuation;
-use super::failing::Failing;
+use super::failure::Failing;
 use super::history::History;
-use super::interface::{Direct, Imperfections, Sensed, Traffic};
-use super::messages::Messages;
+use super::network::{Missing, NearBy, Network};
 use super::sensing::{Sensing, Sight};
-use crate::scenario::{Failure, Missing, NearBy, Scenario};
+use super::{Direct, Imperfections, Sensed, Traffic};
+use crate::scenario::Scenario;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::observation::{Neighbour, Others, Picture};
@@ -18,24 +18,6 @@ const STEPS_PER_DELAY: f64 = 8.0;
 #[must_use]
 pub fn of(scenario: &Scenario, senses: bool) -> Box<dyn Imperfections> {
     if scenario.is_exact() { Box::new(Direct) } else { Box::new(World::new(scenario, senses)) }
-}
-
-/// What vehicles hear of each other.
-#[derive(Clone, Debug)]
-enum Network {
-    /// What others know of themselves, at once.
-    None,
-    /// The same, some seconds later.
-    Late(Late),
-    /// Messages.
-    Messages(Box<Messages>),
-}
-
-#[derive(Clone, Debug)]
-struct Late {
-    by_s: f64,
-    known: Swarm,
-    measured_s: f64,
 }
 
 /// Sensors, network and actuators of a scenario.
@@ -62,16 +44,8 @@ struct World {
 impl World {
     fn new(scenario: &Scenario, senses: bool) -> Self {
         let (sensing, sight) = (Sensing::new(scenario), Sight::new(scenario));
-        let late_s = scenario.network.latency_s;
-        let is_heard = !scenario.network.is_exact() || scenario.failures.iter().any(Failure::is_silent);
-        let network = match scenario.message_hz().filter(|_| is_heard) {
-            Some(rate_hz) => Network::Messages(Box::new(Messages::new(scenario, &sensing, rate_hz))),
-            None if late_s > 0.0 => {
-                Network::Late(Late { by_s: late_s, known: scenario.start.clone(), measured_s: 0.0 })
-            }
-            None => Network::None,
-        };
-        let span_s = sensing.span_s().max(sight.span_s()) + late_s;
+        let network = Network::new(scenario, &sensing);
+        let span_s = sensing.span_s().max(sight.span_s()) + scenario.network.latency_s;
         Self {
             history: History::new(span_s),
             is_shared: matches!(network, Network::None) && (!senses || sight.is_own()),
@@ -105,31 +79,15 @@ impl World {
             .map(|i| (row(&self.own.positions_m, i) - row(&truth.positions_m, i)).norm())
             .fold(0.0, f64::max);
         let carried = |heard: Neighbour| self.carried(heard);
-        let others = match &self.network {
-            Network::None => own,
-            Network::Late(late) => (0..late.known.count())
-                .map(|i| (self.late(late, i).position_m - row(&truth.positions_m, i)).norm())
-                .fold(0.0, f64::max),
-            Network::Messages(messages) => messages.farthest_m(&truth.positions_m, carried, self.time_s),
-        };
+        let others = self.network.farthest_m(&truth.positions_m, carried, self.time_s, own);
         self.slack_m = own + others;
-    }
-
-    fn late(&self, late: &Late, vehicle: usize) -> Neighbour {
-        self.carried(Neighbour::of(&late.known, vehicle, self.time_s - late.measured_s))
     }
 }
 
 impl Picture for World {
     fn heard(&self, i: usize, j: usize) -> Neighbour {
-        let own = || Neighbour::of(&self.own, j, self.time_s - self.sensing.measured_s(self.time_s));
-        match &self.network {
-            Network::None => own(),
-            Network::Late(late) => self.late(late, j),
-            Network::Messages(messages) => {
-                messages.heard(i, j, self.time_s).map_or_else(own, |heard| self.carried(heard))
-            }
-        }
+        let heard = self.network.heard(i, j, self.time_s).map(|heard| self.carried(heard));
+        heard.unwrap_or_else(|| Neighbour::of(&self.own, j, self.time_s - self.sensing.measured_s(self.time_s)))
     }
 
     fn seen(&self, i: usize, j: usize) -> Neighbour {
@@ -160,11 +118,7 @@ impl Imperfections for World {
         }
         self.sensing.know_now(&self.history, time_s, truth, &mut self.own);
         self.sight.look(&self.history, time_s, truth);
-        if let Network::Late(late) = &mut self.network {
-            let said_s = (time_s - late.by_s).max(0.0);
-            late.measured_s = self.sensing.measured_s(said_s);
-            self.sensing.know(&self.history, said_s, None, &mut late.known);
-        }
+        self.network.hear(time_s, &self.sensing, &self.history);
         if self.near == NearBy::Heard {
             // What is seen is the truth here, from which the others' pictures are told.
             self.find_slack(truth);
@@ -188,50 +142,32 @@ impl Imperfections for World {
     }
 
     fn settle(&mut self, time_s: f64) {
-        if let Network::Messages(messages) = &mut self.network {
-            messages.settle(time_s, &self.sensing, &self.history);
-        }
+        self.network.settle(time_s, &self.sensing, &self.history);
         self.history.settle(time_s);
     }
 
     fn longest_step_s(&self) -> f64 {
-        let heard_s = match &self.network {
-            Network::Late(late) => self.sensing.latency_s() + late.by_s,
-            Network::None | Network::Messages(_) => 0.0,
-        };
+        let heard_s = self.network.delay_s().map_or(0.0, |delay_s| self.sensing.latency_s() + delay_s);
         let delays = [self.sensing.latency_s(), self.sight.latency_s(), heard_s];
         let shortest_s = delays.into_iter().filter(|delay_s| *delay_s > 0.0).fold(f64::INFINITY, f64::min);
         shortest_s / STEPS_PER_DELAY
     }
 
     fn channels(&self) -> Vec<Channel> {
-        match &self.network {
-            Network::None => Vec::new(),
-            Network::Late(_) | Network::Messages(_) => vec![Channel::new("message_age", &["oldest_s", "mean_s"])],
-        }
+        self.network.channels()
     }
 
     fn write_channels(&self, channels: &mut [Channel]) {
-        let Some(ages) = channels.first_mut() else { return };
-        ages.values.resize(2 * self.own.count(), 0.0);
-        match &self.network {
-            Network::None => {}
-            Network::Late(late) => ages.values.fill(self.time_s - late.measured_s),
-            Network::Messages(messages) => messages.write_ages(self.time_s, &mut ages.values),
-        }
+        self.network.write_channels(self.time_s, self.own.count(), channels);
     }
 
     fn traffic(&self) -> Option<Traffic> {
-        let Network::Messages(messages) = &self.network else { return None };
-        let (sent, lost) = messages.counts();
-        Some(Traffic { sent, lost, age_p95_s: messages.ages().quantile_s(0.95) })
+        self.network.traffic()
     }
 
     fn reseed(&mut self, seed: u64) {
         self.sensing.reseed(seed);
         self.sight.reseed(seed);
-        if let Network::Messages(messages) = &mut self.network {
-            messages.reseed(seed);
-        }
+        self.network.reseed(seed);
     }
 }

@@ -8,17 +8,14 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::actuation::ActuationSpec;
-use super::failure::Failure;
 use super::graph::GraphTable;
-use super::network::NetworkSpec;
 use super::obstacles::ObstacleTable;
 use super::reference::ReferenceTable;
-use super::sensing::SensingSpec;
 use super::spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety};
 use super::template::Laws;
 use super::time::TimeSpec;
 use super::vehicle::VehicleTable;
+use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use tautline_core::swarm::{Rows, set_row};
 use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;

@@ -44,36 +44,36 @@ pub struct Place {
 }
 
 impl ScenarioError {
-    pub(super) fn new(message: impl AsRef<str>) -> Self {
+    pub(crate) fn new(message: impl AsRef<str>) -> Self {
         let message = printable(message.as_ref()).into();
         Self { code: "scenario/inconsistent", message, help: None, fields: Vec::new(), place: None }
     }
 
     /// A value out of its range.
-    pub(super) fn out_of_range(message: impl AsRef<str>) -> Self {
+    pub(crate) fn out_of_range(message: impl AsRef<str>) -> Self {
         Self::new(message).coded("scenario/out-of-range")
     }
 
     /// Gives the error another code than `scenario/inconsistent`.
-    pub(super) fn coded(mut self, code: &'static str) -> Self {
+    pub(crate) fn coded(mut self, code: &'static str) -> Self {
         self.code = code;
         self
     }
 
-    pub(super) fn with_help(mut self, help: impl AsRef<str>) -> Self {
+    pub(crate) fn with_help(mut self, help: impl AsRef<str>) -> Self {
         self.help = Some(printable(help.as_ref()).into());
         self
     }
 
     /// Names a key whose value is part of what is wrong. The first one named stands for the error, unless another was
     /// overridden.
-    pub(super) fn at(mut self, key: impl Into<Cow<'static, str>>) -> Self {
+    pub(crate) fn at(mut self, key: impl Into<Cow<'static, str>>) -> Self {
         self.fields.push(Field { key: key.into(), entry: None, leg: 0 });
         self
     }
 
     /// Like [`ScenarioError::at`], for an entry of a list.
-    pub(super) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
+    pub(crate) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
         self.fields.push(Field { key: key.into(), entry: Some(entry), leg: 0 });
         self
     }

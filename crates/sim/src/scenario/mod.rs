@@ -5,26 +5,21 @@
 //! keys of the TOML; [`Scenario::resolved_toml`] writes the same document with nothing left to be derived. `builtin`
 //! holds the embedded scenarios.
 
-mod actuation;
 mod build;
 pub mod builtin;
 mod check;
 mod document;
 mod error;
-mod failure;
 mod files;
 mod formation;
 mod graph;
-mod imperfections;
 mod limits;
-mod network;
 mod obstacles;
 mod overrides;
 mod reference;
 mod resolution;
 mod resolved;
 mod schema;
-mod sensing;
 mod source;
 mod spec;
 mod start;
@@ -35,19 +30,16 @@ mod validate;
 mod vehicle;
 mod wind;
 
-pub use actuation::ActuationSpec;
+pub use crate::link::{ActuationSpec, Failure, FailureKind, LinkFailure, Missing, NearBy, NetworkSpec, SensingSpec};
 pub use error::{Field, Place, ScenarioError};
-pub use failure::{Failure, FailureKind};
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
-pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 pub use overrides::Override;
 pub use resolution::Drift;
 pub use schema::{schema, takes_integers_only};
-pub use sensing::SensingSpec;
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
 pub use start::random;

@@ -3,8 +3,6 @@
 //! A plant counts positions from the middle of the start. Whatever moves the swarm as a whole (its mean velocity, which no
 //! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
 
-use super::actuation::ActuationSpec;
-use super::failure::Failure;
 use super::spec::{PlantSpec, Scenario};
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::law::{Certificate, Law, Void, certificate_through};
@@ -90,37 +88,13 @@ impl Scenario {
     /// delta.
     #[must_use]
     pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
-        let promised =
-            self.imperfections().into_iter().fold(promised, |promised, (is, void)| promised.void_where(is, void));
+        let of_time = self.time.control_hz.map(|_| Void::CommandsHeld);
+        let of_body = (!self.airframe.is_point()).then_some(Void::NotAPoint);
+        let of_links = self.imperfections().into_iter().flat_map(|imperfection| imperfection.voids());
+        let voids = of_time.into_iter().chain(of_links).chain(of_body);
+        let promised = voids.fold(promised, |promised, void| promised.void_where(true, void));
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
         promised.void_where(unresolved, Void::Unresolved)
-    }
-
-    /// What voids any promise, and whether it is there.
-    fn imperfections(&self) -> [(bool, Void); 9] {
-        let Self { sensing, network, actuation, .. } = self;
-        let is_late = sensing.latency_s > 0.0 || sensing.near_s() > 0.0 || sensing.rate_hz.is_some();
-        let is_silent = self.failures.iter().any(Failure::is_silent);
-        [
-            (self.time.control_hz.is_some(), Void::CommandsHeld),
-            (is_late, Void::KnownLate),
-            (sensing.is_noisy(), Void::KnownWrongly),
-            (network.latency_s > 0.0 || network.rate_hz.is_some(), Void::HeardLate),
-            (network.loses() || is_silent, Void::MessagesLost),
-            (actuation.max_accel_m_s2.is_some(), Void::AccelerationLimited),
-            (actuation.lag_s > 0.0, Void::AccelerationLate),
-            (self.failures.iter().any(|failure| !failure.is_silent()), Void::VehicleFails),
-            (!self.airframe.is_point(), Void::NotAPoint),
-        ]
-    }
-
-    /// Whether vehicles know the true present state, and are accelerated as they are commanded.
-    #[must_use]
-    pub fn is_exact(&self) -> bool {
-        self.sensing.is_exact()
-            && self.network.is_exact()
-            && self.actuation == ActuationSpec::default()
-            && self.failures.is_empty()
     }
 
     /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.

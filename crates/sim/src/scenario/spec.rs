@@ -5,11 +5,8 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::actuation::ActuationSpec;
-use super::failure::Failure;
-use super::network::NetworkSpec;
-use super::sensing::SensingSpec;
 use super::time::TimeSpec;
+use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use crate::vehicle::Airframe;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;

@@ -65,10 +65,7 @@ impl Scenario {
         self.check_wind()?;
         self.check_arrival()?;
         self.check_breathing()?;
-        self.check_sensing()?;
-        self.check_network()?;
-        self.check_actuation()?;
-        self.check_failures()
+        self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))
     }
 
     fn check_noise(&self) -> Result<(), ScenarioError> {

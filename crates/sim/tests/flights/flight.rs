@@ -6,8 +6,9 @@ use tautline_core::record::{Event, OwnedSample, RecordError, Sample, Sink};
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::Law;
+use tautline_sim::plant::{self, Plant};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
-use tautline_sim::sim::{self, Flight, Motion, Parts, SimError};
+use tautline_sim::sim::{self, Flight, Parts, SimError};
 
 /// A built-in scenario with some keys set.
 pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
@@ -43,7 +44,7 @@ impl Sink for Log {
 /// Flies the scenario with its own law and plant.
 pub(crate) fn fly(scenario: &Scenario) -> (Flight, Log) {
     let law = scenario.law().expect("the law of a valid scenario");
-    let (flown, log) = fly_with(scenario, law, Motion::of(scenario));
+    let (flown, log) = fly_with(scenario, law, plant::of(scenario));
     (flown.expect("a flight"), log)
 }
 
@@ -51,10 +52,10 @@ pub(crate) fn fly(scenario: &Scenario) -> (Flight, Log) {
 pub(crate) fn fly_with(
     scenario: &Scenario,
     law: Box<dyn Law>,
-    motion: impl Into<Motion>,
+    plant: Box<dyn Plant>,
 ) -> (Result<Flight, SimError>, Log) {
     let mut log = Log::default();
-    let parts = Parts { motion: motion.into(), ..Parts::under(scenario, law) };
+    let parts = Parts { plant, ..Parts::under(scenario, law) };
     let flown = sim::fly(scenario, parts, &mut log, &mut |_step| ControlFlow::Continue(()));
     (flown, log)
 }

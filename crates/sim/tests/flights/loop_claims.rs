@@ -12,9 +12,9 @@ use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::{Capabilities, Certificate, LaplacianKeys, Law, LawError, LawSpec, Void};
 use tautline_laws::observation::Observation;
-use tautline_sim::plant::{Path, Plant, PlantError, rapier};
+use tautline_sim::plant::{self, Path, Plant, PlantError, rapier};
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Breakdown, Ending, Flight, Motion, Parts, SimError};
+use tautline_sim::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
 /// A sum of ten tensions and five squares, relative to a sum that may be many times larger.
 const ENERGY_ROUNDING: f64 = 1e-12;
@@ -160,7 +160,7 @@ fn energy_never_increases_and_is_lost_at_the_rate_of_the_theory_up_to_the_step()
 #[test]
 fn with_the_sign_of_the_tension_flipped_both_energy_checks_fail() {
     let scenario = stepwise("pentagon", 240);
-    let (_, log) = fly_with(&scenario, Box::new(flipped(&scenario)), Motion::of(&scenario));
+    let (_, log) = fly_with(&scenario, Box::new(flipped(&scenario)), plant::of(&scenario));
     assert!(energy_rise(&log) > 1.0, "{}", energy_rise(&log));
     assert!(energy_imbalance(&log) > 1.0, "{}", energy_imbalance(&log));
 }
@@ -209,7 +209,7 @@ fn a_law_that_commands_what_cannot_be_flown_is_named_with_vehicle_and_step() {
             }
             Ok(())
         });
-        let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
+        let (flown, log) = fly_with(&scenario, Box::new(law), plant::of(&scenario));
         let error = breakdown(flown);
         let not_finite = Breakdown::CommandNotFinite { step: at, vehicle: 3 };
         let expected = if bad.is_finite() { Breakdown::CommandOutOfRange { step: at, vehicle: 3 } } else { not_finite };
@@ -228,7 +228,7 @@ fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
     for (says_so, lost_at) in [(true, 1), (true, 9), (false, 0), (false, 1), (false, 9)] {
         let inner = rapier::plant(&scenario);
         let plant = Lost { inner, steps_left: lost_at, vehicle: 2, says_so };
-        let (flown, log) = fly_with(&scenario, scenario.law().expect("a law"), plant);
+        let (flown, log) = fly_with(&scenario, scenario.law().expect("a law"), Box::new(plant));
         let error = breakdown(flown);
         assert_eq!(error, Breakdown::StateNotFinite { step: u64::from(lost_at), vehicle: 2 });
         assert!(error.to_string().contains("vehicle 3"), "{error}");
@@ -259,7 +259,7 @@ fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
                 if asked == undefined_at { Err(LawError::OutOfRange) } else { Ok(()) }
             },
         );
-        let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
+        let (flown, log) = fly_with(&scenario, Box::new(law), plant::of(&scenario));
         let flight = flown.expect("an early end is no error");
         assert_eq!(flight.ending, Ending::LawUndefined(LawError::OutOfRange));
         assert_eq!((flight.steps, flight.audit.steps), (undefined_at, undefined_at));
@@ -295,7 +295,7 @@ fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     let inner = scenario.law().expect("a law");
     let law = Named { name: format!("{} of my own", inner.name()), inner };
-    let (flown, log) = fly_with(&scenario, Box::new(law), Motion::of(&scenario));
+    let (flown, log) = fly_with(&scenario, Box::new(law), plant::of(&scenario));
     assert_eq!(flown.expect("a flight").law, "edge-tension of my own");
     let told = Event::OtherLaw { time_s: 0.0, name: "edge-tension of my own".to_owned() };
     assert_eq!(log.events, [told]);

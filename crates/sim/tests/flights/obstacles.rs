@@ -12,8 +12,9 @@ use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
 use tautline_laws::space::{Obstacle, Shape, least_room};
 use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_sim::plant;
 use tautline_sim::scenario::{PlantSpec, Scenario, Source};
-use tautline_sim::sim::{Ending, Flight, Motion, Simulation};
+use tautline_sim::sim::{Ending, Flight, Simulation};
 
 use crate::flight::{Log, builtin, fly, fly_with};
 use crate::numbers::Numbers;
@@ -120,7 +121,7 @@ fn no_random_flight_among_obstacles_breaks_what_was_certified() {
 fn ignorant(scenario: &Scenario) -> (Flight, Log) {
     let mut alone = scenario.clone();
     alone.obstacles.clear();
-    let (flown, log) = fly_with(scenario, alone.law().expect("a law"), Motion::of(scenario));
+    let (flown, log) = fly_with(scenario, alone.law().expect("a law"), plant::of(scenario));
     (flown.expect("a flight"), log)
 }
 

@@ -7,9 +7,10 @@ use nalgebra::Vector3;
 use tautline_audit::Status;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::Void;
+use tautline_sim::plant;
 use tautline_sim::plant::{Path, Plant as _, Unicycles};
 use tautline_sim::scenario::{Override, Scenario, Source};
-use tautline_sim::sim::{Ending, Motion, Simulation};
+use tautline_sim::sim::{Ending, Simulation};
 use tautline_sim::vehicle::Unicycle;
 
 use crate::flight::{fly, read};
@@ -176,5 +177,5 @@ fn what_a_unicycle_cannot_fly_is_refused_with_its_place_and_remedy() {
     let scenario = read(FLIGHT);
     let source = Source::Text { name: "again".to_owned(), text: scenario.resolved_toml() };
     assert_eq!(Scenario::read(&source, &[]).expect("its own text"), scenario);
-    assert!(matches!(Motion::of(&scenario), Motion::Sampled(_)));
+    assert!(plant::of(&scenario).holds_commands());
 }

@@ -1,0 +1,199 @@
+//! `[[failure]]`: vehicles of which a part fails.
+
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ImperfectionSpec;
+use super::sensing::SAME_S;
+use crate::scenario::{Scenario, ScenarioError};
+use crate::vehicle::RotorFailure;
+use tautline_core::swarm::{Rows, row, set_row};
+use tautline_laws::law::Void;
+
+/// A vehicle of which a part fails, for the rest of the flight.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Failure {
+    /// The vehicle, counted from 1.
+    #[schemars(range(min = 1))]
+    pub vehicle: u64,
+    /// From when on in s.
+    pub at_s: f64,
+    /// What fails.
+    #[schemars(flatten)]
+    pub kind: FailureKind,
+}
+
+/// What fails.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[schemars(tag = "kind")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub enum FailureKind {
+    /// It commands nothing any more: a point drifts on, a quadrotor's rotors stop.
+    Dead {},
+    /// A rotor of a quadrotor gives less thrust.
+    Rotor {
+        /// The rotor, counted from 1 as its model lists them.
+        #[schemars(range(min = 1, max = 4))]
+        rotor: u64,
+        /// Share of its thrust that it still gives, from 0 to less than 1: none unless given.
+        #[serde(default)]
+        #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
+        share: f64,
+    },
+    /// It sends nothing any more. Needs `network.rate_hz`.
+    Silent {},
+    /// Its command stays as it was.
+    Frozen {},
+}
+
+impl Failure {
+    /// Whether it sends nothing any more.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        matches!(self.kind, FailureKind::Silent {})
+    }
+
+    /// The vehicle, from 0.
+    #[must_use]
+    pub fn index(&self) -> usize {
+        usize::try_from(self.vehicle.saturating_sub(1)).unwrap_or(usize::MAX)
+    }
+}
+
+impl ImperfectionSpec for Vec<Failure> {
+    fn is_exact(&self) -> bool {
+        self.is_empty()
+    }
+
+    fn check(&self, scenario: &Scenario) -> Result<(), ScenarioError> {
+        for (entry, failure) in self.iter().enumerate() {
+            let &Failure { vehicle, at_s, kind } = failure;
+            if vehicle == 0 || failure.index() >= scenario.count() {
+                return Err(ScenarioError::new(format!(
+                    "vehicle {vehicle} is to fail, and there are {}",
+                    scenario.count()
+                ))
+                .coded("scenario/unknown-vehicle")
+                .with_help("vehicles are counted from 1")
+                .at_entry("failure", entry));
+            }
+            if !(0.0..scenario.time.duration_s).contains(&at_s) {
+                return Err(ScenarioError::new(format!(
+                    "vehicle {vehicle} is to fail at {at_s} s, in a flight from 0 s to {} s",
+                    scenario.time.duration_s
+                ))
+                .coded("scenario/outside-flight")
+                .with_help("let it fail within the flight")
+                .at_entry("failure", entry)
+                .at("time.duration_s"));
+            }
+            match kind {
+                FailureKind::Dead {} => {}
+                FailureKind::Rotor { share, .. } => scenario.check_rotor(entry, share)?,
+                FailureKind::Silent {} => scenario.check_silent(entry)?,
+                FailureKind::Frozen {} => scenario.check_frozen(entry)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn voids(&self) -> Vec<Void> {
+        let void = |failure: &Failure| if failure.is_silent() { Void::MessagesLost } else { Void::VehicleFails };
+        self.iter().map(void).collect()
+    }
+}
+
+impl Scenario {
+    fn check_rotor(&self, entry: usize, share: f64) -> Result<(), ScenarioError> {
+        let (code, said, help) = if self.airframe.quadrotor().is_none() {
+            (
+                "scenario/unsupported-by-vehicle",
+                "a rotor is to fail, and vehicles are points".to_owned(),
+                "set vehicle.model to a quadrotor, or kind to \"dead\"",
+            )
+        } else if !(0.0..1.0).contains(&share) {
+            (
+                "scenario/out-of-range",
+                format!("a rotor that fails still gives a share of {share} of its thrust"),
+                "set share from 0 to less than 1",
+            )
+        } else {
+            return Ok(());
+        };
+        Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("failure", entry))
+    }
+
+    fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {
+        if self.plant.holds_commands() || self.time.control_hz.is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("the ideal plant's vehicles hold no command that could stay as it was")
+            .coded("scenario/unsupported-by-plant")
+            .with_help("set time.control_hz, or plant.kind to \"rapier\"")
+            .at_entry("failure", entry)
+            .at("plant.kind"))
+    }
+
+    fn check_silent(&self, entry: usize) -> Result<(), ScenarioError> {
+        if self.message_hz().is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new("a vehicle is to send nothing any more, and nothing says how often messages are sent")
+            .coded("scenario/missing-key")
+            .with_help("set network.rate_hz, such as 50")
+            .at_entry("failure", entry))
+    }
+
+    /// What becomes of rotors.
+    pub(crate) fn rotor_failures(&self) -> Vec<RotorFailure> {
+        let of_rotors = |failure: &Failure| {
+            let (rotor, share) = match failure.kind {
+                FailureKind::Dead {} => (None, 0.0),
+                FailureKind::Rotor { rotor, share } => (Some(usize::try_from(rotor.checked_sub(1)?).ok()?), share),
+                FailureKind::Silent {} | FailureKind::Frozen {} => return None,
+            };
+            Some(RotorFailure { vehicle: failure.index(), rotor, at_s: failure.at_s, share })
+        };
+        let exists =
+            |failure: &RotorFailure| failure.vehicle < self.count() && failure.rotor.is_none_or(|rotor| rotor < 4);
+        self.failures.iter().filter_map(of_rotors).filter(exists).collect()
+    }
+}
+
+/// What becomes of the commands of vehicles of which a part fails.
+#[derive(Clone, Debug)]
+pub(super) struct Failing {
+    all: Vec<Failed>,
+}
+
+#[derive(Clone, Debug)]
+struct Failed {
+    vehicle: usize,
+    at_s: f64,
+    /// What it commands then \[m/s^2\]; not known yet of one that keeps its command.
+    kept: Option<Vector3<f64>>,
+}
+
+impl Failing {
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        let failed = scenario.failures.iter().filter_map(|failure| {
+            let kept = match failure.kind {
+                FailureKind::Dead {} => Some(Vector3::zeros()),
+                FailureKind::Frozen {} => None,
+                FailureKind::Silent {} | FailureKind::Rotor { .. } => return None,
+            };
+            Some(Failed { vehicle: failure.index(), at_s: failure.at_s, kept })
+        });
+        Self { all: failed.collect() }
+    }
+
+    /// Changes the commands that are given at a time \[s\].
+    pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
+        for failed in self.all.iter_mut().filter(|failed| time_s + SAME_S >= failed.at_s) {
+            let kept = *failed.kept.get_or_insert_with(|| row(command, failed.vehicle));
+            set_row(command, failed.vehicle, kept);
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! `[network]`: what vehicles hear of each other, and when.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::failure::Failure;
+use super::history::History;
+use super::messages::Messages;
+use super::sensing::Sensing;
+use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
+use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError};
+use tautline_core::record::Channel;
+use tautline_core::swarm::{Rows, Swarm, row};
+use tautline_laws::law::Void;
+use tautline_laws::observation::Neighbour;
+
+/// What vehicles hear of others over links: all, at once and all the time unless given.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NetworkSpec {
+    /// How long a message takes, in s: delays what is heard of others, and not what a vehicle knows of itself.
+    #[serde(skip_serializing_if = "is_off")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub latency_s: f64,
+    /// Each message takes up to so much longer, in s, all of it alike likely. Needs `rate_hz`.
+    #[serde(skip_serializing_if = "is_off")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub jitter_s: f64,
+    /// Share of messages that are lost, from 0 to 1. Needs `rate_hz`.
+    #[serde(skip_serializing_if = "is_off")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
+    pub loss: f64,
+    /// How many messages are lost one after the other in the mean, from 1 on (Gilbert and Elliott: all are lost while a link
+    /// is bad, and none while it is good); unless given, each message is lost or not by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1))]
+    pub loss_burst: Option<f64>,
+    /// Messages a second in Hz; `sensing.rate_hz` unless given, and where there is none either, all the time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub rate_hz: Option<f64>,
+    /// What a vehicle takes for the present state of another of which it has an old message.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = Missing::default()))]
+    pub missing: Missing,
+    /// How a vehicle knows whoever is near, with or without a link.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = NearBy::default()))]
+    pub near: NearBy,
+    /// Links that are down for a while. Needs `rate_hz`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failure: Vec<LinkFailure>,
+}
+
+/// What stands for a message that has not come.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Missing {
+    /// What was heard last.
+    #[default]
+    Hold,
+    /// What was heard last, carried along its velocity up to the time of the vehicle's own measurement.
+    Extrapolate,
+}
+
+/// How a vehicle knows whoever is near.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NearBy {
+    /// With a sensor on board, whatever the network does.
+    #[default]
+    Seen,
+    /// By messages that everybody sends to everybody.
+    Heard,
+}
+
+/// A link that is down for a while: what is sent over it is lost, both ways.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinkFailure {
+    /// The two vehicles, counted from 1.
+    #[schemars(inner(range(min = 1)))]
+    pub link: [u64; 2],
+    /// From when on in s.
+    pub from_s: f64,
+    /// Until when in s; to the end of the flight unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "f64")]
+    pub to_s: Option<f64>,
+}
+
+impl NetworkSpec {
+    /// Whether messages may be missing.
+    #[must_use]
+    pub fn loses(&self) -> bool {
+        self.loss > 0.0 || !self.failure.is_empty()
+    }
+}
+
+impl ImperfectionSpec for NetworkSpec {
+    /// Whether everything that is sent is heard at once.
+
+    fn is_exact(&self) -> bool {
+        Self { missing: Missing::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
+    }
+
+    fn is_random(&self) -> bool {
+        self.loss > 0.0 || self.jitter_s > 0.0
+    }
+
+    fn check(&self, scenario: &Scenario) -> Result<(), ScenarioError> {
+        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, rate_hz, .. } = *self;
+        latency("network.latency_s", "the latency of messages", latency_s, scenario.time.duration_s)?;
+        latency("network.jitter_s", "the jitter of messages", jitter_s, scenario.time.duration_s)?;
+        check_loss(loss, loss_burst)?;
+        if rate_hz.is_some() {
+            scenario.check_sampled("network.rate_hz")?;
+        }
+        let needs_rate = [
+            ("network.jitter_s", jitter_s > 0.0),
+            ("network.loss", loss > 0.0),
+            ("network.failure", !self.failure.is_empty()),
+        ];
+        for (key, _) in needs_rate.into_iter().filter(|&(_, is_used)| is_used) {
+            scenario.check_messages(key)?;
+        }
+        self.failure.iter().enumerate().try_for_each(|(entry, failure)| scenario.check_link(entry, failure))?;
+        scenario.check_message_memory()
+    }
+
+    fn voids(&self) -> Vec<Void> {
+        let is_late = self.latency_s > 0.0 || self.rate_hz.is_some();
+        let voids = [(is_late, Void::HeardLate), (self.loses(), Void::MessagesLost)];
+        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+    }
+}
+
+/// Most messages that a vehicle sends in a step.
+const MESSAGES_A_STEP: f64 = 10.0;
+/// Memory expected for a link in one direction: what was heard over it last \[bytes\].
+const BYTES_PER_LINK: u128 = 80;
+/// And for each message that may be under way on it.
+const BYTES_PER_MESSAGE: u128 = 8;
+
+impl Scenario {
+    /// Messages a second \[Hz\], where they are not sent all the time.
+    #[must_use]
+    pub fn message_hz(&self) -> Option<f64> {
+        self.network.rate_hz.or(self.sensing.rate_hz)
+    }
+
+    /// Refuses what happens to messages where nothing says when they are sent.
+    fn check_messages(&self, key: &'static str) -> Result<(), ScenarioError> {
+        if self.message_hz().is_some() {
+            return Ok(());
+        }
+        Err(ScenarioError::new(format!("{key} is about messages, and nothing says how often they are sent"))
+            .coded("scenario/missing-key")
+            .with_help("set network.rate_hz, such as 50")
+            .at(key))
+    }
+
+    fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
+        let &LinkFailure { link: [a, b], from_s, to_s } = failure;
+        let refuse = |code, said: String, help: &str| {
+            Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("network.failure", entry))
+        };
+        let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
+        let is_link = match (index(a), index(b)) {
+            (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
+                self.network.near == NearBy::Heard || self.graph.has_edge(i, j)
+            }
+            _ => false,
+        };
+        if !is_link {
+            return refuse(
+                "scenario/edge",
+                format!("the graph has no link between vehicles {a} and {b} that could be down"),
+                "name the two ends of an edge of [graph], counted from 1",
+            );
+        }
+        let until_s = to_s.unwrap_or(self.time.duration_s);
+        if from_s >= 0.0 && from_s < until_s && from_s < self.time.duration_s {
+            return Ok(());
+        }
+        refuse(
+            "scenario/outside-flight",
+            format!("the link of vehicles {a} and {b} is down from {from_s} s to {until_s} s"),
+            "it is down from 0 s or later, before the end of the flight, and until later than that",
+        )
+    }
+
+    fn check_message_memory(&self) -> Result<(), ScenarioError> {
+        let Some(rate_hz) = self.message_hz() else { return Ok(()) };
+        if self.network.is_exact() && self.sensing.is_exact() {
+            return Ok(());
+        }
+        if rate_hz * self.time.dt_s > MESSAGES_A_STEP {
+            return Err(ScenarioError::new(format!(
+                "{rate_hz} messages a second are more than {MESSAGES_A_STEP} in a step of {} s, and only the last one counts",
+                self.time.dt_s
+            )).coded("scenario/step-too-long")
+            .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
+            .at("network.rate_hz")
+            .at("sensing.rate_hz"));
+        }
+        let count = self.count() as u128;
+        let pairs = count * count.saturating_sub(1);
+        let heard = if self.network.near == NearBy::Heard { pairs } else { 2 * self.graph.edge_count() as u128 };
+        let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 2.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 2; too many saturate")]
+        let bytes = heard.saturating_mul(BYTES_PER_LINK + BYTES_PER_MESSAGE * under_way as u128);
+        if bytes <= MAX_MEMORY_BYTES {
+            return Ok(());
+        }
+        let gib = MAX_MEMORY_BYTES >> 30;
+        Err(ScenarioError::new(format!(
+            "messages over {heard} links would take {} GiB of memory; at most {gib} GiB are used",
+            bytes >> 30
+        ))
+        .coded("scenario/memory")
+        .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
+        .at("network.rate_hz")
+        .at("graph.kind"))
+    }
+}
+
+/// A share, and bursts that can make it up.
+fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
+    let Some(burst) = burst else { return Ok(()) };
+    // A bad link follows a good one at most always.
+    let least = if loss < 1.0 { (loss / (1.0 - loss)).max(1.0) } else { 1.0 };
+    if burst >= least {
+        return Ok(());
+    }
+    Err(ScenarioError::new(format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}"))
+        .with_help(format!("give at least {least}, or leave network.loss_burst out: then each is lost by itself"))
+        .at("network.loss_burst")
+        .at("network.loss"))
+}
+
+/// What vehicles hear of each other.
+#[derive(Clone, Debug)]
+pub(super) enum Network {
+    /// The others' own measurements, without delay.
+    None,
+    /// The same, some seconds later.
+    Late(Late),
+    /// Messages.
+    Messages(Box<Messages>),
+}
+
+/// What all vehicles hear of each other after a constant delay.
+#[derive(Clone, Debug)]
+pub(super) struct Late {
+    by_s: f64,
+    known: Swarm,
+    measured_s: f64,
+}
+
+impl Network {
+    pub(super) fn new(scenario: &Scenario, sensing: &Sensing) -> Self {
+        let late_s = scenario.network.latency_s;
+        let is_heard = !scenario.network.is_exact() || scenario.failures.iter().any(Failure::is_silent);
+        match scenario.message_hz().filter(|_| is_heard) {
+            Some(rate_hz) => Self::Messages(Box::new(Messages::new(scenario, sensing, rate_hz))),
+            None if late_s > 0.0 => Self::Late(Late { by_s: late_s, known: scenario.start.clone(), measured_s: 0.0 }),
+            None => Self::None,
+        }
+    }
+
+    /// What a vehicle heard of another at a time \[s\]; none where it is what the other knows of itself now.
+    pub(super) fn heard(&self, hearer: usize, sender: usize, time_s: f64) -> Option<Neighbour> {
+        match self {
+            Self::None => None,
+            Self::Late(late) => Some(Neighbour::of(&late.known, sender, time_s - late.measured_s)),
+            Self::Messages(messages) => messages.heard(hearer, sender, time_s),
+        }
+    }
+
+    /// Takes what is heard at a time \[s\] after a constant delay.
+    pub(super) fn hear(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
+        if let Self::Late(late) = self {
+            let said_s = (time_s - late.by_s).max(0.0);
+            late.measured_s = sensing.measured_s(said_s);
+            sensing.know(history, said_s, None, &mut late.known);
+        }
+    }
+
+    /// Sends and delivers the messages that are due by a time \[s\].
+    pub(super) fn settle(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
+        if let Self::Messages(messages) = self {
+            messages.settle(time_s, sensing, history);
+        }
+    }
+
+    /// Largest distance \[m\] of a vehicle from where another holds it; `own_m` where all hold what the vehicle knows of itself.
+    pub(super) fn farthest_m(
+        &self,
+        positions_m: &Rows,
+        carried: impl Fn(Neighbour) -> Neighbour,
+        time_s: f64,
+        own_m: f64,
+    ) -> f64 {
+        match self {
+            Self::None => own_m,
+            Self::Late(late) => (0..late.known.count())
+                .map(|i| Neighbour::of(&late.known, i, time_s - late.measured_s))
+                .enumerate()
+                .map(|(i, heard)| (carried(heard).position_m - row(positions_m, i)).norm())
+                .fold(0.0, f64::max),
+            Self::Messages(messages) => messages.farthest_m(positions_m, carried, time_s),
+        }
+    }
+
+    /// The constant delay \[s\], if there is one.
+    pub(super) fn delay_s(&self) -> Option<f64> {
+        if let Self::Late(late) = self { Some(late.by_s) } else { None }
+    }
+
+    pub(super) fn channels(&self) -> Vec<Channel> {
+        match self {
+            Self::None => Vec::new(),
+            Self::Late(_) | Self::Messages(_) => vec![Channel::new("message_age", &["oldest_s", "mean_s"])],
+        }
+    }
+
+    pub(super) fn write_channels(&self, time_s: f64, count: usize, channels: &mut [Channel]) {
+        let Some(ages) = channels.first_mut() else { return };
+        ages.values.resize(2 * count, 0.0);
+        match self {
+            Self::None => {}
+            Self::Late(late) => ages.values.fill(time_s - late.measured_s),
+            Self::Messages(messages) => messages.write_ages(time_s, &mut ages.values),
+        }
+    }
+
+    pub(super) fn traffic(&self) -> Option<Traffic> {
+        let Self::Messages(messages) = self else { return None };
+        let (sent, lost) = messages.counts();
+        Some(Traffic { sent, lost, age_p95_s: messages.ages().quantile_s(0.95) })
+    }
+
+    pub(super) fn reseed(&mut self, seed: u64) {
+        if let Self::Messages(messages) = self {
+            messages.reseed(seed);
+        }
+    }
+}
