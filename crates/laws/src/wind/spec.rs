@@ -70,9 +70,13 @@ pub struct Gust {
     #[serde(with = "point")]
     #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
     pub velocity_m_s: Vector3<f64>,
-    /// The vehicles that it meets, counted from 1 in files and from 0 here, in ascending order; all unless given.
+    /// Vehicles that the gust meets, from 0 and in ascending order; all vehicles without a list.
     #[serde(default, with = "vehicles", skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Vec<u64>", inner(range(min = 1)))]
+    #[schemars(
+        with = "Vec<u64>",
+        inner(range(min = 1)),
+        description = "Vehicles that the gust meets, counted from 1; all unless given."
+    )]
     pub vehicles: Option<Vec<usize>>,
 }
 

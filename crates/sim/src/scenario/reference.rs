@@ -72,7 +72,6 @@ pub(super) enum ReferenceKind {
         period_s: f64,
     },
     /// From rest to rest between points along straight lines.
-    #[serde(alias = "waypoints")]
     WayPoints {
         /// The points in m.
         points_m: Vec<Point>,
