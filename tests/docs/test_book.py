@@ -125,7 +125,7 @@ class ScenarioReference(unittest.TestCase):
 
     def test_a_key_that_is_changed_changes_the_page(self) -> None:
         other = scenario_reference.json.loads(scenario_reference.json.dumps(self.schema))
-        other["$defs"]["TimeTable"]["properties"]["duration_s"]["exclusiveMinimum"] = 7
+        other["$defs"]["TimeSpec"]["properties"]["duration_s"]["exclusiveMinimum"] = 7
         self.assertNotEqual(scenario_reference.Reference(other).page(), self.made)
 
 

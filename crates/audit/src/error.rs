@@ -1,5 +1,10 @@
 //! Why a motion cannot be judged.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::obstacle::Obstacle;
+
 /// Why something could not be judged. Nothing changes then, except that the outcome is no longer clear.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum AuditError {
@@ -65,4 +70,46 @@ pub enum AuditError {
         /// Largest coordinate that is accepted \[m\].
         limit_m: f64,
     },
+}
+
+/// Scaled distance at which two equal ellipsoids touch.
+pub const TOUCHING_ELLIPSOIDS: f64 = 2.0;
+
+/// What keeps two apart: lengths in metres or, around ellipsoids, over their half axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Distance that any two vehicles must keep.
+    pub(super) delta: f64,
+    /// Whether the vehicles' radii count.
+    pub(super) by_radii: bool,
+    /// Height at or below which two need not keep it.
+    pub(super) above: Option<f64>,
+}
+
+impl Limits {
+    /// What two vehicles of these radii must keep between their centres.
+    pub(super) fn of_vehicles(self, first: f64, second: f64) -> f64 {
+        if self.by_radii { self.delta.max(first + second) } else { self.delta }
+    }
+
+    /// What the centre of a vehicle of this radius must keep from an obstacle's surface.
+    pub(super) fn of_obstacle(self, obstacle: &Obstacle, radius: f64) -> f64 {
+        obstacle.clearance_m.unwrap_or(if self.by_radii { (0.5 * self.delta).max(radius) } else { 0.5 * self.delta })
+    }
+}
+
+/// Says whether the work is to stop. Loops that may take long look at it, and leave what they found incomplete: who started
+/// the work looks at it too, and drops the result.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Interruption(Option<Arc<AtomicBool>>);
+
+impl Interruption {
+    pub(super) fn new(flag: Arc<AtomicBool>) -> Self {
+        Self(Some(flag))
+    }
+
+    #[inline]
+    pub(super) fn is_set(&self) -> bool {
+        self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
 }

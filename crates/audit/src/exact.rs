@@ -17,7 +17,7 @@ use std::cmp::Ordering;
 use nalgebra::Vector3;
 
 use super::double_double::{DoubleDouble, OPERATION, is_shorter};
-use super::line::{INTERPOLATION, Line, Place};
+use super::polynomial::{INTERPOLATION, Line, Place};
 use super::sweep::Interval;
 use super::whole_motion::WholeMotion;
 

@@ -1,6 +1,6 @@
 //! What has been found in segments of motion so far, and who came closest.
 
-use super::interruption::Interruption;
+use super::error::Interruption;
 use super::ledger::Ledger;
 use super::outcome::{Approach, ObjectPair};
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::line::Line;
+use super::polynomial::Line;
 use super::polynomial::{rescale, value};
 use super::sweep::Interval;
 

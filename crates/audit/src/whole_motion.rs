@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use num_bigint::BigInt;
 
-use super::line::{Line, Place};
+use super::polynomial::{Line, Place};
 use super::sweep::Interval;
 
 /// A unit, 2 to some power, that doubles are whole numbers of.

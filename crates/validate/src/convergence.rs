@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated};
 use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
-use super::interface::{Judged, Progress, Untried, stated};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
 use tautline_sim::continuous::Tolerances;

@@ -1,8 +1,8 @@
 //! Three detectors, one answer: the closed form, parry's shape cast and the engine's own contacts.
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated};
 use super::flights::{builtin, engine, separation_m};
-use super::interface::{Judged, Progress, Untried, stated};
 use tautline_audit::Status;
 use tautline_core::swarm::Pair;
 use tautline_report::figures::RunHistory;

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated, try_each};
 use super::flights::{continuous, end};
-use super::interface::{Judged, Progress, Untried, stated, try_each};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::{Formation, largest_edge_error_m};

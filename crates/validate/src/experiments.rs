@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated, try_each};
 use super::flights::{builtin, certified_m, continuous, end, larger, reached_at_s, times};
-use super::interface::{Judged, Progress, Untried, stated, try_each};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};

@@ -1,9 +1,9 @@
 //! The law (8) at single instants: its matrix form, its sum, and what it does to the energy.
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated};
+use super::flights::{DELTA_M, random_starts};
 use super::flights::{larger, relative_speed_squared, relative_velocities};
-use super::interface::{Judged, Progress, Untried, stated};
-use super::starts::{DELTA_M, random_starts};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::Formation;

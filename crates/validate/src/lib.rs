@@ -16,29 +16,24 @@ mod detectors;
 mod displacement;
 mod equilibria;
 mod experiments;
-mod figures;
 mod flights;
-mod html;
-mod interface;
 mod law;
 mod margins;
 mod page;
 mod rates;
 mod request;
-mod result;
-mod starts;
 mod tension;
 
 pub use claim::{Claim, Group, Kind};
+pub use claim::{Performance, SCHEMA_VERSION, Validation};
 pub use convergence::Refinement;
 pub use request::{ValidateRequest, validate_into};
-pub use result::{Performance, SCHEMA_VERSION, Validation};
 
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use interface::{Judged, Progress, Untried};
+use claim::{Judged, Progress, Untried};
 
 /// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
 type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> Judged);
@@ -81,7 +76,7 @@ pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
         let mut claims = convergence::claims(&convergence)?;
         claims.push(convergence::free_decay(progress)?);
         let flights = detectors::flights(progress)?;
-        let figures = figures::draw(&flights, &convergence)?;
+        let figures = page::draw(&flights, &convergence)?;
         Ok((claims, detectors::claims(&flights)?, convergence, figures))
     };
     let (mut groups, engine) = rayon::join(parts, engine);

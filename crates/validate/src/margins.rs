@@ -1,8 +1,8 @@
 //! Margins of delay and of held commands: where a disturbance of a millimetre begins to grow, against linear theory.
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated, try_each};
 use super::flights::{builtin, larger};
-use super::interface::{Judged, Progress, Untried, stated, try_each};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Swarm, mean_row, row, set_row};
 use tautline_laws::graph::Graph;

@@ -1,8 +1,13 @@
 //! The result in words: a line a claim for the terminal, tables for `docs/validation.md`.
 
-use super::claim::{Claim, Kind};
+use super::claim::Untried;
+use super::claim::Validation;
+use super::claim::{Claim, Group, Kind};
 use super::convergence::Refinement;
-use super::result::Validation;
+use super::detectors::{Flights, Flown};
+use super::tension;
+use tautline_report::figures::{self, Figure, Step};
+use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
 impl Validation {
     /// The result in one line.
@@ -82,6 +87,113 @@ fn entry(claim: &Claim) -> String {
     let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
     let head = format!("\n### {}: `{id}`\n\n{statement} ({source})\n\n", capitalised(claim.outcome()));
     head + &format!("- expected: {expected}\n- measured: {measured}\n- tolerance: {tolerance} ({reason})\n")
+}
+
+/// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
+pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, Untried> {
+    let steps: Vec<Step> = convergence.iter().map(|&Refinement { dt_s, error_m, .. }| Step { dt_s, error_m }).collect();
+    let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
+    drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
+    drawn.extend(of_flight(&flights.circle, ["figure-3a", "figure-3b", "figure-3c"], "Fig. 3", "circle"));
+    let baseline = &flights.baseline;
+    let distances = figures::distances(&baseline.history, baseline.delta_m, None, "Fig. 4: pentagon without avoidance");
+    drawn.push(named("figure-4", distances));
+    drawn.push(figures::convergence(&steps, "Rapier against continuous time"));
+    Ok(drawn)
+}
+
+/// Paths, control effort and distances.
+fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
+    let [a, b, c] = names;
+    let (history, certified_m) = (&flown.history, flown.flight.certificate.certified_m);
+    [
+        named(a, figures::paths(history, &format!("{number}(a): {flight}, paths"))),
+        named(b, figures::control(history, &format!("{number}(b): {flight}, control effort"))),
+        named(c, figures::distances(history, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
+    ]
+}
+
+fn named(name: &str, figure: Figure) -> Figure {
+    Figure { name: name.to_owned(), ..figure }
+}
+
+/// What the claims rest on.
+const ASSUMED: [&str; 3] = [
+    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, which knows nothing \
+     of the physics engine.",
+    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps that line.",
+    "Random starts come from fixed seeds: the same program finds the same numbers.",
+];
+
+impl Validation {
+    /// The result as a self-contained page: claims, figures and the convergence. Two validations by one program give the same
+    /// bytes.
+    #[must_use]
+    pub fn to_html(&self) -> String {
+        let failed = self.claims().filter(|claim| !claim.pass);
+        let mut sections: Vec<Markup> = self.groups.iter().map(claims).collect();
+        let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
+            self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
+        sections.extend([
+            section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
+            section("The paper's figures", &[page::figures(&of_paper)]),
+            section("What was assumed", &[page::list(&ASSUMED)]),
+            section("Repeat it", &[page::command("tautline validate")]),
+        ]);
+        Page {
+            title: "Validation".to_owned(),
+            kind: "Every claim, ours and the paper's, judged by measurement",
+            badge: Badge::judged(self.pass),
+            verdict: self.headline(),
+            reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
+            warnings: Vec::new(),
+            sections,
+        }
+        .render()
+    }
+}
+
+fn claims(group: &Group) -> Markup {
+    let columns = ["Claim", "Measured", "Outcome"];
+    section(group.title, &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
+}
+
+fn caption(group: &Group) -> String {
+    let (all, failed) = (group.claims.len(), group.claims.iter().filter(|claim| !claim.pass).count());
+    if failed == 0 {
+        format!("{all} claims, all as expected")
+    } else {
+        format!("{failed} of {all} claims not as expected")
+    }
+}
+
+fn row(claim: &Claim) -> [Markup; 3] {
+    let tone = match (claim.pass, claim.kind) {
+        (false, _) => Tone::Bad,
+        (true, Kind::PaperRefuted) => Tone::Neutral,
+        (true, _) => Tone::Good,
+    };
+    let Claim { id, source, expected, tolerance, reason, .. } = claim;
+    let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
+    let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
+    [
+        noted(claim.statement, &format!("{finding}{id}; {source}")),
+        noted(&claim.measured, &judged),
+        Badge { tone, word: claim.outcome().to_owned() }.render(),
+    ]
+}
+
+fn convergence(refinements: &[Refinement]) -> Markup {
+    let row = |&Refinement { dt_s, error_m, order, energy_excess_m2_s2, .. }: &Refinement| {
+        let [error, excess] = [error_m, energy_excess_m2_s2].map(|x| format!("{x:.2e}"));
+        let order = order.map_or("–".to_owned(), |order| format!("{order:.3}"));
+        [format!("1/{:.0}", 1.0 / dt_s), error, order, excess]
+    };
+    page::numbers(
+        "Largest position error of Rapier on the pentagon's flight, by step",
+        &["Step [s]", "Position error [m]", "Order", "Energy excess [m²/s²]"],
+        refinements.iter().map(row),
+    )
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::claim::Claim;
+use super::claim::{Judged, Progress, Untried, stated, try_each};
 use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
-use super::interface::{Judged, Progress, Untried, stated, try_each};
 use tautline_core::swarm::{Rows, Swarm, mean_row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::{Formation, largest_edge_error_m};

@@ -1,7 +1,7 @@
 //! The edge tension (5), (6): its minimum and its derivatives.
 
 use super::claim::Claim;
-use super::interface::{Judged, Progress, Untried, stated};
+use super::claim::{Judged, Progress, Untried, stated};
 use tautline_core::text::bound;
 use tautline_laws::law::EdgeTension;
 

@@ -8,7 +8,7 @@ use super::followed::{Followed, Found};
 use super::limit::{Envelope, Limit, Quantity};
 use super::mean_acceleration::{MeanAcceleration, Velocity};
 use super::outcome::EnvelopeOutcome;
-use crate::interruption::Interruption;
+use crate::error::Interruption;
 use crate::polynomial::{rescale, stray_across, value};
 use crate::sweep::Interval;
 use tautline_core::track::{Item, Piece, Sample};

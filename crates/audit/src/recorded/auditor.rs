@@ -14,7 +14,7 @@ use super::told::{AllTold, Counted};
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::envelope::Watch;
-use crate::interruption::Interruption;
+use crate::error::Interruption;
 use crate::ledger::Lists;
 use crate::outcome::Status;
 use crate::results::Results;

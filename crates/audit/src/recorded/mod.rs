@@ -57,7 +57,7 @@ mod told;
 mod vehicle;
 mod window;
 
-pub use super::limits::TOUCHING_ELLIPSOIDS;
+pub use super::error::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use error::RecordedError;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::error::RecordedError;
 use crate::envelope::{Envelope, Limit, Quantity};
-use crate::limits::{Limits, TOUCHING_ELLIPSOIDS};
+use crate::error::{Limits, TOUCHING_ELLIPSOIDS};
 use crate::obstacle::Obstacle;
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 

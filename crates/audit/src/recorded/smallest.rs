@@ -4,7 +4,7 @@ use super::company::Company;
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use super::window::{Windows, within};
-use crate::interruption::Interruption;
+use crate::error::Interruption;
 use crate::outcome::Approach;
 use crate::results::Results;
 use crate::slices::{Slice, Slices};

@@ -2,7 +2,7 @@
 
 use super::outcome::{Told, ToldViolation};
 use super::settings::{Motion, Settings};
-use crate::limits::Limits;
+use crate::error::Limits;
 use crate::outcome::{Approach, ObjectPair, Undecided, Violation};
 use crate::results::{KEPT, Results};
 use crate::sweep::Interval;

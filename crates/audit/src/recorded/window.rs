@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use super::vehicle::Vehicle;
 use crate::enclosure::Target;
-use crate::limits::Limits;
+use crate::error::Limits;
 use crate::obstacle::Obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;

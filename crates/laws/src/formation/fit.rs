@@ -1,10 +1,10 @@
 //! How well a swarm fits a shape once the best rigid motion is taken out.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::Formation;
-use super::flat::centre;
-use tautline_core::swarm::{Rows, row};
+use crate::graph::Graph;
+use tautline_core::swarm::{Rows, first_row_not_finite, row};
 
 /// What a formation may be moved by and still be the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,4 +153,77 @@ impl Fit {
         let svd = if largest > 0.0 { covariance / largest } else { covariance }.svd(true, true);
         Some(Self { rotation: svd.u? * svd.v_t?, positions_centre, slots_centre })
     }
+}
+
+/// Edges of a complete graph up to which each of them is looked at.
+const MOST_EDGES: usize = 1_000_000;
+
+/// Edges or vehicles that [`largest_edge_error_m`] looks at.
+#[must_use]
+pub fn edges_looked_at(graph: &Graph) -> usize {
+    if is_bounded(graph) { graph.count() } else { graph.edge_count() }
+}
+
+/// Whether pairs are too many to be looked at one by one.
+fn is_bounded(graph: &Graph) -> bool {
+    graph.is_complete() && graph.edge_count() > MOST_EDGES
+}
+
+/// Largest error of a desired distance over the edges of the graph, `max |l_ij - d_ij|` \[m\]; 0 without edges.
+///
+/// On a complete graph of more than a million edges (1414 vehicles) a bound on it, in O(N): no distance is off by more than
+/// its two vehicles are from their slots, so the two largest of these distances are added, from the formation as
+/// [`best_rigid_motion`](super::best_rigid_motion) lays it over the swarm. Two vehicles that are off in opposite directions reach it.
+///
+/// NaN where a position of an edge is NaN, or where positions, formation and graph do not have the same number of
+/// vehicles.
+#[must_use]
+pub fn largest_edge_error_m(positions_m: &Rows, formation: &Formation, graph: &Graph) -> f64 {
+    let count = positions_m.nrows();
+    if formation.count() != count || graph.count() != count {
+        return f64::NAN;
+    }
+    if is_bounded(graph) {
+        return two_farthest_m(positions_m, formation);
+    }
+    let mut largest = 0.0;
+    for i in 0..count {
+        let (position, slot) = (row(positions_m, i), row(&formation.slots_m, i));
+        for j in graph.later_neighbours(i) {
+            let distance_m = (row(positions_m, j) - position).norm();
+            let error = (distance_m - (row(&formation.slots_m, j) - slot).norm()).abs();
+            if error.is_nan() {
+                return f64::NAN;
+            }
+            largest = f64::max(largest, error);
+        }
+    }
+    largest
+}
+
+/// Dimension of the smallest flat that holds all rows: 0 a point, 1 a line, 2 a plane, 3 space.
+///
+/// Counts the singular values of the centred table above `relative_tolerance` times the largest one. An empty table
+/// and one with a number that is not finite have dimension 0.
+#[must_use]
+pub fn affine_dimension(rows: &Rows, relative_tolerance: f64) -> usize {
+    if rows.nrows() == 0 || first_row_not_finite(rows).is_some() {
+        return 0;
+    }
+    let centre = centre(rows);
+    let mut centred = DMatrix::from_fn(rows.nrows(), 3, |i, axis| rows[(i, axis)] - centre[axis]);
+    let largest = centred.amax();
+    if largest == 0.0 || !largest.is_finite() {
+        return 0;
+    }
+    centred /= largest;
+    let singular = centred.singular_values();
+    singular.iter().filter(|&&value| value > relative_tolerance * singular[0]).count()
+}
+
+/// Mean of the rows, taken about the first one so that a swarm far from the origin loses no digits.
+pub(super) fn centre(rows: &Rows) -> Vector3<f64> {
+    let origin = row(rows, 0);
+    let count = rows.nrows();
+    origin + (1..count).map(|i| row(rows, i) - origin).sum::<Vector3<f64>>() / count as f64
 }

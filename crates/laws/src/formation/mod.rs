@@ -5,9 +5,7 @@
 
 mod assignment;
 mod drawn;
-mod edges;
 mod fit;
-mod flat;
 mod shapes;
 
 use nalgebra::Vector3;
@@ -17,9 +15,9 @@ use tautline_core::swarm::{Pair, Rows, row, separation, set_row};
 
 pub use assignment::{most_assigned, optimal_slots, optimal_slots_around};
 pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
-pub use edges::{edges_looked_at, largest_edge_error_m};
+pub use fit::affine_dimension;
 pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes_rms_m};
-pub use flat::affine_dimension;
+pub use fit::{edges_looked_at, largest_edge_error_m};
 pub use shapes::NARROWEST_V_RAD;
 
 /// The target shape: slot `h_i` for vehicle i.

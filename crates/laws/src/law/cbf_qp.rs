@@ -4,13 +4,13 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::near_lists::NearLists;
+use super::setting::Carried;
 use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;

@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::carried::Carried;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::interface::{Capabilities, Law, RateQuery, Rates};
+use super::setting::Carried;
 use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;

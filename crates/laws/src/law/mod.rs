@@ -5,12 +5,10 @@
 //! (see `examples/own_law.rs`).
 
 mod bands;
-mod carried;
 mod cbf_qp;
 mod certificate;
 mod clearance;
 mod consensus;
-mod contact;
 mod displacement;
 mod edge_tension;
 mod error;

@@ -3,19 +3,17 @@
 //! [`NearPairs`] finds the pairs of a whole table at once, [`KeptPairs`] keeps them while points move little, [`closest_pair`]
 //! is the nearest of them, [`Spaced`] keeps points apart as they come one by one, [`Shape`] says how far a point is from a solid, and [`Metric`] scales lengths to what must stay empty. The judge of `audit` uses none of this: a fault here must not blind it.
 
-mod closest;
-mod kept;
 mod metric;
 mod near;
 mod shape;
 mod spaced;
 
-pub use closest::closest_pair;
-pub use kept::KeptPairs;
 pub use metric::Metric;
+pub use near::KeptPairs;
 pub use near::NearPairs;
 pub use shape::Shape;
 pub use spaced::Spaced;
+pub use spaced::closest_pair;
 
 use nalgebra::Vector3;
 

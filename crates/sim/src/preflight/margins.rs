@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::numbers::significant;
+use super::warning::significant;
 use crate::scenario::Scenario;
 use tautline_laws::law::{Law, Linear};
 

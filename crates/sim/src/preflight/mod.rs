@@ -4,12 +4,9 @@
 //! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
 //! the way. Its fields are the keys of `tautline check --json`.
 
-mod drift;
 mod margins;
-mod numbers;
-mod rigidity;
+mod stability;
 mod warning;
-mod words;
 
 use serde::Serialize;
 
@@ -22,7 +19,7 @@ use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, Vel
 use tautline_laws::space::{closest_pair, least_room};
 
 pub use margins::{Bound, Near, PredictedMargin};
-pub use rigidity::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
+pub use stability::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
 /// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
@@ -344,8 +341,8 @@ fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
         format!(
             "The law's links ask for steps of {} s, and the shortest that time.dt_s and time.max_halvings allow are {} s: what would \
              be flown is not the motion of the law. Shorten time.dt_s, add links, or lower the law's gains.",
-            numbers::significant(needed_s),
-            numbers::significant(shortest_s)
+            warning::significant(needed_s),
+            warning::significant(shortest_s)
         )
     })
 }
@@ -370,7 +367,7 @@ fn motion_dimension(start: &Swarm) -> usize {
 fn relative_velocity_unstable(margin: Option<VelocityMargin>) -> Option<String> {
     let margin = margin?;
     (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {
-        let rate = numbers::rate(margin.per_s);
+        let rate = warning::rate(margin.per_s);
         format!(
             "Relative velocities are not damped: their margin is {rate} 1/s and must be positive. {}",
             margin.remedy

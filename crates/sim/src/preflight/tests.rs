@@ -226,7 +226,11 @@ fn the_closed_form_of_the_complete_graph_is_the_counted_rank() {
         Formation::sphere(40, 9.0),
     ] {
         let graph = Graph::complete(formation.count());
-        assert_eq!(Rigidity::of(&formation, &graph, 3).rank, Some(rigidity::rank(&formation, &graph)), "{formation:?}");
+        assert_eq!(
+            Rigidity::of(&formation, &graph, 3).rank,
+            Some(stability::rank(&formation, &graph)),
+            "{formation:?}"
+        );
     }
 }
 
@@ -357,7 +361,7 @@ fn the_words_say_what_the_numbers_say() {
     let line = check(&scenario("pentagon-collinear", &[]));
     assert_eq!(line.headline(), "REFUSED: start-on-line");
     assert!(line.warnings[0].to_string().starts_with("warning [start-on-line]: The start lies on a line"));
-    assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(numbers::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
+    assert_eq!([0.0, 0.3, 1.5, 2.5e-7].map(warning::significant), ["0.00", "0.300", "1.50", "2.50e-7"]);
 }
 
 #[test]

@@ -60,7 +60,7 @@ pub struct ObstacleTable {
     /// Its place in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_m: Option<[f64; 3]>,
-    /// Times in s and places in m, `[t, x, y, z]`, of an obstacle that moves: for `tautline audit --obstacles` alone.
+    /// Path of an obstacle that moves, a row `[t, x, y, z]` for each instant: for `tautline audit --obstacles` alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     path: Option<Vec<[f64; 4]>>,
     /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02

@@ -1,7 +1,9 @@
 //! The judge's place in the loop: every way is swept, and what it finds is kept for the next sample.
 
+use super::ending::SimError;
 use crate::plant::{HullContact, Path, Plant};
 use crate::scenario::Scenario;
+use tautline_audit as audit;
 use tautline_audit::{
     AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Obstacle,
     Status, StepFinding, Violation, swept_distance_m, swept_separation_m,
@@ -10,10 +12,7 @@ use tautline_core::record::Event;
 use tautline_core::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::Law;
-use tautline_laws::space::{Metric, NearPairs};
-
-use super::ending::SimError;
-use super::obstacles::judged;
+use tautline_laws::space::{self, Metric, NearPairs};
 
 /// The auditor with what the loop asks of it from step to step.
 #[derive(Clone)]
@@ -395,6 +394,28 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
         let &Violation { pair, to_s, min_m, .. } = violation;
         events.push(deepest(violation));
         events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
+    }
+}
+
+/// An obstacle at rest, as it is judged.
+#[must_use]
+pub fn judged(obstacle: &space::Obstacle) -> audit::Obstacle {
+    audit::Obstacle {
+        name: obstacle.name.clone(),
+        shape: judged_shape(obstacle.shape),
+        clearance_m: Some(obstacle.clearance_m),
+        path: vec![(0.0, obstacle.place_m)],
+    }
+}
+
+/// A shape, as it is judged.
+#[must_use]
+pub fn judged_shape(shape: space::Shape) -> audit::Shape {
+    match shape {
+        space::Shape::Ball { radius_m } => audit::Shape::Ball { radius_m },
+        space::Shape::Box { half_m, yaw_deg } => audit::Shape::Box { half_m, yaw_rad: yaw_deg.to_radians() },
+        space::Shape::Capsule { from_m, to_m, radius_m } => audit::Shape::Capsule { from_m, to_m, radius_m },
+        space::Shape::HalfSpace { normal } => audit::Shape::HalfSpace { normal },
     }
 }
 

@@ -5,14 +5,10 @@
 //! is one of continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
 //! shortened too. A step allocates nothing.
 
-mod channels;
+mod accuracy;
 mod controller;
 mod ending;
-mod integration;
 mod judge;
-mod obstacles;
-mod parts;
-mod resolution;
 mod simulation;
 mod watch;
 
@@ -20,9 +16,8 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
-pub use obstacles::{judged, judged_shape};
-pub use parts::Parts;
-pub use simulation::{Saved, Simulation};
+pub use judge::{judged, judged_shape};
+pub use simulation::{Parts, Saved, Simulation};
 
 use crate::scenario::Scenario;
 use tautline_core::record::{Event, RecordError, Sink, Step};

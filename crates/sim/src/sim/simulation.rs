@@ -2,19 +2,18 @@
 
 mod step;
 
-use super::channels::Channels;
+use super::accuracy::{IntegrationError, Resolution};
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
-use super::integration::IntegrationError;
 use super::judge::{Judge, Judged};
-use super::parts::Parts;
-use super::resolution::Resolution;
 use super::watch::Watch;
-use crate::plant::{Path, Plant};
+use crate::link::{self, Imperfections};
+use crate::plant::{self, Path, Plant};
 use crate::scenario::Scenario;
-use tautline_core::record::{Event, Peaks, Sample};
+use tautline_core::record::{Channel, Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
-use tautline_laws::law::{Certificate, Void};
+use tautline_laws::law::{Certificate, Law, Void};
+use tautline_laws::target::{Schedule, Supervisor};
 
 /// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
 ///
@@ -325,5 +324,71 @@ impl Simulation {
             last: self.state,
             performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },
         }
+    }
+}
+
+/// What a flight is made of beside its scenario.
+pub struct Parts {
+    /// The control law.
+    pub law: Box<dyn Law>,
+    /// What moves the vehicles.
+    pub plant: Box<dyn Plant>,
+    /// What lies between truth and law.
+    pub link: Box<dyn Imperfections>,
+    /// Who changes the target.
+    pub supervisor: Box<dyn Supervisor>,
+}
+
+impl Parts {
+    /// What the scenario asks for.
+    ///
+    /// # Errors
+    /// [`SimError::Law`] where its law does not exist, which a validated scenario rules out but for memory.
+    pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
+        Ok(Self::under(scenario, scenario.law()?))
+    }
+
+    /// What the scenario asks for, under another law.
+    #[must_use]
+    pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
+        let link = link::of(scenario, law.capabilities().sensing_range_m.is_some());
+        let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival)
+            .free_by(law.capabilities().controls.freedom());
+        let supervisor = match law.capabilities().settling {
+            Some(settling) => {
+                let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
+                supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())
+            }
+            None => supervisor,
+        };
+        Self { law, plant: plant::of(scenario), link, supervisor: Box::new(supervisor) }
+    }
+}
+
+/// The channels of a flight, vehicles' before link's, in memory that is used again for each sample.
+#[derive(Clone)]
+pub(super) struct Channels {
+    all: Vec<Channel>,
+    /// How many of them are the vehicles'.
+    vehicles: usize,
+}
+
+impl Channels {
+    pub(super) fn of(plant: &dyn Plant, link: &dyn Imperfections) -> Self {
+        let mut all = plant.channels();
+        let vehicles = all.len();
+        all.extend(link.channels());
+        Self { all, vehicles }
+    }
+
+    /// Takes the present values.
+    pub(super) fn write(&mut self, plant: &dyn Plant, link: &dyn Imperfections) {
+        let (vehicles, links) = self.all.split_at_mut(self.vehicles);
+        plant.write_channels(vehicles);
+        link.write_channels(links);
+    }
+
+    pub(super) fn all(&self) -> &[Channel] {
+        &self.all
     }
 }

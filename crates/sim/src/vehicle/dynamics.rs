@@ -3,10 +3,10 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 use super::attitude::Attitude;
-use super::downwash::Downwash;
-use super::mixer::Mixer;
 use super::model::{GRAVITY_M_S2, Model, Quadrotor};
-use super::rotor::{RotorCurve, RotorLag};
+use super::rotors::Downwash;
+use super::rotors::Mixer;
+use super::rotors::{RotorCurve, RotorLag};
 
 /// Where a quadrotor is, how it moves and how fast its rotors turn.
 #[derive(Clone, Copy, Debug, PartialEq)]

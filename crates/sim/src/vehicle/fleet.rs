@@ -2,9 +2,9 @@
 
 use nalgebra::{Vector3, Vector4};
 
-use super::downwash::Downwash;
 use super::dynamics::{Drift, Dynamics, Ground, State, Wrench};
 use super::model::Quadrotor;
+use super::rotors::Downwash;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::wind::Wind;

@@ -9,25 +9,21 @@
 //! the order of the model.
 
 mod attitude;
-mod check;
-mod downwash;
 mod dynamics;
-mod file;
 mod fleet;
-mod mixer;
 mod model;
-mod rotor;
+mod rotors;
 mod unicycle;
 
 pub use attitude::{Attitude, LEAST_LIFT, THRUST_RESERVE};
-pub use check::ModelError;
-pub use downwash::{AIR_DENSITY_KG_M3, Downwash};
 pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
-pub use file::{MODELS, Misread, read};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
-pub use mixer::Mixer;
+pub use model::ModelError;
 pub use model::{GRAVITY_M_S2, Model, Quadrotor, Turn};
-pub use rotor::{RotorCurve, RotorLag};
+pub use model::{MODELS, Misread, read};
+pub use rotors::Mixer;
+pub use rotors::{AIR_DENSITY_KG_M3, Downwash};
+pub use rotors::{RotorCurve, RotorLag};
 pub use unicycle::{Heading, Steering, Unicycle};
 
 /// What kind of body a vehicle is.

@@ -1,13 +1,13 @@
 //! What is drawn, and its slots.
 
-use super::error::DrawingError;
-use super::limits::MAX_DRAWN_SLOTS;
-use super::mask::Mask;
-use super::outline::{Curves, Point, Region, regions};
-use super::picture::{Ink, mask};
-use super::spread::spread;
-use super::{svg, text, walk};
+use thiserror::Error;
+
 use crate::formation::Formation;
+
+use super::outline::{self, Curves, Point, Region, regions};
+use super::picture::{Ink, Mask, mask};
+use super::spread::spread;
+
 use tautline_core::swarm::{Rows, set_row};
 
 /// Samples for each slot; odd, so that the middle of a part of a line is one.
@@ -40,7 +40,7 @@ impl Drawing {
     /// # Errors [`DrawingError`] for a character that the font does not have, more than
     /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS), or blanks alone.
     pub fn text(text: &str) -> Result<Self, DrawingError> {
-        let letters = text::letters(text)?;
+        let letters = outline::letters(text)?;
         Ok(Self { drawn: Drawn::Areas(regions(&letters, false)?), letters: letters.len() })
     }
 
@@ -49,7 +49,7 @@ impl Drawing {
     /// # Errors
     /// [`DrawingError`] for data that cannot be read, are not finite, or draw nothing.
     pub fn path(data: &str, filled: bool) -> Result<Self, DrawingError> {
-        Self::curves(&svg::path(data)?, filled)
+        Self::curves(&outline::path(data)?, filled)
     }
 
     /// An SVG file: the lines of its visible shapes, or what they surround. What is written in letters or holds pixels
@@ -58,7 +58,7 @@ impl Drawing {
     /// # Errors
     /// [`DrawingError`] for bytes that are no SVG, or draw nothing.
     pub fn svg(bytes: &[u8], filled: bool) -> Result<Self, DrawingError> {
-        Self::curves(&svg::file(bytes)?, filled)
+        Self::curves(&outline::file(bytes)?, filled)
     }
 
     /// The pixels of a PNG picture that have this ink; without one, those that are opaque where some are not, or else
@@ -115,7 +115,7 @@ impl Drawing {
             Drawn::Lines(regions) => {
                 let lines: Vec<&[Point]> = regions.iter().flat_map(|region| &region.lines).map(Vec::as_slice).collect();
                 let odd = least.div_ceil(count.max(1)) | 1;
-                let (samples, step) = walk::along(&lines, odd * count);
+                let (samples, step) = outline::along(&lines, odd * count);
                 return if samples.is_empty() {
                     Err(DrawingError::Empty)
                 } else {
@@ -131,7 +131,7 @@ impl Drawing {
         if mask.count() == 0 {
             return Err(DrawingError::Empty);
         }
-        let (samples, side) = walk::inside(mask, least);
+        let (samples, side) = outline::inside(mask, least);
         Ok(spread(&samples, count, side, mask.side))
     }
 }
@@ -146,4 +146,61 @@ fn fine_enough(regions: &[Region], least: usize) -> Mask {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1, and clamped")]
     let pixels = ((PIXELS as f64 * finer).ceil().min(MOST_PIXELS as f64)) as usize;
     Mask::of(regions, pixels)
+}
+
+/// Most slots of a drawing.
+pub const MAX_DRAWN_SLOTS: usize = 100_000;
+
+/// Most pixels of a picture in all, whatever its sides: 4096 x 4096.
+pub const MAX_PIXELS: u64 = 1 << 24;
+
+/// Longest text \[characters\].
+pub const MAX_TEXT_CHARS: usize = 1000;
+
+/// Why something cannot be drawn with slots.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum DrawingError {
+    /// A character that the font does not have.
+    #[error("the font has no {0:?}")]
+    Glyph(char),
+    /// A text that is too long.
+    #[error("a text of {0} characters; at most {MAX_TEXT_CHARS} are drawn")]
+    Length(usize),
+    /// Fewer slots than there are letters.
+    #[error("{slots} slots for {letters} letters")]
+    Letters {
+        /// Slots asked for.
+        slots: usize,
+        /// Letters of the text, blanks not counted.
+        letters: usize,
+    },
+    /// Path data that cannot be read.
+    #[error("this is no SVG path: {0}")]
+    Path(String),
+    /// An SVG file that cannot be read.
+    #[error("this is no SVG file: {0}")]
+    Svg(String),
+    /// An SVG file whose elements are nested too deep.
+    #[error("elements of the SVG file are nested more than {0} deep")]
+    Nesting(usize),
+    /// A picture that cannot be read.
+    #[error("this is no PNG picture: {0}")]
+    Png(String),
+    /// A picture that is too large.
+    #[error("{width} x {height} pixels; at most {MAX_PIXELS} in all are read")]
+    Pixels {
+        /// Pixels of a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Lines that are not finite, or too far apart to compute with.
+    #[error("what is drawn reaches to where numbers end")]
+    NotFinite,
+    /// No line and no area.
+    #[error("nothing is drawn")]
+    Empty,
+    /// More slots than a drawing is spread over.
+    #[error("{0} slots; a drawing has at most {MAX_DRAWN_SLOTS}")]
+    Slots(usize),
 }

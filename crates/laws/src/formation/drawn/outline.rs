@@ -1,8 +1,15 @@
 //! Curves as polylines of a drawing whose longer side is 1.
 
 use kurbo::{Affine, BezPath, PathEl, Rect, Shape as _};
+use roxmltree::Document;
+use skrifa::instance::{LocationRef, Size};
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::{FontRef, GlyphId, MetadataProvider as _};
+use usvg::tiny_skia_path::PathSegment;
+use usvg::{FillRule, Group, ImageHrefResolver, Node, Options, Tree};
 
-use super::error::DrawingError;
+use super::drawing::{DrawingError, MAX_TEXT_CHARS};
+use super::picture::Mask;
 
 /// x to the right and y upwards, in longer sides of the drawing.
 pub(super) type Point = [f64; 2];
@@ -75,4 +82,190 @@ fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     });
     lines.retain(|line| line.len() > 1);
     lines
+}
+
+/// Deepest nesting of elements: drawing goes down into them one by one.
+const MAX_NESTING: usize = 200;
+
+/// Path data, as the attribute `d` of SVG has it.
+pub(super) fn path(data: &str) -> Result<Vec<Curves>, DrawingError> {
+    let path = BezPath::from_svg(data).map_err(|error| DrawingError::Path(error.to_string()))?;
+    Ok(vec![Curves { path, even_odd: false }])
+}
+
+/// The visible shapes of a file. What is written in letters or holds pixels is not drawn.
+pub(super) fn file(bytes: &[u8]) -> Result<Vec<Curves>, DrawingError> {
+    let text = std::str::from_utf8(bytes).map_err(|error| DrawingError::Svg(error.to_string()))?;
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options).map_err(|error| DrawingError::Svg(error.to_string()))?;
+    check_nesting(&document)?;
+    // Nothing is read but this file.
+    let resolver = ImageHrefResolver { resolve_data: Box::new(|_, _, _| None), resolve_string: Box::new(|_, _| None) };
+    let options = Options { image_href_resolver: resolver, ..Options::default() };
+    let tree = Tree::from_xmltree(&document, &options).map_err(|error| DrawingError::Svg(error.to_string()))?;
+    let mut found = Vec::new();
+    collect(tree.root(), &mut found);
+    Ok(found)
+}
+
+fn check_nesting(document: &Document<'_>) -> Result<(), DrawingError> {
+    let mut depths: Vec<usize> = Vec::new();
+    for node in document.descendants() {
+        let depth = node.parent().and_then(|parent| depths.get(parent.id().get_usize())).map_or(0, |depth| depth + 1);
+        if depth > MAX_NESTING {
+            return Err(DrawingError::Nesting(MAX_NESTING));
+        }
+        depths.push(depth);
+    }
+    Ok(())
+}
+
+fn collect(group: &Group, found: &mut Vec<Curves>) {
+    for node in group.children() {
+        match node {
+            Node::Group(group) => collect(group, found),
+            Node::Path(path) if path.is_visible() => {
+                let to_page = path.abs_transform();
+                let numbers = [to_page.sx, to_page.ky, to_page.kx, to_page.sy, to_page.tx, to_page.ty];
+                found.push(Curves {
+                    path: Affine::new(numbers.map(f64::from)) * curve(path.data()),
+                    even_odd: path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd),
+                });
+            }
+            Node::Path(_) | Node::Image(_) | Node::Text(_) => {}
+        }
+    }
+}
+
+fn curve(path: &usvg::tiny_skia_path::Path) -> BezPath {
+    let at = |point: usvg::tiny_skia_path::Point| (f64::from(point.x), f64::from(point.y));
+    let mut curve = BezPath::new();
+    for segment in path.segments() {
+        match segment {
+            PathSegment::MoveTo(to) => curve.move_to(at(to)),
+            PathSegment::LineTo(to) => curve.line_to(at(to)),
+            PathSegment::QuadTo(control, to) => curve.quad_to(at(control), at(to)),
+            PathSegment::CubicTo(first, second, to) => curve.curve_to(at(first), at(second), at(to)),
+            PathSegment::Close => curve.close_path(),
+        }
+    }
+    curve
+}
+
+/// A thin sans serif, and one that has more characters.
+const FONTS: [&[u8]; 2] = [epaint_default_fonts::UBUNTU_LIGHT, epaint_default_fonts::HACK_REGULAR];
+
+/// What is added between letters, so that slots of neighbours do not run together \[em\].
+const TRACKING_EM: f32 = 0.1;
+
+/// From line to line \[em\].
+const LINE_EM: f64 = 1.3;
+
+/// The letters of a text, left to right, a line below the other, an em high; blanks have none.
+pub(super) fn letters(text: &str) -> Result<Vec<Curves>, DrawingError> {
+    let length = text.chars().count();
+    if length > MAX_TEXT_CHARS {
+        return Err(DrawingError::Length(length));
+    }
+    let fonts: Vec<_> = FONTS.iter().filter_map(|data| FontRef::new(data).ok()).collect();
+    let mut letters = Vec::new();
+    for (line, text) in text.lines().enumerate() {
+        let mut right_em = 0.0;
+        for letter in text.chars() {
+            let in_font = |font: &FontRef<'static>| Some((font.clone(), font.charmap().map(letter)?));
+            let found = if letter.is_control() { None } else { fonts.iter().find_map(in_font) };
+            let (font, glyph) = found.ok_or(DrawingError::Glyph(letter))?;
+            let path = outline(&font, glyph).ok_or(DrawingError::Glyph(letter))?;
+            let place = Affine::translate((f64::from(right_em), -(line as f64) * LINE_EM));
+            if !path.elements().is_empty() {
+                letters.push(Curves { path: place * path, even_odd: false });
+            }
+            let metrics = font.glyph_metrics(Size::new(1.0), LocationRef::default());
+            right_em += metrics.advance_width(glyph).unwrap_or_default() + TRACKING_EM;
+        }
+    }
+    if letters.is_empty() { Err(DrawingError::Empty) } else { Ok(letters) }
+}
+
+fn outline(font: &FontRef<'_>, glyph: GlyphId) -> Option<BezPath> {
+    let mut pen = Pen(BezPath::new());
+    let settings = DrawSettings::unhinted(Size::new(1.0), LocationRef::default());
+    font.outline_glyphs().get(glyph)?.draw(settings, &mut pen).ok()?;
+    Some(pen.0)
+}
+
+struct Pen(BezPath);
+
+fn at(x: f32, y: f32) -> (f64, f64) {
+    (x.into(), y.into())
+}
+
+impl OutlinePen for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        self.0.move_to(at(x, y));
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        self.0.line_to(at(x, y));
+    }
+
+    fn quad_to(&mut self, cx0: f32, cy0: f32, x: f32, y: f32) {
+        self.0.quad_to(at(cx0, cy0), at(x, y));
+    }
+
+    fn curve_to(&mut self, cx0: f32, cy0: f32, cx1: f32, cy1: f32, x: f32, y: f32) {
+        self.0.curve_to(at(cx0, cy0), at(cx1, cy1), at(x, y));
+    }
+
+    fn close(&mut self) {
+        self.0.close_path();
+    }
+}
+
+/// Order of the curve that walks the inside of a raster: 2^16 pixels a side.
+const ORDER: u8 = 16;
+
+/// Points at equal steps along polylines, from half a step after the first end on, and the step; none without length.
+pub(super) fn along(lines: &[&[Point]], points: usize) -> (Vec<Point>, f64) {
+    let pieces =
+        || lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1], length(ends[0], ends[1]))));
+    let whole: f64 = pieces().map(|(.., length)| length).sum();
+    let step = whole / points as f64;
+    let mut walked = Vec::with_capacity(points);
+    let mut before = 0.0;
+    for (from, to, length) in pieces().filter(|&(.., length)| length > 0.0) {
+        while walked.len() < points {
+            let part = ((walked.len() as f64 + 0.5) * step - before) / length;
+            if part > 1.0 {
+                break;
+            }
+            walked.push([0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * part));
+        }
+        before += length;
+    }
+    (walked, step)
+}
+
+fn length([x0, y0]: Point, [x1, y1]: Point) -> f64 {
+    libm::hypot(x1 - x0, y1 - y0)
+}
+
+/// Points inside what is drawn: `count` of the middles of its pixels, or of equal parts of them, the others evenly
+/// left out; with them the side of a part. None where nothing is drawn.
+pub(super) fn inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
+    let drawn = mask.count();
+    let parts = (1..=count.isqrt() + 1).find(|parts| drawn * parts * parts >= count).unwrap_or(1);
+    let mut places: Vec<[usize; 2]> = mask
+        .pixels()
+        .flat_map(|[x, y]| (0..parts * parts).map(move |part| [x * parts + part % parts, y * parts + part / parts]))
+        .collect();
+    places.sort_by_cached_key(|&[x, y]| fast_hilbert::xy2h(clamped(x), clamped(y), ORDER));
+    let side = mask.side / parts as f64;
+    let kept = places.len().min(count);
+    let points = (0..kept).map(|i| places[(2 * i + 1) * places.len() / (2 * kept)].map(|x| (x as f64 + 0.5) * side));
+    (points.collect(), side)
+}
+
+fn clamped(place: usize) -> u32 {
+    u32::try_from(place).unwrap_or(u32::MAX)
 }

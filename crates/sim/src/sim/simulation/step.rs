@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use super::super::accuracy::Part;
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
-use super::super::integration::Part;
 use super::super::judge::longest_move_m;
 use super::Simulation;
 use crate::feedback::Feedback as _;

@@ -1,0 +1,177 @@
+//! A rotor: its thrust at a speed, and the speed that lags behind what is asked for.
+
+use nalgebra::{Matrix4, Vector3, Vector4};
+
+use super::model::Model;
+
+/// Thrust a n^2 + b n of a rotor \[N\] at n revolutions per minute, never below zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorCurve {
+    a: f64,
+    b: f64,
+}
+
+impl RotorCurve {
+    /// Of a model.
+    #[must_use]
+    pub fn of(model: &Model) -> Self {
+        Self { a: model.thrust_n_per_rpm2, b: model.thrust_n_per_rpm }
+    }
+
+    /// Thrust at a speed \[N\].
+    #[must_use]
+    pub fn thrust_n(self, speed_rpm: f64) -> f64 {
+        (speed_rpm * (self.a * speed_rpm + self.b)).max(0.0)
+    }
+
+    /// Speed that gives a thrust of 0 or more \[rpm\]: n = (-b + sqrt(b^2 + 4 a f))/(2 a).
+    #[must_use]
+    pub fn speed_rpm(self, thrust_n: f64) -> f64 {
+        let Self { a, b } = self;
+        ((b * b + 4.0 * a * thrust_n.max(0.0)).sqrt() - b).max(0.0) / (2.0 * a)
+    }
+}
+
+/// How far rotors come towards the speeds that are asked for within a time: exp(-dt/lag) of the difference is left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotorLag {
+    up: f64,
+    down: f64,
+}
+
+impl RotorLag {
+    pub(super) fn over(model: &Model, dt_s: f64) -> Self {
+        Self { up: libm::exp(-dt_s / model.lag_up_s), down: libm::exp(-dt_s / model.lag_down_s) }
+    }
+
+    /// The speeds \[rpm\] after this time where `asked_rpm` are held: exact, for a speed does not pass what is asked for.
+    #[must_use]
+    pub fn after(self, rotors_rpm: Vector4<f64>, asked_rpm: Vector4<f64>) -> Vector4<f64> {
+        rotors_rpm.zip_map(&asked_rpm, |speed_rpm, asked_rpm| {
+            let left = if asked_rpm > speed_rpm { self.up } else { self.down };
+            asked_rpm + (speed_rpm - asked_rpm) * left
+        })
+    }
+}
+
+/// Determinant, with lengths in arms, from which four rotors set thrust and torques each by itself.
+const LEAST_DETERMINANT: f64 = 1e-3;
+
+/// The shares of each rotor in a thrust and in the torques about the body's axes; by default none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mixer {
+    /// Thrust of each rotor for a unit of all thrust, with no torque.
+    lift: Vector4<f64>,
+    /// Thrust \[N\] of each rotor for a torque of 1 N m about x, y and z, without thrust.
+    turns: [Vector4<f64>; 3],
+    most_n: f64,
+}
+
+impl Mixer {
+    /// Of a model; none where its rotors cannot set thrust and torques each by itself, all pushing.
+    #[must_use]
+    pub fn new(model: &Model) -> Option<Self> {
+        let places = model.rotor_positions_m.map(|[x, y]| [x, y]);
+        let arm_m = places.iter().flatten().fold(0.0, |most: f64, place| most.max(place.abs()));
+        let rows = Matrix4::from_fn(|effect, rotor| match effect {
+            0 => 1.0,
+            1 => places[rotor][1] / arm_m,
+            2 => -places[rotor][0] / arm_m,
+            _ => model.rotor_turns[rotor].reaction(),
+        });
+        let inverse = rows.try_inverse().filter(|_| rows.determinant().abs() >= LEAST_DETERMINANT)?;
+        let share = |effect: usize, unit: f64| Vector4::from(inverse.column(effect)) / unit;
+        let lift = share(0, 1.0);
+        let turns = [share(1, arm_m), share(2, arm_m), share(3, model.torque_per_thrust_m)];
+        (lift.min() > 0.0).then_some(Self { lift, turns, most_n: model.max_thrust_n })
+    }
+
+    /// The thrust of each rotor \[N\], from 0 to its most, that gives a thrust \[N\] and a torque about the body's axes \[N m\]
+    /// as far as they go: roll and pitch as much as there is, then yaw, then thrust.
+    #[must_use]
+    pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
+        let [roll, pitch, yaw] = &self.turns;
+        let all = roll * torque_n_m.x + pitch * torque_n_m.y + yaw * torque_n_m.z + self.lift * lift_n;
+        if all.iter().all(|thrust_n| (0.0..=self.most_n).contains(thrust_n)) {
+            return all;
+        }
+        let level = roll * torque_n_m.x + pitch * torque_n_m.y;
+        let level = level * self.largest_share(&Vector4::zeros(), &level);
+        let yaw = yaw * torque_n_m.z;
+        let turning = level + yaw * self.largest_share(&level, &yaw);
+        let (mut least_n, mut most_n) = (0.0_f64, f64::INFINITY);
+        for (turn, lift) in turning.iter().zip(&self.lift) {
+            least_n = least_n.max(-turn / lift);
+            most_n = most_n.min((self.most_n - turn) / lift);
+        }
+        let lift_n = lift_n.min(most_n).max(least_n);
+        (turning + self.lift * lift_n).map(|thrust_n| thrust_n.clamp(0.0, self.most_n))
+    }
+
+    /// The largest share of `more`, up to all of it, for which some thrust keeps every rotor within its limits; for none of it
+    /// there is one.
+    fn largest_share(&self, base: &Vector4<f64>, more: &Vector4<f64>) -> f64 {
+        let mut share = 1.0_f64;
+        for i in 0..4 {
+            for j in 0..4 {
+                // The thrust that rotor i needs for its least must not be more than rotor j allows for its most.
+                let spread = |of: &Vector4<f64>| of[j] / self.lift[j] - of[i] / self.lift[i];
+                let (room, grows) = (self.most_n / self.lift[j] - spread(base), spread(more));
+                if grows > 0.0 {
+                    share = share.min((room / grows).max(0.0));
+                }
+            }
+        }
+        share
+    }
+}
+
+/// Density of air at sea level \[kg/m^3\].
+pub const AIR_DENSITY_KG_M3: f64 = 1.225;
+
+/// Speed of a round jet on its axis: 6.6 sqrt(T/rho)/z in its far field.
+const FAR_FIELD: f64 = 6.6;
+
+/// Farther from a jet's axis than so many of its widths nothing is felt.
+const WIDTHS: f64 = 4.0;
+
+/// Farther below a rotor nothing is felt \[m\].
+const REACH_M: f64 = 20.0;
+
+/// The jet of one rotor, which blows straight down.
+///
+/// Momentum theory and a textbook's round jet: the induced speed v = sqrt(T/(2 rho A)) becomes 2 v in the wake, and the speed
+/// on the axis falls as U1 = min(2 v, 6.6 sqrt(T/rho)/z), over a width b = sqrt(2 T/(pi rho))/U1 that keeps the momentum.
+/// Jets add up by their squares: U^2 = sum U1^2 exp(-2 r^2/b^2).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Downwash {
+    /// Where the rotor is \[m\].
+    place_m: Vector3<f64>,
+    /// sqrt(T/rho) \[m^2/s\].
+    strength: f64,
+    wake_m_s: f64,
+}
+
+impl Downwash {
+    /// Below a rotor at a place \[m\], of a radius \[m\] and a thrust \[N\].
+    #[must_use]
+    pub fn new(place_m: Vector3<f64>, radius_m: f64, thrust_n: f64) -> Self {
+        let strength = (thrust_n.max(0.0) / AIR_DENSITY_KG_M3).sqrt();
+        let wake_m_s = 2.0 * strength / (radius_m * (2.0 * std::f64::consts::PI).sqrt());
+        Self { place_m, strength, wake_m_s }
+    }
+
+    /// Square of the speed at which it blows downwards at a point \[m^2/s^2\].
+    #[must_use]
+    pub fn squared_m2_s2(&self, point_m: Vector3<f64>) -> f64 {
+        let from_m = point_m - self.place_m;
+        let below_m = -from_m.z;
+        if below_m <= 0.0 || below_m > REACH_M || self.strength == 0.0 {
+            return 0.0;
+        }
+        let axis_m_s = self.wake_m_s.min(FAR_FIELD * self.strength / below_m);
+        let width_m = self.strength * (2.0 / std::f64::consts::PI).sqrt() / axis_m_s;
+        let squared = (from_m.x * from_m.x + from_m.y * from_m.y) / (width_m * width_m);
+        if squared > WIDTHS * WIDTHS { 0.0 } else { axis_m_s * axis_m_s * libm::exp(-2.0 * squared) }
+    }
+}
