@@ -75,7 +75,7 @@ pub(super) struct AuditArguments {
     /// How many vehicles there must be to judge: another number is wrong input.
     #[arg(long, value_name = "N", help_heading = "Question")]
     pub(super) expect_vehicles: Option<usize>,
-    /// Judge the samples of a recording of tautline alone: take no word of its run for what happened between them.
+    /// Judge a recording of tautline from its samples, without the run's audit of every step.
     #[arg(long, help_heading = "Question")]
     pub(super) independent: bool,
     /// Leave it undecided where a vehicle is not seen over the whole window.

@@ -19,9 +19,6 @@
 //! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
 //! [`Settings::max_gap_s`], nothing is known of it. Where there never were two to keep apart nothing is clear.
 //!
-//! A run knows more than it records: what it says of the time between two instants ([`Told`], [`ToldViolation`]) goes before what is drawn
-//! between them.
-//!
 //! ```
 //! use nalgebra::Vector3;
 //! use tautline_audit::Status;
@@ -53,7 +50,6 @@ mod rates;
 mod series;
 mod settings;
 mod smallest;
-mod told;
 mod vehicle;
 mod window;
 
@@ -61,7 +57,7 @@ pub use super::limits::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use error::RecordedError;
-pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies, Told, ToldViolation};
+pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
 pub use places::Places;
 pub use proof::{Proof, ProofBuilder, ProofWindow};
 pub use series::{PairSample, PairSeries};

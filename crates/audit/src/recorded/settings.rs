@@ -75,9 +75,6 @@ pub struct Settings {
     pub radius_m: Option<f64>,
     /// Half axes \[m\] of the ellipsoid around each vehicle, such as a downwash that reaches far down.
     pub ellipsoid_m: Option<Vector3<f64>>,
-    /// Whether what is told of the time between samples ([`super::TrackAuditor::tell`]) is of lengths over the axes of the ellipsoid
-    /// already, and not of metres.
-    pub is_told_scaled: bool,
     /// Judge from here on \[s\].
     pub from_s: Option<f64>,
     /// Judge up to here \[s\].

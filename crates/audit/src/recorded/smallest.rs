@@ -37,14 +37,8 @@ impl Smallest {
         self.interruption = interruption;
     }
 
-    /// Looks at a window, in slices between the samples in it and the instants at which anybody comes or goes. `nearest` says which
-    /// of those that were drawn closest, the closest first, counts.
-    pub(super) fn follow(
-        &mut self,
-        vehicles: &[Vehicle],
-        window: Interval,
-        nearest: impl Fn(&[Approach]) -> Option<Approach>,
-    ) {
+    /// Judges a window in slices between its samples and the instants at which a vehicle appears or leaves.
+    pub(super) fn follow(&mut self, vehicles: &[Vehicle], window: Interval) {
         let company = Company::over(vehicles, window);
         let mut parts: Option<Vec<Vehicle>> = None;
         for two in ends(vehicles, window, &company).windows(2) {
@@ -60,7 +54,7 @@ impl Smallest {
                 }
                 drawn = self.closest(parts, over);
             }
-            if let Some(closest) = nearest(&drawn) {
+            if let Some(&closest) = drawn.first() {
                 self.slices.take(company.slice(over, closest));
             }
         }
@@ -72,11 +66,7 @@ impl Smallest {
         results.closest.kept
     }
 
-    /// The slices, with what the recording itself told.
-    pub(super) fn finish(mut self, told: &[Approach]) -> Vec<Slice> {
-        for closest in told {
-            self.slices.enter(*closest);
-        }
+    pub(super) fn finish(self) -> Vec<Slice> {
         self.slices.finish(MOST_KEPT)
     }
 }

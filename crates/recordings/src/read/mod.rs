@@ -71,6 +71,7 @@ pub use order::Recording;
 use std::fs;
 use std::path::Path;
 
+use crate::mcap::McapRecording;
 use folder::{ARCHIVE, Folder};
 use recognise::recognise;
 use source::Source;
@@ -117,6 +118,12 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
 pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
     let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::Mcap);
     if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
+}
+
+/// Opens a recording of `tautline run` for what it holds beside positions; `None` for any other file.
+#[must_use]
+pub fn open_run(path: &Path) -> Option<McapRecording> {
+    if path.is_file() { mcap::open_run(path) } else { None }
 }
 
 /// What several files that are one recording are called.

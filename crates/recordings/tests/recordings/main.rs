@@ -21,6 +21,7 @@ mod own_channels;
 mod parquet;
 mod refusals;
 mod ros;
+mod stored_audit;
 mod told_apart;
 mod ulog;
 mod vehicles;

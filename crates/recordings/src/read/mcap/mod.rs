@@ -31,12 +31,15 @@ mod tree;
 
 pub use channels::Channels;
 
+use std::path::Path;
+
 use super::error::{Fault, Place, ReadError};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
+use crate::mcap::{McapRecording, SWARM_SCHEMA};
 use splits::Splits;
 use tautline_core::record::{ReadFault, RecordError};
 
@@ -50,18 +53,47 @@ pub(super) fn open_bag(
     foreign::open(folder, Splits::new(files, messages, options), options)
 }
 
+/// What wrote the positions of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Origin {
+    Run,
+    Export,
+    Foreign,
+}
+
+/// Returns the origin of a file by the first schema that is known.
+fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
+    while let Some(part) = topics.next()? {
+        let Part::Schema(name) = part else { continue };
+        let is_export = name == exported::TRACKS.schema_name;
+        let origin = match name {
+            SWARM_SCHEMA => Some(Origin::Run),
+            _ if is_export => Some(Origin::Export),
+            _ => schemas::reader_of(name).map(|_| Origin::Foreign),
+        };
+        if origin.is_some() {
+            return Ok(origin);
+        }
+    }
+    Ok(None)
+}
+
+/// Opens a recording of `tautline run` where [`open`] reads the file as one; `None` for any other file.
+pub(super) fn open_run(path: &Path) -> Option<McapRecording> {
+    let origin = origin(&mut TopicReader::open(path).ok()?).ok()?;
+    McapRecording::open(path).ok().filter(|_| origin == Some(Origin::Run))
+}
+
 /// Opens a recording, going by the first schema that is known.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
-    while let Some(part) = topics.next()? {
-        match part {
-            Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
-            Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
-            Part::Schema(name) if schemas::reader_of(name).is_some() => {
-                return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
-            }
-            _ => {}
+    match origin(&mut topics)? {
+        Some(Origin::Run) => return run::open(source, options),
+        Some(Origin::Export) => return exported::open(source, options),
+        Some(Origin::Foreign) => {
+            return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
         }
+        None => {}
     }
     options.accept_unfinished(topics.is_complete())?;
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
