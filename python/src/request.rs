@@ -20,8 +20,8 @@ pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)
 }
 
 /// Formats by their names.
-pub(crate) fn formats() -> [(&'static str, Format); Format::ALL.len()] {
-    Format::ALL.map(|format| (format.name(), format))
+fn formats() -> Vec<(&'static str, Format)> {
+    Format::all().map(|format| (format.name, format)).collect()
 }
 
 fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) -> PyResult<Option<T>> {

@@ -11,8 +11,8 @@ use super::error::{Fault, Place, ReadError, quoted};
 use super::mcap;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::recognise::BAG;
 use super::source::{Source, ZSTD_MAGIC};
-use super::stranger::BAG;
 
 /// What a bag says of itself.
 const METADATA: &str = "metadata.yaml";

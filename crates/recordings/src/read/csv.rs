@@ -12,15 +12,71 @@ use csv_core::ReadRecordResult;
 use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, quoted};
-use super::format::Format;
 use super::headerless;
 use super::heading;
 use super::layout::Layout;
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
+use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table;
 use super::time_columns;
+
+/// A table in CSV, or text without a row.
+pub(super) const CSV: Reader = Reader {
+    name: "csv",
+    title: "a table in CSV",
+    extensions: &["csv", "txt"],
+    docs: "Table in text with a header, long (`t,id,x,y,z`) or wide (`t,x1,y1,z1,x2,...`)",
+    magic: &[],
+    sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
+    open: |source, options| open(source, Format::CSV, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
+
+/// Numbers between blanks: any other text.
+pub(super) const TEXT: Reader = Reader {
+    name: "text",
+    title: "a table in plain text",
+    extensions: &["txt"],
+    docs: "Numbers between blanks: `t x y z x y z ...`",
+    magic: &[],
+    sniff: |head| head.text.is_some(),
+    open: |source, options| open(source, Format::TEXT, options),
+    takes: &[
+        Takes::TimeUnit,
+        Takes::Rows,
+        Takes::Dimensions,
+        Takes::Columns,
+        Takes::Origin,
+        Takes::Axes,
+        Takes::OneVehicle,
+    ],
+    packing: Packing::Any,
+};
+
+/// The table that a text of numbers may be; by its first bytes alone it is [`TEXT`].
+pub(super) const TRAJNET: Reader = Reader {
+    name: "trajnet",
+    title: "a table of TrajNet",
+    extensions: &["txt"],
+    docs: "Numbers between blanks: frame, vehicle, x and y",
+    magic: &[],
+    sniff: |_| false,
+    open: |source, options| open(source, Format::TRAJNET, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
+
+/// Whether a line is one of CSV and not of numbers between blanks or brackets.
+fn has_separators(line: &[u8]) -> bool {
+    let has = |byte| memchr::memchr(byte, line).is_some();
+    let is_number = |bytes: &[u8]| str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok());
+    let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
+    let has_tuples = begins_with_a_number && has(b'(');
+    (has(b',') && !has_tuples) || has(b';') || (has(b'\t') && !begins_with_a_number)
+}
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +90,7 @@ enum Separator {
 const BLANKS: Separator = Separator::Any(b" \t");
 
 /// The columns of a table of `TrajNet`, which has no header.
-const TRAJNET: [&str; 4] = ["frame", "id", "x", "y"];
+const TRAJNET_COLUMNS: [&str; 4] = ["frame", "id", "x", "y"];
 
 /// Between the numbers of `t (x,y) (x,y)`.
 const TUPLES: Separator = Separator::Any(b" \t(),");
@@ -63,11 +119,11 @@ pub(super) struct Text {
 }
 
 /// Opens a table.
-pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut text = Text::open(source, format)?;
-    if format == Format::Text && !text.named && options.dimensions.is_none() {
+    if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            Likeness::Certain => text = Text::open(source, Format::Trajnet)?,
+            Likeness::Certain => text = Text::open(source, Format::TRAJNET)?,
             Likeness::Possible => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
                                whole";
@@ -147,13 +203,13 @@ impl Text {
         self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
         self.has_header = !numeric;
-        self.comments = numeric || format == Format::Crazyflie;
+        self.comments = numeric || format == Format::CRAZYFLIE;
         let named = |names: &[String]| names.iter().any(|name| heading::is_time(name) || heading::is_frame(name));
         let above = [self.separator, Separator::Byte(b','), BLANKS].map(|separator| names(comment, separator));
         let above = above.into_iter().filter_map(Result::ok);
         let above =
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
-        if format == Format::Trajnet && !(numeric && self.header.len() == TRAJNET.len()) {
+        if format == Format::TRAJNET && !(numeric && self.header.len() == TRAJNET_COLUMNS.len()) {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
             let remedy =
                 "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
@@ -166,10 +222,10 @@ impl Text {
             (self.header, self.has_header, self.comments) = (names, false, true);
         } else if !numeric {
             self.header.pop_if(|name| name.is_empty());
-        } else if format == Format::Trajnet {
-            self.header = TRAJNET.map(str::to_owned).into();
+        } else if format == Format::TRAJNET {
+            self.header = TRAJNET_COLUMNS.map(str::to_owned).into();
             self.first.clear();
-        } else if format == Format::Text {
+        } else if format == Format::TEXT {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
             self.named = false;
         } else {
@@ -329,7 +385,7 @@ fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError>
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
     let mut likeness = Likeness::Possible;
     while next_line(&mut lines, true)? {
-        if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET.len() {
+        if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET_COLUMNS.len() {
             return Ok(Likeness::None);
         }
         let whole = |index| {
@@ -360,12 +416,14 @@ fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
 fn separator(line: &[u8], format: Format) -> Separator {
     let count = |byte| memchr::memchr_iter(byte, line).count();
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
-    match format {
-        Format::Text if line.contains(&b'(') => TUPLES,
-        Format::Text | Format::Trajnet if comma == 0 && semicolon == 0 => BLANKS,
-        _ if semicolon > 0 && semicolon >= comma => Separator::Byte(b';'),
-        _ if tab > comma => Separator::Byte(b'\t'),
-        _ => Separator::Byte(b','),
+    if format == Format::TEXT && line.contains(&b'(') {
+        TUPLES
+    } else if (format == Format::TEXT || format == Format::TRAJNET) && comma == 0 && semicolon == 0 {
+        BLANKS
+    } else if semicolon > 0 && semicolon >= comma {
+        Separator::Byte(b';')
+    } else {
+        Separator::Byte(if tab > comma { b'\t' } else { b',' })
     }
 }
 

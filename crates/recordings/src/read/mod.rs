@@ -27,7 +27,6 @@ mod dates;
 mod earth;
 mod error;
 mod folder;
-mod format;
 mod headerless;
 mod heading;
 mod heights;
@@ -45,11 +44,11 @@ mod options;
 mod order;
 pub(crate) mod parquet;
 mod places;
+mod readers;
 mod recognise;
 mod rows;
 mod skybrush;
 mod source;
-mod stranger;
 mod table;
 mod time_columns;
 mod turned;
@@ -62,11 +61,11 @@ pub use self::parquet::is_guarded;
 pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
-pub use format::Format;
 pub use heading::is_read;
 pub use mcap::Channels;
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions, Scale};
 pub use order::Recording;
+pub use readers::{Format, READERS, Reader};
 
 use std::fs;
 use std::path::Path;
@@ -116,7 +115,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
 /// # Errors
 /// [`ReadError`] when it is damaged before its first instant.
 pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
-    let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::Mcap);
+    let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::MCAP);
     if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
 }
 
@@ -139,7 +138,7 @@ pub fn called(paths: &[&Path]) -> String {
 #[must_use]
 pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
     let mut source = Source::file(path);
-    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::Skybrush;
+    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::SKYBRUSH;
     let limit = if is_show { skybrush::least_distance(&source).ok()?? } else { return None };
     Some(limit * options.metres()).filter(|limit| limit.is_finite() && *limit > 0.0)
 }
@@ -183,8 +182,8 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     };
     let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
     let left_out = folder.note();
-    if format.transpose()? == Some(Format::Crazyflie) {
-        options.refuse_needless(Format::Crazyflie)?;
+    if format.transpose()? == Some(Format::CRAZYFLIE) {
+        options.refuse_needless(Format::CRAZYFLIE)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
     }
@@ -201,10 +200,10 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
 
 fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
-    if let Some(format) = options.format.filter(|format| *format != Format::Mcap) {
+    if let Some(format) = options.format.filter(|format| *format != Format::MCAP) {
         return Err(Fault::WrongFormat(format).into());
     }
-    options.refuse_needless(Format::Mcap)?;
+    options.refuse_needless(Format::MCAP)?;
     bag::open(path, options)
 }
 
@@ -212,21 +211,5 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     options.check()?;
     let format = recognise(&mut source, options.format)?;
     options.refuse_needless(format)?;
-    if matches!(format, Format::Npz | Format::Parquet) {
-        source = source.seekable()?;
-    }
-    let source = &source;
-    match format {
-        Format::Csv | Format::Text | Format::Trajnet => csv::open(source, format, options),
-        Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], None, options),
-        Format::Jsonl => objects::open(source, options),
-        Format::Mcap => mcap::open(source, options),
-        Format::Ulog => ulog::open(source, options),
-        Format::Npz => npz::open(source, options),
-        Format::Parquet => parquet::open(source, options),
-        Format::Skybrush => skybrush::open(source, options),
-        Format::Vviz => vviz::open(source, options),
-        Format::Motive => motive::open(source, options),
-        Format::Vicon => vicon::open(source, options),
-    }
+    (format.open)(&source, options)
 }

@@ -9,11 +9,21 @@ use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_o
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::units;
 
-/// How a take begins.
-pub(super) const BEGIN: &[u8] = b"Format Version,";
+pub(super) const READER: Reader = Reader {
+    name: "motive",
+    title: "a take of OptiTrack Motive",
+    extensions: &["csv"],
+    docs: "Take of OptiTrack Motive as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
+    open,
+    takes: &[Takes::Rows],
+    packing: Packing::Any,
+};
 
 /// Lines among which those that name the columns are.
 const HEAD_LINES: u64 = 20;

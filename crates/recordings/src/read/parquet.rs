@@ -21,9 +21,22 @@ use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::rows::BATCH;
 use super::source::Source;
 use super::table;
+
+pub(super) const READER: Reader = Reader {
+    name: "parquet",
+    title: "a Parquet file",
+    extensions: &["parquet"],
+    docs: "Table in Parquet, long or wide",
+    magic: &[b"PAR1"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open: |source, options| open(&source.clone().seekable()?, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
 
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";

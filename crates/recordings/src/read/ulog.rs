@@ -21,12 +21,22 @@ use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::{About, Ordered, Recording};
+use super::readers::{Packing, Reader, Takes};
 use super::rows::{BATCH, Row, Rows};
 use super::source::Source;
 use super::turned;
 
-/// How a log begins.
-pub(super) const MAGIC: &[u8] = b"ULog\x01\x12\x35";
+pub(super) const READER: Reader = Reader {
+    name: "ulog",
+    title: "a ULog of PX4",
+    extensions: &["ulg"],
+    docs: "Log of PX4",
+    magic: &[b"ULog\x01\x12\x35"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open,
+    takes: &[Takes::Rows, Takes::Origin, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    packing: Packing::Any,
+};
 
 const GLOBAL: &str = "vehicle_global_position";
 const LOCAL: &str = "vehicle_local_position";

@@ -16,8 +16,21 @@ use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_o
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::units;
+
+pub(super) const READER: Reader = Reader {
+    name: "vicon",
+    title: "an export of Vicon",
+    extensions: &["csv"],
+    docs: "Export of Vicon Nexus or Tracker as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(is_export),
+    open,
+    takes: &[Takes::Rows, Takes::Axes],
+    packing: Packing::Any,
+};
 
 /// Names that a first section has.
 const SECTIONS: [&str; 9] =
@@ -27,7 +40,7 @@ const SECTIONS: [&str; 9] =
 const MARKERS: &str = "Trajectories";
 
 /// Whether a text begins as an export does: a section, and its rate.
-pub(super) fn is_export(text: &[u8]) -> bool {
+fn is_export(text: &[u8]) -> bool {
     let mut lines = text.split(|&byte| byte == b'\n').map(cells);
     let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
     let rate = second.first().and_then(|rate| rate.parse::<f64>().ok());

@@ -1,5 +1,6 @@
 //! Recordings of any origin read, written and exported.
 
+mod readers;
 mod recording;
 
 mod any_bytes;

@@ -78,7 +78,7 @@ impl ExportRequest {
         let path = &self.output;
         let by_extension = || {
             let extension = path.extension()?.to_str()?;
-            WRITTEN.iter().copied().find(|format| format.name().eq_ignore_ascii_case(extension))
+            WRITTEN.iter().copied().find(|format| format.name.eq_ignore_ascii_case(extension))
         };
         let format = self.format.or_else(by_extension).ok_or_else(|| {
             let message = format!("the name `{}` does not tell a format", path.display());
@@ -110,7 +110,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
         Ok(Box::new(Interruptible { tracks: open(paths, options)?, path, interrupted: Arc::clone(interrupted) }))
     };
     let channels = || match &paths[..] {
-        [path] if options.format.is_none_or(|format| format == Format::Mcap) => read::open_channels(path),
+        [path] if options.format.is_none_or(|format| format == Format::MCAP) => read::open_channels(path),
         _ => Ok(None),
     };
     let exported = write_atomically_with(output, |file| {

@@ -34,9 +34,9 @@ pub use channels::Channels;
 use std::path::Path;
 
 use super::error::{Fault, Place, ReadError};
-use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Format, Packing, Reader, Takes};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
@@ -52,6 +52,18 @@ pub(super) fn open_bag(
 ) -> Result<Recording, ReadError> {
     foreign::open(folder, Splits::new(files, messages, options), options)
 }
+
+pub(in crate::read) const READER: Reader = Reader {
+    name: "mcap",
+    title: "an MCAP file",
+    extensions: &["mcap"],
+    docs: "MCAP: recordings of tautline, messages of Foxglove or ROS 2",
+    magic: &[b"\x89MCAP0\r\n"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open,
+    takes: &[Takes::Rows, Takes::Origin, Takes::Frame, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    packing: Packing::None,
+};
 
 /// What wrote the positions of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +124,7 @@ impl From<RecordError> for ReadError {
         };
         match fault {
             ReadFault::Empty => Fault::Empty.into(),
-            ReadFault::NotMcap => Fault::WrongFormat(Format::Mcap).into(),
+            ReadFault::NotMcap => Fault::WrongFormat(Format::MCAP).into(),
             ReadFault::TooLong { offset, bytes, limit } => {
                 let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
                 Fault::Damaged(reason).at(Place::Byte(offset))

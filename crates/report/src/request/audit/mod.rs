@@ -136,7 +136,7 @@ pub fn own_recording(
     monitor: &dyn Monitor,
 ) -> Result<Option<OwnRecording>, Failure> {
     match paths {
-        [path] if options.format.is_none_or(|format| format == Format::Mcap) => {
+        [path] if options.format.is_none_or(|format| format == Format::MCAP) => {
             OwnRecording::read(path, options, monitor)
         }
         _ => Ok(None),
