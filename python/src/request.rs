@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use tautline::audit::envelope::{Envelope, Limit, Quantity};
-use tautline::audit::recorded::{self, Motion, VehicleSettings};
+use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
@@ -140,7 +140,7 @@ impl Question {
         require_presence: bool,
         independent: bool,
     ) -> PyResult<Self> {
-        let motions = Motion::ALL.map(|motion| (motion.name(), motion));
+        let motions = Interpolation::ALL.map(|motion| (motion.name(), motion));
         let mut settings = recorded::Settings {
             delta_m: delta,
             motion: choice("motion", motion, &motions)?,

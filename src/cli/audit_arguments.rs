@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::reading::{self, ReadArguments, one_of};
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
-use tautline_audit::recorded::{Motion, Settings, VehicleSettings};
+use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
 use tautline_recordings::read::Format;
 use tautline_report::request::outputs::Called;
 use tautline_report::request::{AuditRequest, ConfigFile, Failure, Subject};
@@ -34,7 +34,7 @@ pub(super) struct AuditArguments {
     pub(super) delta: Option<f64>,
     /// What happens between samples [default: linear for samples, polynomial for curves].
     #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
-    pub(super) motion: Option<Motion>,
+    pub(super) motion: Option<Interpolation>,
     /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
     #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     pub(super) max_accel: Vec<Named>,
@@ -123,14 +123,14 @@ pub(super) struct AuditArguments {
     pub(super) allow_undecided: bool,
 }
 
-fn motion() -> impl TypedValueParser<Value = Motion> {
+fn motion() -> impl TypedValueParser<Value = Interpolation> {
     let help = |motion| match motion {
-        Motion::Linear => "Straight lines",
-        Motion::Hold => "Nothing, with a jump at each sample",
-        Motion::Polynomial => "The recording's own curves",
-        Motion::Bounded => "Anything within the largest acceleration",
+        Interpolation::Linear => "Straight lines",
+        Interpolation::Hold => "Nothing, with a jump at each sample",
+        Interpolation::Polynomial => "The recording's own curves",
+        Interpolation::Bounded => "Anything within the largest acceleration",
     };
-    one_of(Motion::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
+    one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
 
 /// Whose lines mark what was found.

@@ -1,14 +1,8 @@
 //! The audit of a recording, as it is read.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-
-use super::error::RecordedError;
-use super::gaps::Gaps;
 use super::outcome::{Outcome, Tallies, alone};
-use super::presence::absences;
-use super::rates::Rates;
-use super::settings::{LARGEST, Settings};
+use super::presence::{Gaps, Rates, absences};
+use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::Smallest;
 use super::vehicle::Vehicle;
 use super::window::Windows;
@@ -18,6 +12,8 @@ use crate::ledger::Lists;
 use crate::outcome::Status;
 use crate::results::Results;
 use crate::sweep::Interval;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use tautline_core::track::Item;
 
 /// Segments of a vehicle in a window, about.

@@ -1,7 +1,7 @@
 //! The audit of recorded motion: did any two vehicles come too close, by what a recording says?
 //!
 //! A recording is a stream of [`Item`](tautline_core::track::Item)s, each vehicle at times of its own. What happens between two samples is stated
-//! ([`Motion`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
+//! ([`Interpolation`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
 //! **violation**, or **undecided**, with the interval in which the smallest distance lies.
 //!
 //! - Straight flight and jumps are swept in closed form, like the steps of [`super::Auditor`].
@@ -39,15 +39,10 @@
 //! ```
 
 mod auditor;
-mod company;
-mod error;
-mod gaps;
+mod lookup;
 mod outcome;
-mod places;
 mod presence;
 mod proof;
-mod rates;
-mod series;
 mod settings;
 mod smallest;
 mod vehicle;
@@ -56,9 +51,9 @@ mod window;
 pub use super::limits::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
-pub use error::RecordedError;
+pub use lookup::PositionLookup;
+pub use lookup::{PairSample, PairSeries};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
-pub use places::Places;
 pub use proof::{Proof, ProofBuilder, ProofWindow};
-pub use series::{PairSample, PairSeries};
-pub use settings::{Motion, Settings, VehicleSettings};
+pub use settings::RecordedError;
+pub use settings::{Interpolation, Settings, VehicleSettings};

@@ -3,16 +3,14 @@
 //! `python/tautline/check_proof.py` is that program. The claim names the smallest separation, its pair and its time. Each
 //! window holds a box around every vehicle, so that only pairs whose boxes are near need a closer look.
 
-use serde::Serialize;
-
-use super::error::RecordedError;
 use super::outcome::Outcome;
-use super::settings::Settings;
+use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
 use super::window::within;
 use crate::pair_sweep::overlaps;
 use crate::segment::Segment;
 use crate::sweep::Interval;
+use serde::Serialize;
 use tautline_core::track::Item;
 
 /// Segments of the vehicle that has most of them in a window.

@@ -2,11 +2,10 @@
 //!
 //! Numbers are written with as few digits as give the same bits again.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
-
 use super::error::ExportError;
 use super::source::{About, Column, Source};
+use std::fs::File;
+use std::io::{BufWriter, Write};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;

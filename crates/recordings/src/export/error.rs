@@ -1,8 +1,7 @@
 //! Why a recording cannot be exported.
 
-use std::io;
-
 use crate::read::{Format, ReadError};
+use std::io;
 
 /// A recording cannot be exported.
 #[derive(Debug, thiserror::Error)]

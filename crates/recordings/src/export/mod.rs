@@ -5,13 +5,11 @@
 //! read several times, so that memory is bounded by an instant and a block, not by the recording. Curves cannot be
 //! written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
 
-mod beside;
 mod csv;
 mod error;
 mod mcap;
 mod npz;
 mod parquet;
-mod sampled;
 mod source;
 
 pub use crate::read::Format;

@@ -3,24 +3,22 @@
 //! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
 //! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
-use std::borrow::Cow;
-use std::collections::BTreeSet;
-use std::str;
-
-use csv_core::ReadRecordResult;
-
-use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
+use super::columns::Body;
+use super::conventions::Convention;
 use super::error::{Fault, Place, ReadError, quoted};
-use super::headerless;
-use super::heading;
+use super::identity::Slots;
 use super::layout::Layout;
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::table;
-use super::time_columns;
+use super::table::Cells;
+use super::{columns, heading, table};
+use csv_core::ReadRecordResult;
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::str;
 
 /// A table in CSV, or text without a row.
 pub(super) const CSV: Reader = Reader {
@@ -138,7 +136,7 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     let (stem, first) = (source.stem(), &text.first);
     let numbers = || {
         let dimensions = options.dimensions.or(text.tuples());
-        headerless::layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
+        layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
@@ -242,7 +240,7 @@ impl Text {
 
     /// Takes a row of units below the header for what it says: each into the name of its column.
     fn take_units(&mut self) -> Result<(), ReadError> {
-        let found = time_columns::find(&self.header, &ReadOptions::default()).ok().flatten();
+        let found = columns::find(&self.header, &ReadOptions::default()).ok().flatten();
         let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
         if !next_line(&mut self.lines, self.comments)? {
             return Ok(());
@@ -515,4 +513,89 @@ impl Fields {
         self.unquoted = Some(unquoted);
         Ok(())
     }
+}
+
+/// How far the norm of a quaternion may be from 1.
+const NORM: f64 = 0.01;
+
+/// The columns of a vehicle whose x is in this one.
+fn body(x: usize, dimensions: Dimensions) -> Body {
+    let (axes, count) = dimensions.counts();
+    let from = |first: usize| [0, 1, 2].map(|axis| (axis < axes).then_some(first + axis));
+    Body { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
+}
+
+/// The columns of a table whose first row holds these numbers: time and then the numbers of each vehicle, or a table of
+/// the vehicle `alone`, as TUM and KITTI write them.
+pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
+    let count = first.len();
+    let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
+    let table = |time, names, bodies: Vec<Body>, words: &str| {
+        let note = format!("there is no header: the numbers are taken as {words}");
+        Layout {
+            time,
+            rest: None,
+            unit: None,
+            id: None,
+            is_id_given: false,
+            rivals: Vec::new(),
+            suspects: Vec::new(),
+            names,
+            metres: vec![1.0; count],
+            on_earth: false,
+            convention: Convention::default(),
+            is_planar: bodies.iter().any(|body| body.position[2].is_none()),
+            bodies,
+            slots: Slots::default(),
+            notes: vec![note],
+        }
+    };
+    let one = |time, position: [usize; 3], words| {
+        let body = Body { position: position.map(Some), velocity: None, radius: None };
+        table(time, vec![alone.to_owned()], vec![body], words)
+    };
+    if let &[_, _, _, _, x, y, z, w] = first
+        && ((x * x + y * y + z * z + w * w).sqrt() - 1.0).abs() < NORM
+    {
+        return Ok(one(Some(0), [1, 2, 3], "time, position and attitude of one vehicle, as TUM writes them"));
+    }
+    let known: Vec<_> = Dimensions::ALL.into_iter().filter(fits).collect();
+    let dimensions = match (options.dimensions, &known[..]) {
+        (Some(given), _) if fits(&given) => given,
+        (None, &[only]) if count == 1 + only.counts().1 => only,
+        (None, [_, ..]) => {
+            let problem = format!("it has {count} numbers, and nothing says how many of them are one vehicle's");
+            let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
+            let remedy = format!(
+                "say it with --dimensions {}: x and y, x, y and z, and +2 or +3 with their velocities",
+                ways.join(" or ")
+            );
+            return Err(Fault::coded("recording/ambiguous-layout", problem, remedy));
+        }
+        (None, []) if count == 12 => {
+            if options.times_per_second.is_none() {
+                return Err(Fault::frames("it has twelve numbers, as KITTI writes poses, and no time"));
+            }
+            return Ok(one(None, [3, 7, 11], "a pose of one vehicle in each line, as KITTI writes them"));
+        }
+        (given, _) => {
+            let each = given.map_or(3, |given| given.counts().1);
+            let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
+            return Err(Fault::coded(
+                "recording/field-count",
+                problem,
+                "write t x y z x y z ..., a line for each time, or give other --dimensions",
+            ));
+        }
+    };
+    let (axes, each) = dimensions.counts();
+    let bodies: Vec<_> = (1..count).step_by(each).map(|x| body(x, dimensions)).collect();
+    let names: Vec<_> = (1..=bodies.len()).map(|number| number.to_string()).collect();
+    let words = format!(
+        "time and {}{} of each of {} vehicles",
+        if axes == 2 { "x, y (there is no height)" } else { "x, y, z" },
+        if each > axes { " and velocity" } else { "" },
+        names.len()
+    );
+    Ok(table(Some(0), names, bodies, &words))
 }

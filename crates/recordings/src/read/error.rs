@@ -1,10 +1,8 @@
 //! Why a recording cannot be read: the file, the place in it, the fault and the remedy.
 
-use std::fmt;
-use std::io;
-use std::path::Path;
-
 use super::readers::Format;
+use std::path::Path;
+use std::{fmt, io};
 
 /// Longest value that a message repeats \[characters\].
 const LONGEST_QUOTE: usize = 60;

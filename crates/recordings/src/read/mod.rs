@@ -12,48 +12,35 @@
 //! no parts of one, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
-mod archive;
 mod axes;
 mod bag;
 mod capture;
-mod cells;
 mod clock;
 mod columns;
 mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
-mod dates;
 mod earth;
 mod error;
 mod folder;
-mod headerless;
 mod heading;
-mod heights;
 mod identity;
-mod join;
 mod layout;
-mod leftovers;
 pub(crate) mod mcap;
 mod motive;
-mod names;
 mod npy;
 mod npz;
 mod objects;
 mod options;
 mod order;
 pub(crate) mod parquet;
-mod places;
 mod readers;
 mod recognise;
-mod rows;
 mod skybrush;
 mod source;
 mod table;
-mod time_columns;
-mod turned;
 mod ulog;
-mod units;
 mod vicon;
 mod vviz;
 
@@ -86,7 +73,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
+    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -106,7 +93,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
+    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -195,7 +182,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
     };
-    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
+    folder::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }
 
 fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {

@@ -3,15 +3,14 @@
 //! The first line says the unit of length. Five lines or so name the columns: type, name, ID, perhaps the parent, what is
 //! measured (`Position`) and its axis. Axes are those of Motive: y up.
 
-use std::collections::BTreeSet;
-
-use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
+use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::units;
+use super::{capture, heading};
+use std::collections::BTreeSet;
 
 pub(super) const READER: Reader = Reader {
     name: "motive",
@@ -78,7 +77,7 @@ impl Head {
 
     fn capture(&self) -> Result<Capture, Fault> {
         let unit = self.said("Length Units").unwrap_or_default();
-        let metres = units::size_of(unit, false).ok_or_else(|| {
+        let metres = heading::size_of(unit, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
                 format!("its unit of length is not known: {}", quoted(unit)),

@@ -14,20 +14,15 @@
 //! Where the lengths of the axes have several meanings (3 x 3 x 3, or T x 3 x 2), neither the user nor `axes` says which one
 //! holds, the archive is refused. Arrays in the usual order are streamed; others are in memory.
 
-use std::collections::BTreeSet;
-
-use nalgebra::Vector3;
-
-use super::archive::Archive;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
-use super::names::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, Ordered, PLANAR, Recording};
+use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
-use super::rows::{BATCH, Row, Rows};
-use super::source::Source;
+use super::source::{Archive, Source};
+use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 pub(super) const READER: Reader = Reader {
     name: "npz",

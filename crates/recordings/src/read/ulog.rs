@@ -10,21 +10,18 @@
 //! computer: the smallest delay of a GPS message sets them to UTC. The messages are decoded here, because the kept crate fills
 //! one that breaks off with zeros.
 
-use std::collections::BTreeMap;
-use std::io::{BufReader, Read};
-use std::str;
-
-use nalgebra::Vector3;
-
+use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
-use super::order::{About, Ordered, Recording};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
-use super::rows::{BATCH, Row, Rows};
 use super::source::Source;
-use super::turned;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
+use std::str;
 
 pub(super) const READER: Reader = Reader {
     name: "ulog",
@@ -53,7 +50,7 @@ const EARLIEST_UTC_US: u64 = 1_000_000_000_000_000;
 
 /// Opens a log.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    turned::refuse_known(options, "a log of PX4")?;
+    axes::refuse_known(options, "a log of PX4")?;
     let asked = match &options.topics[..] {
         [] => None,
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),

@@ -12,13 +12,13 @@
 //! Objects have translations (`TX`, `TY`, `TZ`) beside their rotations; where some section has these, it is read, else the
 //! trajectories of markers.
 
-use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
+use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::units;
+use super::{capture, heading};
 
 pub(super) const READER: Reader = Reader {
     name: "vicon",
@@ -179,7 +179,7 @@ impl Head {
                 format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
             return Err(Fault::coded("recording/unit-conflict", problem, "export all in millimetres"));
         }
-        units::size_of(first, false).ok_or_else(|| {
+        heading::size_of(first, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
                 format!("its unit of length is not known: {}", quoted(first)),

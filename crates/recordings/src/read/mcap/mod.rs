@@ -13,23 +13,16 @@
 //! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
 //! what it holds.
 
-mod channels;
-pub(crate) mod exported;
 mod foreign;
 mod foxglove_poses;
 mod messages;
 mod outline;
+pub(crate) mod own;
 mod plan;
-mod poses;
-mod rigid;
 mod ros;
-mod run;
-mod schemas;
-mod splits;
-mod topic_name;
 mod tree;
 
-pub use channels::Channels;
+pub use own::Channels;
 
 use std::path::Path;
 
@@ -40,7 +33,7 @@ use super::readers::{Format, Packing, Reader, Takes};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
-use splits::Splits;
+use foreign::Splits;
 use tautline_core::record::{ReadFault, RecordError};
 
 /// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
@@ -77,11 +70,11 @@ enum Origin {
 fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
     while let Some(part) = topics.next()? {
         let Part::Schema(name) = part else { continue };
-        let is_export = name == exported::TRACKS.schema_name;
+        let is_export = name == own::TRACKS.schema_name;
         let origin = match name {
             SWARM_SCHEMA => Some(Origin::Run),
             _ if is_export => Some(Origin::Export),
-            _ => schemas::reader_of(name).map(|_| Origin::Foreign),
+            _ => messages::reader_of(name).map(|_| Origin::Foreign),
         };
         if origin.is_some() {
             return Ok(origin);
@@ -100,8 +93,8 @@ pub(super) fn open_run(path: &Path) -> Option<McapRecording> {
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
     match origin(&mut topics)? {
-        Some(Origin::Run) => return run::open(source, options),
-        Some(Origin::Export) => return exported::open(source, options),
+        Some(Origin::Run) => return own::open_samples(source, options),
+        Some(Origin::Export) => return own::open_export(source, options),
         Some(Origin::Foreign) => {
             return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
         }

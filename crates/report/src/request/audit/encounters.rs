@@ -5,7 +5,7 @@ use super::Open;
 use crate::figures::{self, Encounter, Figure};
 use crate::report::recorded::interval;
 use tautline_audit::Slice;
-use tautline_audit::recorded::{Approach, Outcome, PairSeries, Places, RecordedError, Settings};
+use tautline_audit::recorded::{Approach, Outcome, PairSeries, PositionLookup, RecordedError, Settings};
 
 /// Pairs, and approaches to obstacles, that are drawn.
 const DRAWN: usize = 3;
@@ -16,7 +16,7 @@ pub(super) fn figures(
     monitor: &dyn Monitor,
     settings: &Settings,
     outcome: &Outcome,
-    places: &mut Places,
+    places: &mut PositionLookup,
 ) -> Result<Vec<Figure>, Failure> {
     let follow = |approach: &Approach| Ok((PairSeries::new(settings, outcome, approach.pair)?, *approach));
     let closest = |of: &[Approach]| of.iter().take(DRAWN).map(follow).collect::<Result<Vec<_>, RecordedError>>();

@@ -22,7 +22,7 @@ use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
 use tautline_audit::Obstacle;
-use tautline_audit::recorded::{Motion, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
+use tautline_audit::recorded::{Interpolation, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
@@ -309,7 +309,7 @@ impl<'a> AuditRequest<'a> {
 
     /// The settings with the obstacles and the fence of files.
     fn complete_settings(&self) -> Result<Settings, Failure> {
-        if self.has_max_accel() && self.settings.motion != Some(Motion::Bounded) {
+        if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
             return Err(Failure::input(
                 "audit/unused-acceleration",
                 "--max-accel says nothing of a motion that is known exactly",
@@ -383,7 +383,7 @@ impl<'a> AuditRequest<'a> {
         const FASTEST_M_S: f64 = 340.0;
         let settings = &self.settings;
         let asked = [
-            (settings.motion == Some(Motion::Bounded), "--motion bounded"),
+            (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
             (settings.from_s.is_some(), "--from"),
             (settings.to_s.is_some(), "--to"),
             (settings.max_gap_s.is_some(), "--max-gap"),
@@ -421,8 +421,8 @@ impl<'a> AuditRequest<'a> {
             all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
         };
         let (motion, basis) = match self.settings.motion {
-            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
-            Some(Motion::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
+            Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
             _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
             _ if answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
             _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),

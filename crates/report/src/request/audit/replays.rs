@@ -8,7 +8,7 @@ use crate::figures::Figure;
 use crate::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::recorded::RecordedReport;
 use tautline_audit::Slices;
-use tautline_audit::recorded::{Motion, Outcome, Places, Settings, TOUCHING_ELLIPSOIDS};
+use tautline_audit::recorded::{Interpolation, Outcome, PositionLookup, Settings, TOUCHING_ELLIPSOIDS};
 use tautline_core::track::Item;
 
 /// Most times of a recording that are kept while it is judged.
@@ -77,7 +77,7 @@ pub(super) fn of_recording(
     let moments = report.moments();
     let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
     let seen = instants.seen;
-    let mut places = Places::new(settings, outcome, instants.shown(outcome, &spans));
+    let mut places = PositionLookup::new(settings, outcome, instants.shown(outcome, &spans));
     let figures = encounters::figures(open, monitor, settings, outcome, &mut places)?;
     let mut near = Slices::default();
     outcome.smallest.iter().for_each(|slice| near.take(*slice));
@@ -93,7 +93,7 @@ pub(super) fn of_recording(
     };
     let gaps = places.gaps().iter().map(|gap| (gap.vehicle, [gap.from_s, gap.to_s])).collect();
     let (times_s, positions_m) = places.finish();
-    let holds = settings.motion == Some(Motion::Hold);
+    let holds = settings.motion == Some(Interpolation::Hold);
     let film = Film::of(times_s, positions_m, near, seen).with_gaps(gaps).holding(holds);
     Ok((Replay::new(&stage, &film, &moments, report.judgement(), PAGE_BYTES), figures))
 }
