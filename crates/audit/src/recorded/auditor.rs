@@ -1,5 +1,8 @@
 //! The audit of a recording, as it is read.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use super::outcome::{Outcome, Tallies, alone};
 use super::presence::{Gaps, Rates, absences};
 use super::settings::{LARGEST, RecordedError, Settings};
@@ -12,8 +15,6 @@ use crate::ledger::Lists;
 use crate::outcome::Status;
 use crate::results::Results;
 use crate::sweep::Interval;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use tautline_core::track::Item;
 
 /// Segments of a vehicle in a window, about.

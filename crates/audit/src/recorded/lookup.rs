@@ -1,4 +1,6 @@
-//! Where the vehicles of a recording were at given times, as they are judged.
+//! Positions of vehicles at given times, and distances of one pair over time, while a recording is read again.
+
+use nalgebra::Vector3;
 
 use super::outcome::{Gap, Outcome};
 use super::settings::{RecordedError, Settings};
@@ -9,7 +11,6 @@ use crate::outcome::ObjectPair;
 use crate::pair_sweep::{Overlap, overlaps};
 use crate::segment::Segment;
 use crate::sweep::Interval;
-use nalgebra::Vector3;
 use tautline_core::swarm::{Rows, set_row};
 use tautline_core::track::Item;
 

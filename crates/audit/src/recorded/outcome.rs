@@ -1,12 +1,13 @@
 //! What an audit says of a recording.
 
+use serde::Serialize;
+
 use crate::envelope::EnvelopeOutcome;
 use crate::obstacle::Obstacle;
 use crate::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use crate::shortlist::Tally;
 use crate::slices::Slice;
 use crate::sweep::Interval;
-use serde::Serialize;
 
 /// A time during which a vehicle was not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

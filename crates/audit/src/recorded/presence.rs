@@ -1,11 +1,12 @@
-//! Which vehicles are not seen over the whole window.
+//! Presence of vehicles: usual intervals between samples, gaps, and vehicles that are not seen over the whole window.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::outcome::{Absence, Gap, Presence};
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use crate::shortlist::{Finding, LISTED, Shortlist, Tally};
 use crate::sweep::Interval;
-use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::track::Item;
 
 /// Relative rounding of a mean interval.

@@ -3,6 +3,8 @@
 //! `python/tautline/check_proof.py` is that program. The claim names the smallest separation, its pair and its time. Each
 //! window holds a box around every vehicle, so that only pairs whose boxes are near need a closer look.
 
+use serde::Serialize;
+
 use super::outcome::Outcome;
 use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
@@ -10,7 +12,6 @@ use super::window::within;
 use crate::pair_sweep::overlaps;
 use crate::segment::Segment;
 use crate::sweep::Interval;
-use serde::Serialize;
 use tautline_core::track::Item;
 
 /// Segments of the vehicle that has most of them in a window.

@@ -1,12 +1,14 @@
-//! What is asked of a recording.
+//! The question of an audit, and errors in it or in the recording.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+use serde::Deserialize;
 
 use crate::envelope::{Envelope, Limit, Quantity};
 use crate::limits::{Limits, TOUCHING_ELLIPSOIDS};
 use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
-use nalgebra::Vector3;
-use serde::Deserialize;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number that is accepted, be it a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;

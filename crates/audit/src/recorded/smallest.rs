@@ -1,4 +1,4 @@
-//! The smallest distance of all pairs over time.
+//! The smallest distance of all pairs over time, in the intervals in which at least two vehicles are present.
 
 use super::settings::Settings;
 use super::vehicle::Vehicle;
@@ -93,12 +93,12 @@ fn ends(vehicles: &[Vehicle], window: Interval, intervals: &PresenceIntervals) -
     if ends.len() == 1 { vec![window.from_s, window.to_s] } else { ends }
 }
 
-/// Times of a window at which two vehicles are there, not both of them on the ground.
+/// Intervals of a window in which at least two vehicles are present, not all of them on the ground.
 #[derive(Clone, Debug)]
 pub(super) struct PresenceIntervals {
-    /// When somebody comes, goes, takes off or lands, within the window \[s\].
+    /// When a vehicle appears, leaves, takes off or lands within the window \[s\].
     pub(super) changes_s: Vec<f64>,
-    /// When two are there, in order of time; no two touch.
+    /// The intervals in order of time; no two of them touch.
     pub(super) stretches: Vec<Interval>,
 }
 

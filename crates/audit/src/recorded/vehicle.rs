@@ -1,5 +1,7 @@
 //! One vehicle of a recording, from items to segments.
 
+use nalgebra::Vector3;
+
 use super::outcome::{Contradiction, Gap, Presence};
 use super::settings::{Interpolation, RecordedError, Settings};
 use crate::envelope::Seen;
@@ -7,7 +9,6 @@ use crate::polynomial::{BernsteinBasis, parts_told};
 use crate::segment::{Curve, Deviation, Segment};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::whole_motion::compare_height;
-use nalgebra::Vector3;
 use tautline_core::track::{Item, Piece, Sample};
 
 /// Pieces of a curve that follow each other within this \[s\] leave no gap: files write times with about this resolution. A

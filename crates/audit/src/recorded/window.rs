@@ -6,6 +6,11 @@
 //! is as sharp for a swarm that flies together as for one that rests. Sort and sweep along the longest axis finds the pairs
 //! to compare. A window in which too many pairs remain is halved.
 
+use std::mem;
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
 use super::vehicle::Vehicle;
 use crate::enclosure::Target;
 use crate::limits::Limits;
@@ -17,9 +22,6 @@ use crate::polynomial::stray;
 use crate::results::{KEPT, Results};
 use crate::segment::Segment;
 use crate::sweep::{Interval, RelativeMotion, larger};
-use nalgebra::Vector3;
-use std::mem;
-use std::ops::Range;
 use tautline_core::swarm::Pair;
 
 /// With more pairs left than this for each vehicle a window is halved.

@@ -2,10 +2,11 @@
 //!
 //! Numbers are written with as few digits as give the same bits again.
 
-use super::error::ExportError;
-use super::source::{About, Column, Source};
 use std::fs::File;
 use std::io::{BufWriter, Write};
+
+use super::error::ExportError;
+use super::source::{About, Column, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;

@@ -1,7 +1,8 @@
 //! Why a recording cannot be exported.
 
-use crate::read::{Format, ReadError};
 use std::io;
+
+use crate::read::{Format, ReadError};
 
 /// A recording cannot be exported.
 #[derive(Debug, thiserror::Error)]

@@ -1,14 +1,16 @@
 //! An MCAP file with the messages of [`crate::read`]'s exported recordings, `/vehicles` and `/tracks`, and a topic for each
 //! channel as in `run.mcap`, with a row for each vehicle of the message on `/tracks` behind it.
 
+use std::fs::File;
+use std::io::BufWriter;
+
+use mcap::WriteOptions;
+
 use super::error::ExportError;
 use super::source::{About, Source};
 use crate::mcap::topic::{TopicWriter, encode, log_time_ns};
 use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::read::mcap::own::{Instant, TRACKS, VEHICLES, Vehicles};
-use mcap::WriteOptions;
-use std::fs::File;
-use std::io::BufWriter;
 use tautline_core::track::Sample;
 
 /// Size at which a chunk is closed \[bytes\].

@@ -4,15 +4,17 @@
 //!
 //! The recording is read once for each array, so that none of them is in memory.
 
-use super::error::ExportError;
-use super::source::{About, Source, Written};
-use nalgebra::Vector3;
 use std::fs::File;
 use std::io;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
-use tautline_core::track::Sample;
+
+use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
+
+use super::error::ExportError;
+use super::source::{About, Source, Written};
+use tautline_core::track::Sample;
 
 /// Arrays that mean something to who reads motion.
 const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];

@@ -1,8 +1,8 @@
 //! A long table in Parquet, with the columns of the table in text.
 
-use super::error::ExportError;
-use super::source::{About, Source};
-use crate::read::parquet::EPOCH_KEY;
+use std::fs::File;
+use std::sync::Arc;
+
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
 use parquet::errors::ParquetError;
@@ -10,8 +10,10 @@ use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
-use std::fs::File;
-use std::sync::Arc;
+
+use super::error::ExportError;
+use super::source::{About, Source};
+use crate::read::parquet::EPOCH_KEY;
 use tautline_core::track::Sample;
 
 /// Rows of a group, which is built in memory.

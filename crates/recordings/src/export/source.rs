@@ -1,9 +1,11 @@
-//! A recording that is exported, instant by instant.
+//! A recording that is exported: its instants, its curves as samples, and the channels beside positions.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
 
 use super::error::ExportError;
 use crate::read::{Channels, ReadError, Recording, is_read};
-use nalgebra::Vector3;
-use std::sync::Arc;
 use tautline_core::record::Channel;
 use tautline_core::track::{Clock, Item, Piece, Sample, Tracks};
 

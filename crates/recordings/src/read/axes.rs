@@ -1,10 +1,12 @@
-//! Axes of recordings turned to x, y and z of ours: east, north and up, or any frame whose z is up.
+//! Directions of the axes of a recording, and recordings turned to x east, y north and z up.
+
+use std::str::FromStr;
+
+use nalgebra::Vector3;
 
 use super::error::{Fault, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
-use nalgebra::Vector3;
-use std::str::FromStr;
 use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Which axis of a recording becomes x, y and z, and by what it is multiplied.

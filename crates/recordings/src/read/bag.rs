@@ -1,17 +1,19 @@
 //! ROS 2 bags: a folder with `metadata.yaml` and files in MCAP, which follow each other and may be packed by zstd.
 
+use std::collections::BTreeSet;
+use std::fs;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Deserialize;
+
 use super::error::{Fault, Place, ReadError, quoted};
 use super::mcap;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::recognise::BAG;
 use super::source::{Source, ZSTD_MAGIC};
-use serde::Deserialize;
-use std::collections::BTreeSet;
-use std::fs;
-use std::fs::File;
-use std::io::Read as _;
-use std::path::{Component, Path, PathBuf};
 
 /// What a bag says of itself.
 const METADATA: &str = "metadata.yaml";

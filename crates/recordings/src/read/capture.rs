@@ -1,13 +1,15 @@
 //! What the tables of motion capture share: rows below a head of several lines, a vehicle in several markers.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::str;
+
+use nalgebra::Vector3;
+
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::{Lines, Source};
-use nalgebra::Vector3;
-use std::collections::{BTreeMap, BTreeSet};
-use std::str;
 
 /// When a row is.
 #[derive(Clone, Copy, Debug, PartialEq)]

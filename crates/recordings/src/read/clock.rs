@@ -1,8 +1,10 @@
-//! Times as a recording writes them, and the clock that turns them into seconds.
+//! Times and dates as a recording writes them, and the clock that converts them to seconds.
 
-use chrono::{DateTime, NaiveDateTime};
 use std::cmp::Ordering;
 use std::fmt::Write as _;
+
+use chrono::{DateTime, NaiveDateTime};
+
 use tautline_core::track::Clock;
 
 /// From this distance to zero on, a clock is counted from an epoch \[s\]: there doubles are coarser than 0.1 ns.

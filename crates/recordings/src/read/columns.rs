@@ -1,4 +1,6 @@
-//! Which column of a table gives what, as far as it is found.
+//! Columns of a table by their roles: positions, velocities, and one or two columns of time.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::{Stamp, TimeUnit};
 use super::earth::Heights;
@@ -6,7 +8,6 @@ use super::error::{Fault, list, quoted};
 use super::heading::{EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::options::{ColumnNames, ReadOptions};
 use super::{axes, heading};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// The columns of a position, and of what else is known of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]

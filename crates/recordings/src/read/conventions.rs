@@ -8,11 +8,12 @@
 //! | `px`, `py`, `pz` beside `ledr`, `ledg`, `ledb` (trajectories of MAVSDK Drone Show) | north, east, down | one |
 //! | `p_RS_R_x`, ... (ground truth of `EuRoC`) | x, y, z | one |
 
+use std::collections::BTreeSet;
+
 use super::axes::Axes;
 use super::error::Fault;
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
-use std::collections::BTreeSet;
 
 /// The remedy for positions that are relative to a place of each vehicle.
 pub(super) const GLOBAL: &str =

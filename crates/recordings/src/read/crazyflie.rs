@@ -8,6 +8,8 @@
 //! holds a file for each vehicle, or a folder for each vehicle whose files follow each other. Files come in the order of
 //! the numbers in their names.
 
+use nalgebra::Vector3;
+
 use super::csv::Text;
 use super::curves::{Curves, piece};
 use super::error::{Fault, ReadError, quoted};
@@ -16,7 +18,6 @@ use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
 use super::source::Source;
 use super::table::{Cells as _, number};
-use nalgebra::Vector3;
 use tautline_core::track::Item;
 
 pub(super) const READER: Reader = Reader {

@@ -3,6 +3,12 @@
 //! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
 //! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::str;
+
+use csv_core::ReadRecordResult;
+
 use super::clock::{Stamp, TimeUnit};
 use super::columns::Body;
 use super::conventions::Convention;
@@ -15,10 +21,6 @@ use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table::Cells;
 use super::{columns, heading, table};
-use csv_core::ReadRecordResult;
-use std::borrow::Cow;
-use std::collections::BTreeSet;
-use std::str;
 
 /// A table in CSV, or text without a row.
 pub(super) const CSV: Reader = Reader {

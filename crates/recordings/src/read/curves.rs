@@ -1,9 +1,11 @@
 //! Recordings that hold curves: all pieces are in memory.
 
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
 use super::error::ReadError;
 use super::order::{BATCH, Recording};
-use nalgebra::Vector3;
-use std::collections::BTreeSet;
 use tautline_core::track::{Clock, Item, Piece, Tracks};
 
 /// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.

@@ -3,6 +3,10 @@
 //! The way is exact and not that of a flat map: to coordinates around the centre of the Earth, and from there into the
 //! frame of the origin. A double resolves 1 nm at that distance, and so do the places.
 
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Matrix3, Vector3};
+
 use super::axes;
 use super::conventions::GLOBAL;
 use super::error::{Fault, ReadError, quoted};
@@ -11,8 +15,6 @@ use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Row;
 use super::table::{Cells, number, vector};
-use nalgebra::{Matrix3, Vector3};
-use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].

@@ -1,8 +1,9 @@
 //! Why a recording cannot be read: the file, the place in it, the fault and the remedy.
 
-use super::readers::Format;
 use std::path::Path;
 use std::{fmt, io};
+
+use super::readers::Format;
 
 /// Longest value that a message repeats \[characters\].
 const LONGEST_QUOTE: usize = 60;

@@ -1,14 +1,15 @@
-//! Folders and archives that hold a file for each vehicle.
+//! Folders and archives that hold a file for each vehicle, and several files joined to one recording.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use super::error::{Fault, ReadError, quoted};
 use super::identity::spelling;
 use super::order::Recording;
 use super::recognise::is_prose;
 use super::source::{Archive, Source};
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
-use std::fs;
-use std::path::{Path, PathBuf};
 use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
 
 /// Longest number in a file's name that is put in order by its value \[digits\].

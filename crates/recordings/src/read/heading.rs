@@ -1,4 +1,4 @@
-//! What the name of a column says: a quantity, perhaps of a vehicle, perhaps in a unit.
+//! Names of columns: a quantity, perhaps of one vehicle, perhaps with a unit; and the units.
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};

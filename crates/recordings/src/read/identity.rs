@@ -1,11 +1,13 @@
 //! Whether the rows of a table say which vehicle they are of: columns that could name vehicles, by their names and by their
 //! values.
 
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::Vector3;
+
 use super::error::{Fault, quoted};
 use super::heading;
 use super::heading::Heading;
-use nalgebra::Vector3;
-use std::collections::{BTreeMap, HashMap};
 
 /// Distinct values of a column beyond which it names no vehicles.
 const MOST_VALUES: usize = 1000;

@@ -3,6 +3,8 @@
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
 //! regard to case. A unit that a name says is honoured, and one that is not known is refused.
 
+use std::collections::BTreeSet;
+
 use super::clock::TimeUnit;
 use super::columns::{Body, Columns, Rest, missing};
 use super::conventions::Convention;
@@ -13,7 +15,6 @@ use super::identity::Slots;
 use super::options::ReadOptions;
 use super::order::PLANAR;
 use super::{axes, columns, heading, identity};
-use std::collections::BTreeSet;
 
 /// Names of places that are no vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];

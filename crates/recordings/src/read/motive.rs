@@ -3,6 +3,8 @@
 //! The first line says the unit of length. Five lines or so name the columns: type, name, ID, perhaps the parent, what is
 //! measured (`Position`) and its axis. Axes are those of Motive: y up.
 
+use std::collections::BTreeSet;
+
 use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
@@ -10,7 +12,6 @@ use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::{capture, heading};
-use std::collections::BTreeSet;
 
 pub(super) const READER: Reader = Reader {
     name: "motive",

@@ -3,10 +3,11 @@
 //! The header is read here because a file may lie about its lengths: memory grows only with bytes that are there, where
 //! `npyz` reserves up to 4 GiB that a header claims for itself, and costs a cold build 22 core-seconds and 17 crates.
 
-use super::clock::{Stamp, TimeUnit};
-use super::error::Fault;
 use std::io;
 use std::io::Read;
+
+use super::clock::{Stamp, TimeUnit};
+use super::error::Fault;
 
 /// First bytes of an array.
 const MAGIC: &[u8; 6] = b"\x93NUMPY";

@@ -14,6 +14,10 @@
 //! Where the lengths of the axes have several meanings (3 x 3 x 3, or T x 3 x 2), neither the user nor `axes` says which one
 //! holds, the archive is refused. Arrays in the usual order are streamed; others are in memory.
 
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
+
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::npy::Array;
@@ -21,8 +25,6 @@ use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
 use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
-use nalgebra::Vector3;
-use std::collections::BTreeSet;
 
 pub(super) const READER: Reader = Reader {
     name: "npz",

@@ -1,6 +1,12 @@
 //! Tables with an object of JSON in each line. Keys are columns; those of an object in an object stand behind its own and a
 //! dot, two or three numbers in a list are called x, y and z.
 
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+
+use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
 use super::clock::Stamp;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::layout::Layout;
@@ -10,10 +16,6 @@ use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table;
 use super::table::Cells;
-use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
-use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
-use std::fmt;
 
 pub(super) const READER: Reader = Reader {
     name: "jsonl",

@@ -1,11 +1,12 @@
 //! What the user says of a recording.
 
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
 use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
 use super::readers::{Format, Takes};
-use std::collections::BTreeMap;
-use std::str::FromStr;
 
 /// What an axis of an array of positions counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

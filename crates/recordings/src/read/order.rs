@@ -1,13 +1,16 @@
-//! Rows of a recording in the order of its file, given out in the order of time.
+//! Rows of a recording, names of its vehicles, and their order: rows in the order of the file are given out in the order of
+//! time.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::identity::{alike, spelling};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source;
-use nalgebra::Vector3;
-use std::collections::HashMap;
-use std::path::PathBuf;
 use tautline_core::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].

@@ -3,6 +3,18 @@
 //! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
 //! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
 
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit, Type as Physical};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, DataType};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
+
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
@@ -12,16 +24,6 @@ use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
 use super::table;
 use super::table::Cells;
-use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit, Type as Physical};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, DataType};
-use parquet::errors::ParquetError;
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
-use parquet::schema::types::ColumnDescriptor;
-use std::borrow::Cow;
-use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 pub(super) const READER: Reader = Reader {
     name: "parquet",

@@ -1,12 +1,13 @@
 //! The readers: a table with a row for each format.
 
+use std::fmt;
+use std::ops::Deref;
+
 use super::error::ReadError;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::source::Source;
 use super::{crazyflie, csv, mcap, motive, npz, objects, parquet, skybrush, ulog, vicon, vviz};
-use std::fmt;
-use std::ops::Deref;
 
 /// A format that is read. Each is a file of this module and a row of [`READERS`].
 pub struct Reader {

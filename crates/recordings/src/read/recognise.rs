@@ -1,13 +1,14 @@
 //! Recognises the format of a file by its content, and formats that are known and not read.
 
+use std::io::Read;
+use std::path::Path;
+use std::str;
+
 use super::error::{Fault, ReadError};
 use super::heading;
 use super::readers::{Format, Head, Packing};
 use super::skybrush::SHOW;
 use super::source::{Archive, GZIP_MAGIC, Source};
-use std::io::Read;
-use std::path::Path;
-use std::str;
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;

@@ -4,6 +4,12 @@
 //! before which it stands at its first point; a drone with a single point stands there throughout. The control points belong to the segment that ends at the point: with n of
 //! them the segment is a Bezier curve of degree n + 1, so without any it is a straight line.
 
+use std::io::Read;
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
+
 use super::curves::{Curves, distinct, piece};
 use super::error::{Fault, Place, ReadError};
 use super::options::ReadOptions;
@@ -11,10 +17,6 @@ use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
 use super::{npz, recognise};
-use nalgebra::Vector3;
-use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
-use std::io::Read;
 use tautline_core::track::{Item, Piece, Sample};
 
 pub(super) const READER: Reader = Reader {

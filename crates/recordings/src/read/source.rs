@@ -1,17 +1,19 @@
-//! Files as streams of bytes and of lines, which may not grow without a limit.
+//! Files as streams of bytes and of lines, zip archives, and limits to the growth of what is packed.
 
-use super::error::{Fault, Place, ReadError, quoted};
-use flate2::bufread::DeflateDecoder;
-use flate2::read::MultiGzDecoder;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::io::{BufRead as _, BufReader, Read, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use flate2::bufread::DeflateDecoder;
+use flate2::read::MultiGzDecoder;
 use tempfile::TempPath;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
+
+use super::error::{Fault, Place, ReadError, quoted};
 
 /// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;

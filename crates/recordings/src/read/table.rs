@@ -1,4 +1,9 @@
-//! Tables row by row, whatever their cells are written as.
+//! Tables row by row, and their cells as numbers and names.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
 
 use super::clock::{Date, Probe, Stamp, TimeUnit};
 use super::columns::Body;
@@ -9,9 +14,6 @@ use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
 use super::source::Source;
-use nalgebra::Vector3;
-use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 /// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.
 const MOST_SUSPECTED: usize = 256;

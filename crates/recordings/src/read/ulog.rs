@@ -10,6 +10,12 @@
 //! computer: the smallest delay of a GPS message sets them to UTC. The messages are decoded here, because the kept crate fills
 //! one that breaks off with zeros.
 
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
+use std::str;
+
+use nalgebra::Vector3;
+
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{Local, is_no_fix, no_fixes};
@@ -18,10 +24,6 @@ use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
-use nalgebra::Vector3;
-use std::collections::BTreeMap;
-use std::io::{BufReader, Read};
-use std::str;
 
 pub(super) const READER: Reader = Reader {
     name: "ulog",

@@ -4,16 +4,18 @@
 //! otherwise that of `defaultPositionRate`. The first sample is at time 0 unless it says its time itself. Axes are those of
 //! graphics: x right, y up, z forward. Files are thinned out for looking at, so samples are samples and no curve.
 
+use std::collections::BTreeSet;
+use std::io::Read as _;
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
 use super::curves::Curves;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
-use nalgebra::Vector3;
-use serde::Deserialize;
-use std::collections::BTreeSet;
-use std::io::Read as _;
 use tautline_core::track::{Item, Sample};
 
 /// Keys in front of the long arrays of a show.

@@ -1,4 +1,6 @@
-//! Recordings of others.
+//! MCAP recordings of other programs: files that follow each other, and poses brought into one frame.
+
+use nalgebra::{Point3, Vector3};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
@@ -11,7 +13,6 @@ use super::outline::{is_static, place, space};
 use super::plan::{Plan, Way};
 use super::tree::{Known, Placed};
 use crate::mcap::topic::{Message, Part, TopicReader};
-use nalgebra::{Point3, Vector3};
 
 /// Opens a recording in some files that follow each other; `whole` is what is called so.
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {

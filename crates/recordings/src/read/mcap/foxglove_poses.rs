@@ -1,9 +1,10 @@
 //! Foxglove's messages that hold positions, in protobuf and JSON.
 
-use super::messages::{NO_TURN, Reader, Seen, What, Who, nanoseconds};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+
+use super::messages::{NO_TURN, Reader, Seen, What, Who, nanoseconds};
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {

@@ -1,8 +1,9 @@
-//! What a message says of a position, whoever's message it is.
+//! Positions of a message, and the schemas whose messages hold positions.
+
+use nalgebra::Vector3;
 
 use super::{foxglove_poses, ros};
 use crate::mcap::topic::{CDR, Declared};
-use nalgebra::Vector3;
 
 /// Reads a message in an encoding; the error says what is wrong with it.
 pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;

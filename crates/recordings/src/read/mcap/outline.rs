@@ -1,4 +1,9 @@
-//! What a recording of others holds: its topics with positions, its frames, and who is told of twice.
+//! Outline of an MCAP recording of another program: topics with positions and their names, frames, and vehicles that several
+//! topics describe.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
 
 use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted};
@@ -6,8 +11,6 @@ use super::foreign::Splits;
 use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
 use super::tree::{Body, Placed, Tree};
 use crate::mcap::topic::{Declared, Message, Part};
-use nalgebra::Vector3;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Most parts of a topic that may be namespaces of transforms.
 const DEEPEST: usize = 16;

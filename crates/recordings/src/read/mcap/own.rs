@@ -1,4 +1,4 @@
-//! Recordings that were exported, and the messages that they consist of.
+//! Recordings of tautline: `run.mcap`, what was exported as MCAP with its messages, and channels beside positions.
 //!
 //! ```text
 #![doc = include_str!("vehicles.msg")]
@@ -8,6 +8,11 @@
 #![doc = include_str!("tracks.msg")]
 //! ```
 
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
 use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
@@ -16,9 +21,6 @@ use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
 use tautline_core::record::{Channel, ReadFault};
 
 /// Where the vehicles are named.

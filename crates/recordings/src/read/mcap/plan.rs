@@ -1,5 +1,9 @@
 //! What is read of a recording of others, and how it comes into one frame.
 
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Vector3};
+
 use super::super::axes;
 use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
@@ -9,8 +13,6 @@ use super::messages::{EARTH, What, Who};
 use super::outline::{Outline, is_static, place, refuse_own_frames, space};
 use super::tree::{Body, Chain, Known, Placed, Tree};
 use crate::mcap::topic::Part;
-use nalgebra::{Isometry3, Vector3};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// What is read, and how.
 pub(super) struct Plan {

@@ -1,9 +1,10 @@
 //! ROS 2's messages that hold positions, in CDR.
 
-use super::messages::{EARTH, FIXES, Reader, Seen, What, Who, nanoseconds};
-use crate::mcap::topic::{CDR, decode};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+
+use super::messages::{EARTH, FIXES, Reader, Seen, What, Who, nanoseconds};
+use crate::mcap::topic::{CDR, decode};
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {

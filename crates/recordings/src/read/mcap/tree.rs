@@ -4,9 +4,11 @@
 //! moves; where some frame of its branch is called `base_link` or `base_footprint`, it is the first of those. What hangs on
 //! a vehicle (wheels, cameras, rotors) is part of it.
 
-use super::super::error::{Fault, UNSEEN, quoted};
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+use super::super::error::{Fault, UNSEEN, quoted};
 
 /// Longest way from a frame to its root \[frames\].
 const DEEPEST: usize = 64;

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::envelope::OfLimit;
-use super::named::{OfPair, OfVehicle};
 use crate::report::findings::finite;
-use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
+use crate::report::flight;
+use crate::report::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
 };
@@ -319,4 +319,24 @@ impl RecordedReport {
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
+}
+
+/// A finding on a pair, with their names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfPair<T> {
+    /// Their names.
+    pub who: [String; 2],
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
+}
+
+/// A finding on a vehicle, with its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfVehicle<T> {
+    /// Its name.
+    pub vehicle: String,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
 }

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::envelope::OfLimit;
-use super::named::{OfPair, OfVehicle};
 use super::report::{EarlyEnd, RecordedReport, Seen};
+use super::report::{OfPair, OfVehicle};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};

@@ -1,13 +1,11 @@
 //! `audit_files`: judges a recording of any origin.
 
 mod config;
-mod encounters;
-mod fence_file;
-mod obstacle_file;
 mod own;
 mod places;
 mod proof;
 mod replays;
+mod venue_file;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -335,9 +333,9 @@ impl<'a> AuditRequest<'a> {
             }
         }
         let mut settings = self.settings.clone();
-        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacle_file::read)?);
+        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
         if let Some(fence) = self.fence.as_deref() {
-            settings.envelope.fence = Some(fence_file::read(fence)?);
+            settings.envelope.fence = Some(venue_file::read_fence(fence)?);
         }
         Ok(settings)
     }

@@ -14,9 +14,10 @@ use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
 use tautline_core::text::exact;
 use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
-use tautline_recordings::read::{self, ReadOptions};
-use tautline_sim::scenario::{self, Scenario};
-use tautline_sim::sim;
+use tautline_recordings::read;
+use tautline_recordings::read::ReadOptions;
+use tautline_sim::scenario::Scenario;
+use tautline_sim::{scenario, sim};
 
 /// Relative difference of two distances of the same instant that were computed in two ways.
 const SAME: f64 = 1e-9;

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::{self, File};
+use std::fs;
+use std::fs::File;
 use std::path::Path;
 
 use serde::Serialize;
@@ -14,7 +15,8 @@ use crate::report::recorded::Clock;
 use crate::report::write_atomically;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
-use tautline_recordings::read::{self, ColumnNames, ReadOptions};
+use tautline_recordings::read;
+use tautline_recordings::read::{ColumnNames, ReadOptions};
 
 /// Names of the column of time that the checker knows.
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
