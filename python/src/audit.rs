@@ -26,7 +26,7 @@ fn judged(report: &RecordedReport) -> PyResult<Judged> {
     Ok((report.verdict(), report.headline(), report.text(), json))
 }
 
-/// What a flight said of itself beside its instants: as the recording of it would.
+/// Limits, obstacles and audit of a flight, as its recording holds them.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Seen(pub(crate) OwnRecording);
 

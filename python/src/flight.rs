@@ -12,7 +12,7 @@ use tautline::preflight::Preflight;
 use tautline::record::{Event, RecordError, Sample, Sink};
 use tautline::replay::Film;
 use tautline::report::Report;
-use tautline::request::{Witness, flight_page, run_verdict};
+use tautline::request::{OwnRecording, flight_page, run_audit};
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
@@ -33,6 +33,8 @@ struct Samples {
     velocities_m_s: Vec<f64>,
     commands_m_s2: Vec<f64>,
     separations_m: Vec<f64>,
+    /// The law that was flown, where it is not the scenario's.
+    other_law: Option<String>,
 }
 
 impl Sink for Samples {
@@ -50,7 +52,10 @@ impl Sink for Samples {
         Ok(())
     }
 
-    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
+        if let Event::OtherLaw { name, .. } = event {
+            self.other_law = Some(name.clone());
+        }
         Ok(())
     }
 
@@ -75,7 +80,7 @@ pub(crate) struct Flown {
 }
 
 impl Flown {
-    fn new(py: Python<'_>, report: &Report, samples: Samples, witness: Witness) -> PyResult<Self> {
+    fn new(py: Python<'_>, report: &Report, samples: Samples, own: OwnRecording) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
             passed: report.verdict.pass,
@@ -87,7 +92,7 @@ impl Flown {
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            seen: Py::new(py, Seen(witness.finish(&run_verdict(report))))?,
+            seen: Py::new(py, Seen(own))?,
         })
     }
 }
@@ -152,24 +157,24 @@ pub(crate) fn fly(
             McapRecorder::create(path, &header)
         });
         let page = html.is_some().then(|| (RunHistory::new().scaled_by(scenario.metric()), Film::new()));
-        let mut sinks = (samples, (Witness::of(scenario), Beside { recording: recording.transpose()?, page }));
+        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, (witness, Beside { recording, page })) = sinks;
+        let (samples, Beside { recording, page }) = sinks;
         let closed = recording.map_or(Ok(()), |recording| match &flown {
-            Ok((report, _)) => recording.close(run_verdict(report)),
+            Ok((report, _)) => recording.close(run_audit(scenario, report)),
             Err(_) => recording.finish(),
         });
         let (report, ending) = flown?;
         closed?;
         let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
-        Ok((report, ending, (samples, witness), page))
+        Ok((report, ending, samples, page))
     };
     let (flown, raised) = here(py, || catching(flight))?;
     if let Some(raised) = signals.raised.or(raised) {
         return Err(raised);
     }
-    let (report, ending, (samples, witness), page) = flown.map_err(SimError::raised)?;
+    let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
     if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
         return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
     }
@@ -177,5 +182,6 @@ pub(crate) fn fly(
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
-    Flown::new(py, &report, samples, witness)
+    let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone());
+    Flown::new(py, &report, samples, own)
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use tautline::audit::envelope::{Envelope, Limit, Quantity};
-use tautline::audit::recorded::{self, Motion, VehicleSettings};
+use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
@@ -20,8 +20,8 @@ pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)
 }
 
 /// Formats by their names.
-pub(crate) fn formats() -> [(&'static str, Format); Format::ALL.len()] {
-    Format::ALL.map(|format| (format.name(), format))
+fn formats() -> Vec<(&'static str, Format)> {
+    Format::all().map(|format| (format.name, format)).collect()
 }
 
 fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) -> PyResult<Option<T>> {
@@ -140,7 +140,7 @@ impl Question {
         require_presence: bool,
         independent: bool,
     ) -> PyResult<Self> {
-        let motions = Motion::ALL.map(|motion| (motion.name(), motion));
+        let motions = Interpolation::ALL.map(|motion| (motion.name(), motion));
         let mut settings = recorded::Settings {
             delta_m: delta,
             motion: choice("motion", motion, &motions)?,

@@ -52,7 +52,7 @@ pub(crate) fn export(
     sample_hz: Option<f64>,
     force: bool,
 ) -> PyResult<()> {
-    let written: Vec<_> = WRITTEN.iter().map(|format| (format.name(), *format)).collect();
+    let written: Vec<_> = WRITTEN.iter().map(|format| (format.name, *format)).collect();
     let format = choice("to", to, &written)?;
     let request = ExportRequest { paths, options: options.0.clone(), output, format, sample_hz, force };
     answered(py, |monitor| export_file(&request, monitor))

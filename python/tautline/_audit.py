@@ -56,7 +56,7 @@ class ViolationError(Error):
 class Audit:
     """What the judge says of a recording."""
 
-    #: ``PROVED CLEAR``, ``CLEAR as the run judged every step``, ``CLEAR if straight between samples`` (or as it was asked),
+    #: ``PROVED CLEAR``, ``PROVED CLEAR by the run's audit of every step``, ``CLEAR if straight between samples`` (or as was asked),
     #: ``VIOLATION`` or ``UNDECIDED``.
     verdict: str
     #: The verdict and what it rests on, in a line.

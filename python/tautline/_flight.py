@@ -91,8 +91,8 @@ class Flight:
         return frame(columns)
 
     def audit(self, **asked: Any) -> Audit:
-        """Judges the recorded instants with other questions, as :func:`tautline.audit` judges the flight's recording: what the flight
-        saw between them counts, and delta, ellipsoids and obstacles are the scenario's unless others are asked about. Of a flight that
+        """Judges the flight as :func:`tautline.audit` judges its recording: delta, ellipsoids and obstacles are the scenario's unless
+        others are given. The flight's own audit answers that question; any other is judged from the recorded instants. Of a flight that
         ended early the verdict is ``UNDECIDED`` unless a violation was seen, or ``to_s`` ends the window before."""
         return audit(self.t, self.positions, _seen=self._seen, **asked)
 

@@ -5,9 +5,7 @@ use std::sync::Once;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use super::Exit;
-use super::{
-    attack, audit_arguments, audits, campaign, check, compare, completions, export, list, margin, run, schema, validate,
-};
+use super::{attack, audit, campaign, check, compare, completions, export, list, margin, run, schema, validate};
 #[cfg(feature = "viewer")]
 use super::{render, view};
 use tautline_recordings::read;
@@ -32,7 +30,7 @@ pub(super) enum Command {
     /// Fly a scenario, audit every step and leave a recording and a report.
     Run(run::RunArguments),
     /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
-    Audit(audit_arguments::AuditArguments),
+    Audit(audit::AuditArguments),
     /// Say what is known before the first step: stability, certified separation, step, traps.
     Check(check::CheckArguments),
     /// Reproduce the paper and judge every claim, ours and the paper's.
@@ -82,7 +80,7 @@ pub(super) fn quiet_guarded_panics() {
 pub(super) fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
     match command {
         Command::Run(arguments) => run::run(&arguments),
-        Command::Audit(arguments) => audits::audits(&arguments, line),
+        Command::Audit(arguments) => audit::audits(&arguments, line),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),

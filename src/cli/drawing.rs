@@ -48,7 +48,7 @@ pub(super) fn timeline(
         return Err(Failure::input("render/out-of-range", format!("--delta is {delta_m:?}"), help));
     }
     // Our own recordings know formation, graph and law too.
-    let may_be_ours = reading.format.is_none_or(|format| format == Format::Mcap);
+    let may_be_ours = reading.format.is_none_or(|format| format == Format::MCAP);
     let timeline = match McapRecording::open(recording) {
         Ok(ours) if may_be_ours => {
             speaks_for_itself(&ours, reading, delta_m)?;

@@ -18,7 +18,7 @@ pub(super) struct ExportArguments {
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
     /// Format to write [default: by the extension of the file].
-    #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name().into(), *format)).collect()))]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect()))]
     format: Option<Format>,
     /// How often curves are sampled [Hz]; what is between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]

@@ -4,8 +4,7 @@
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
 mod attack;
-mod audit_arguments;
-mod audits;
+mod audit;
 mod campaign;
 mod check;
 mod command;

@@ -188,20 +188,9 @@ fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
 
 /// A format that is read.
 pub(super) fn format() -> impl TypedValueParser<Value = Format> {
-    let help = |format| match format {
-        Format::Csv => "A table in text with a header",
-        Format::Text => "Numbers between blanks: t x y z x y z ...",
-        Format::Trajnet => "Numbers between blanks: frame, vehicle, x and y",
-        Format::Jsonl => "An object of JSON in each line",
-        Format::Parquet => "A table in Parquet",
-        Format::Npz => "Arrays t and positions, as numpy.savez saves them",
-        Format::Mcap => "MCAP: our own, Foxglove or ROS 2 messages",
-        Format::Ulog => "A log of PX4",
-        Format::Crazyflie => "A folder of Crazyflie polynomials",
-        Format::Skybrush => "A Skybrush show",
-        Format::Vviz => "A VVIZ show of Verge Aero or Finale 3D",
-        Format::Motive => "A take of OptiTrack Motive as CSV",
-        Format::Vicon => "An export of Vicon Nexus or Tracker as CSV",
-    };
-    one_of(Format::ALL.map(|format| (PossibleValue::new(format.name()).help(help(format)), format)).into())
+    one_of(
+        Format::all()
+            .map(|format| (PossibleValue::new(format.name).help(format.docs.replace('`', "")), format))
+            .collect(),
+    )
 }

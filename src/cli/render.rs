@@ -49,7 +49,7 @@ pub(super) struct RenderArguments {
     /// A picture every so many seconds of the flight.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     every: Option<f64>,
-    /// A film: .mp4 (H.264; needs ffmpeg, or a build with --features film), .gif, or an animated .png.
+    /// A film: .mp4 (H.264; needs ffmpeg, or a build with --features film) or .gif.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
     /// A contact sheet of so many columns and rows.

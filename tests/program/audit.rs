@@ -75,7 +75,6 @@ fn a_recording_of_ours_is_judged_by_its_own_delta_unless_another_is_given() {
     let own = audit(folder.path(), &["out/run.mcap"]);
     assert_eq!(own.exit, Some(0), "{own:?}");
     assert!(own.out.contains("(delta 1.000 m)"), "{own:?}");
-    assert!(own.err.contains("note: up to 4 steps were flown between two samples"), "{own:?}");
     assert!(own.err.contains("note: the safety distance is the recording's own, 1.0 m"), "{own:?}");
     let another = audit(folder.path(), &["out/run.mcap", "--delta", "1.5"]);
     assert!(another.out.contains("(delta 1.500 m)") && !another.err.contains("recording's own"), "{another:?}");
@@ -346,7 +345,9 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
         let ran = audit(folder.path(), &[&recording, "--json"]);
         let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
         assert_eq!(json["separation"]["min_m"], report["separation"]["min_m"], "{out}: {ran:?}");
-        assert_eq!(json["separation"]["min_pair"], report["separation"]["min_pair"], "{out}");
+        // Samples of every step are judged again: of two pairs at one distance another one may be the first.
+        let is_repeated = out != "every";
+        assert!(!is_repeated || json["separation"]["min_pair"] == report["separation"]["min_pair"], "{out}");
         assert_eq!(json["status"], report["audit"]["status"], "{out}");
         let [told, flown] = [&json, &report].map(|of| of["audit"]["violations"].as_array().expect("a list"));
         let ended = flown.iter().filter(|v| v["to_s"].as_f64() < report["run"]["duration_s"].as_f64());
@@ -363,7 +364,7 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
     assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
     // What straight lines say of it is a violation, and the run knows better.
     let (exit, apart) = fly("swap.toml", "apart", &[]);
-    assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &false.into()), "{apart}");
+    assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &true.into()), "{apart}");
     assert_eq!(
         (&apart["audit"]["judged_by_run"], &apart["audit"]["assumes"]),
         (&true.into(), &serde_json::Value::Null)

@@ -33,7 +33,6 @@ mod refuses;
 mod runs;
 mod scenarios;
 mod shapes;
-mod told;
 
 impl program::Ran {
     /// Returns the stable code of the error: the first line on standard error that is `area/problem`, or nothing.

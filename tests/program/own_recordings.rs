@@ -1,11 +1,12 @@
-//! A recording of a run has the verdict of the run, as long as it is what the run wrote.
+//! The audit of a recording of `tautline run` repeats the run's own audit, as long as the file is what the run wrote.
 
 use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use tautline::mcap::{Entry, McapRecorder, McapRecording};
-use tautline::record::Sink as _;
+use tautline::mcap::{Entry, Header, McapRecorder, McapRecording, RunAudit, StoredAudit};
+use tautline::record::{Sample, Sink as _};
+use tautline::swarm::{Rows, Swarm};
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
@@ -79,37 +80,58 @@ fn a_recording_is_clear_as_its_run_judged_and_says_so() {
     let folder = pentagon();
     let judged = audit(folder.path(), &["flown"]);
     assert_eq!(judged.exit, Some(0), "{judged:?}");
-    let said = "CLEAR as the run judged every step: never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
+    let said = "PROVED CLEAR by the run's audit of every step: never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
     assert_eq!(judged.out.lines().next(), Some(said));
     let found = json(&audit(folder.path(), &["flown", "--json"]).out);
-    assert_eq!((&found["audit"]["proved"], &found["audit"]["judged_by_run"]), (&false.into(), &true.into()));
-    // Of a part, of some vehicles and against a smaller distance too.
-    for more in [&["--from", "1", "--to", "3"][..], &["--ids", "1,2,3"], &["--delta", "1.5"], &["--radius", "0.9"]] {
-        let part = audit(folder.path(), &[&["flown"], more].concat());
-        assert!(part.exit == Some(0) && part.out.starts_with("CLEAR as the run judged"), "{more:?}: {part:?}");
+    assert_eq!((&found["audit"]["proved"], &found["audit"]["judged_by_run"]), (&true.into(), &true.into()));
+    for same in [&["--delta", "2"][..], &["--require-presence", "--expect-vehicles", "5"]] {
+        let again = audit(folder.path(), &[&["flown"], same].concat());
+        assert!(
+            again.exit == Some(0) && again.out.starts_with("PROVED CLEAR by the run's audit"),
+            "{same:?}: {again:?}"
+        );
     }
 }
 
 #[test]
-fn what_the_run_did_not_judge_is_not_said_by_its_word() {
+fn another_question_is_judged_from_the_samples_and_a_note_says_so() {
     let folder = pentagon();
-    for more in [&["--limit", "speed=100"][..], &["--independent"], &["--motion", "linear"]] {
+    for more in [
+        &["--from", "1", "--to", "3"][..],
+        &["--ids", "1,2,3"],
+        &["--delta", "1.5"],
+        &["--radius", "0.9"],
+        &["--offset", "1=0.001"],
+        &["--above", "-1"],
+        &["--max-gap", "1"],
+        &["--scale", "1.5"],
+        &["--motion", "linear"],
+        &["--limit", "speed=100"],
+    ] {
         let drawn = audit(folder.path(), &[&["flown"], more].concat());
         assert!(
-            drawn.exit == Some(0) && drawn.out.starts_with("CLEAR if straight between samples: "),
+            drawn.exit == Some(0) && drawn.out.starts_with("CLEAR if straight between samples"),
+            "{more:?}: {drawn:?}"
+        );
+        assert!(
+            drawn.err.contains("note: the samples are judged: the run's audit of every step "),
             "{more:?}: {drawn:?}"
         );
     }
+    let independent = audit(folder.path(), &["flown", "--independent"]);
+    assert!(independent.out.starts_with("CLEAR if straight between samples: "), "{independent:?}");
     // More than the run kept.
     let more = audit(folder.path(), &["flown", "--delta", "2.5"]);
     assert!(more.exit == Some(1) && more.out.starts_with("VIOLATION: 2 and 3 came to 2.460 m"), "{more:?}");
-    // By other clocks.
-    let later = audit(folder.path(), &["flown", "--offset", "1=0.001"]);
-    assert!(!later.out.contains("as the run judged"), "{later:?}");
 }
 
-/// Writes a recording anew, with what `change` makes of it, and its verdict where `is_closed`.
-fn rewritten(folder: &Path, to: &str, is_closed: bool, change: impl Fn(&mut Entry)) {
+fn stored(recording: &McapRecording) -> RunAudit {
+    let StoredAudit::AsWritten(audit) = recording.stored_audit() else { panic!("{:?}", recording.stored_audit()) };
+    *audit
+}
+
+/// Writes the recording of the folder again with changed entries, and closes it with a changed audit.
+fn rewritten(folder: &Path, to: &str, change: impl Fn(&mut Entry), change_audit: impl Fn(&mut RunAudit)) {
     let mut recording = McapRecording::open(&folder.join("flown/run.mcap")).expect("a recording");
     let mut recorder = McapRecorder::create(&folder.join(to), recording.header()).expect("made");
     for entry in recording.by_ref() {
@@ -120,84 +142,101 @@ fn rewritten(folder: &Path, to: &str, is_closed: bool, change: impl Fn(&mut Entr
             Entry::Event(event) => recorder.event(event).expect("recorded"),
         }
     }
-    let verdict = recording.verdict().expect("a verdict").clone();
-    if is_closed { recorder.close(verdict) } else { recorder.finish() }.expect("closed");
+    let mut audit = stored(&recording);
+    change_audit(&mut audit);
+    recorder.close(audit).expect("closed");
+}
+
+fn altered(folder: &Path, to: &str, change: impl Fn(&mut Vec<u8>)) {
+    let mut bytes = fs::read(folder.join("flown/run.mcap")).expect("a recording");
+    change(&mut bytes);
+    fs::write(folder.join(to), bytes).expect("written");
+}
+
+/// Sets the checksums of all chunks to 0, which stands for none.
+fn remove_checksums(bytes: &mut [u8]) {
+    let (mut at, chunk, data_end) = (8, 6, 15);
+    while bytes[at] != data_end {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("8 bytes"));
+        if bytes[at] == chunk {
+            bytes[at + 9 + 24..at + 9 + 28].fill(0);
+        }
+        at += 9 + usize::try_from(length).expect("fits");
+    }
+}
+
+/// Replaces a number wherever it is in the file.
+fn replace(bytes: &mut [u8], value: f64, by: f64) {
+    let places: Vec<_> = (0..bytes.len() - 8).filter(|&at| bytes[at..at + 8] == value.to_le_bytes()).collect();
+    for at in places {
+        bytes[at..at + 8].copy_from_slice(&by.to_le_bytes());
+    }
 }
 
 #[test]
-fn a_recording_that_was_changed_or_cut_does_not_profit_from_its_run() {
+fn a_recording_that_was_changed_or_cut_is_judged_from_its_samples() {
     let folder = pentagon();
     let said = |arguments: &[&str]| audit(folder.path(), arguments);
-    rewritten(folder.path(), "same.mcap", true, |_| {});
-    assert!(said(&["same.mcap"]).out.starts_with("CLEAR as the run judged every step: "));
-    // One place of one sample, by a millimetre.
-    rewritten(folder.path(), "moved.mcap", true, |entry| {
-        if let Entry::Sample(sample) = entry
-            && (sample.time_s - 2.0).abs() < 1e-3
-        {
-            sample.swarm.positions_m[(0, 0)] += 1e-3;
+    rewritten(folder.path(), "same.mcap", |_| {}, |_| {});
+    assert!(said(&["same.mcap"]).out.starts_with("PROVED CLEAR by the run's audit of every step: "));
+    // One coordinate of one sample, and one number of the audit.
+    let recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
+    let (samples, _) = recording.read_all().expect("whole");
+    let coordinate = samples[samples.len() - 1].swarm.positions_m[(0, 0)];
+    let closest_m = json(&said(&["flown", "--json"]).out)["separation"]["min_m"].as_f64().expect("known");
+    for value in [coordinate, closest_m] {
+        altered(folder.path(), "changed.mcap", |bytes| {
+            replace(bytes, value, value + 1e-3);
+            remove_checksums(bytes);
+        });
+        let changed = said(&["changed.mcap"]);
+        assert!(
+            changed.exit == Some(0) && changed.out.starts_with("CLEAR if straight between samples: "),
+            "{changed:?}"
+        );
+        assert!(changed.err.contains("is not as the run wrote it"), "{changed:?}");
+    }
+    // Closed without an audit, as by a run that failed.
+    let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
+    let mut recorder = McapRecorder::create(&folder.path().join("open.mcap"), recording.header()).expect("made");
+    for entry in recording.by_ref() {
+        if let Entry::Sample(sample) = entry.expect("whole") {
+            recorder.sample(&sample.as_sample()).expect("recorded");
         }
-    });
-    let moved = said(&["moved.mcap"]);
-    assert!(moved.exit == Some(0) && moved.out.starts_with("CLEAR if straight between samples: "), "{moved:?}");
-    assert!(moved.err.contains("is not as the run wrote it"), "{moved:?}");
-    // Moved upon another between two samples that were left as they are: the run's word of that time does not hide it.
-    rewritten(folder.path(), "near.mcap", true, |entry| {
+    }
+    recorder.finish().expect("closed");
+    let open = said(&["open.mcap"]);
+    assert!(open.out.starts_with("CLEAR if straight between samples: "), "{open:?}");
+    assert!(open.err.contains("holds no audit of its run"), "{open:?}");
+    // Cut off.
+    altered(folder.path(), "cut.mcap", |bytes| bytes.truncate(bytes.len() - 200));
+    assert_eq!(said(&["cut.mcap"]).exit, Some(2));
+    let cut = said(&["cut.mcap", "--allow-unfinished"]);
+    assert!(!cut.out.contains("by the run's audit"), "{cut:?}");
+}
+
+#[test]
+fn an_audit_that_the_samples_contradict_is_not_used() {
+    let folder = pentagon();
+    let with_closest = |to: &str, change: fn(f64) -> f64| {
+        rewritten(folder.path(), to, |_| {}, |audit| audit.closest[0].min_m = change(audit.closest[0].min_m));
+        audit(folder.path(), &[to])
+    };
+    let raised = with_closest("raised.mcap", |m| m + 0.001);
+    assert!(raised.out.starts_with("CLEAR if straight between samples: never closer than 2.460355 m"), "{raised:?}");
+    assert!(raised.err.contains("closer than the run's audit says"), "{raised:?}");
+    // A vehicle is moved upon another, and the hash is computed again.
+    let near = |entry: &mut Entry| {
         if let Entry::Sample(sample) = entry
             && (1.9..2.4).contains(&sample.time_s)
         {
             let beside = sample.swarm.positions_m.row(2).clone_owned();
             sample.swarm.positions_m.row_mut(0).copy_from(&beside);
         }
-    });
-    let near = said(&["near.mcap"]);
-    assert!(near.exit == Some(1) && near.out.starts_with("VIOLATION: "), "{near:?}");
-    // Closed without a verdict, as by a run that failed.
-    rewritten(folder.path(), "open.mcap", false, |_| {});
-    assert!(said(&["open.mcap"]).out.starts_with("CLEAR if straight between samples: "));
-    // Cut off.
-    let bytes = fs::read(folder.path().join("flown/run.mcap")).expect("a recording");
-    fs::write(folder.path().join("cut.mcap"), &bytes[..bytes.len() - 200]).expect("written");
-    assert_eq!(said(&["cut.mcap"]).exit, Some(2));
-    let cut = said(&["cut.mcap", "--allow-unfinished"]);
-    assert!(!cut.out.contains("as the run judged"), "{cut:?}");
-}
-
-#[test]
-fn a_verdict_that_the_samples_contradict_is_not_used() {
-    let folder = pentagon();
-    let with_closest = |to: &str, change: fn(f64) -> f64| {
-        let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
-        let mut recorder = McapRecorder::create(&folder.path().join(to), recording.header()).expect("made");
-        for entry in recording.by_ref() {
-            match entry.expect("whole") {
-                Entry::Sample(sample) => recorder.sample(&sample.as_sample()).expect("recorded"),
-                Entry::Event(event) => recorder.event(&event).expect("recorded"),
-            }
-        }
-        let mut verdict = recording.verdict().expect("a verdict").clone();
-        verdict.separation_m = change(verdict.separation_m);
-        recorder.close(verdict).expect("closed");
-        audit(folder.path(), &[to])
     };
-    let same = with_closest("same.mcap", |m| m);
-    assert!(same.out.starts_with("CLEAR as the run judged every step: never closer than 2.460355 m"), "{same:?}");
-    let raised = with_closest("raised.mcap", |m| m + 0.001);
-    assert!(raised.out.starts_with("CLEAR if straight between samples: never closer than 2.460355 m"), "{raised:?}");
-    assert!(raised.err.contains("the verdict of the run is not used"), "{raised:?}");
-    // A verdict with a smaller separation than the samples leaves the audit clear.
-    let lowered = with_closest("lowered.mcap", |m| m - 0.001);
-    assert_eq!(lowered.exit, Some(0), "{lowered:?}");
-}
-
-#[test]
-fn the_smallest_separation_that_is_printed_is_clear_and_the_next_number_is_not() {
-    let folder = pentagon();
-    let printed = json(&audit(folder.path(), &["flown", "--json"]).out)["separation"]["min_m"].as_f64().expect("known");
-    for (delta_m, exit) in [(printed, 0), (printed.next_up(), 1)] {
-        let judged = audit(folder.path(), &["flown", "--delta", &format!("{delta_m:?}")]);
-        assert_eq!(judged.exit, Some(exit), "{judged:?}");
-    }
+    rewritten(folder.path(), "near.mcap", near, |_| {});
+    let near = audit(folder.path(), &["near.mcap"]);
+    assert!(near.exit == Some(1) && near.out.starts_with("VIOLATION: "), "{near:?}");
 }
 
 #[test]
@@ -205,7 +244,10 @@ fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
     fly(folder.path(), "pentagon", &["time.duration_s=6", "arrival.hold_s=6", "time.record_hz=0.2"]);
     let judged = audit(folder.path(), &["flown"]);
-    assert!(judged.exit == Some(0) && judged.out.starts_with("CLEAR as the run judged every step"), "{judged:?}");
+    assert!(
+        judged.exit == Some(0) && judged.out.starts_with("PROVED CLEAR by the run's audit of every step"),
+        "{judged:?}"
+    );
     // A `--max-gap` of the user still applies.
     let short = audit(folder.path(), &["flown", "--max-gap", "2"]);
     assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED"), "{short:?}");
@@ -263,19 +305,82 @@ fn straight_lines_past_an_obstacle_do_not_overrule_a_run_that_judged_every_step(
 }
 
 #[test]
-fn a_run_that_ended_early_gives_no_word_for_its_recording() {
+fn a_run_that_ended_early_does_not_answer_for_the_whole_flight() {
     let folder = pentagon();
-    let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
-    let mut recorder = McapRecorder::create(&folder.path().join("early.mcap"), recording.header()).expect("made");
-    for entry in recording.by_ref() {
-        match entry.expect("whole") {
-            Entry::Sample(sample) => recorder.sample(&sample.as_sample()).expect("recorded"),
-            Entry::Event(event) => recorder.event(&event).expect("recorded"),
-        }
-    }
-    let mut verdict = recording.verdict().expect("a verdict").clone();
-    verdict.ended_early = "interrupted".to_owned();
-    recorder.close(verdict).expect("closed");
+    rewritten(folder.path(), "early.mcap", |_| {}, |audit| audit.ended_early = "interrupted".to_owned());
     let early = audit(folder.path(), &["early.mcap"]);
     assert!(early.out.starts_with("CLEAR if straight between samples: "), "{early:?}");
+}
+
+#[test]
+fn a_run_that_is_undecided_leaves_its_recording_undecided() {
+    let folder = pentagon();
+    rewritten(folder.path(), "open.mcap", |_| {}, |audit| audit.status = "undecided".to_owned());
+    let open = audit(folder.path(), &["open.mcap"]);
+    assert!(open.exit == Some(1) && open.out.starts_with("UNDECIDED: the run's own audit"), "{open:?}");
+}
+
+#[test]
+fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // The classical law, stiff, so that vehicles pass each other between two samples a second apart.
+    let times = ["time.record_hz=1", "time.duration_s=20", "arrival.hold_s=20"];
+    fly(folder.path(), "pentagon-laplacian", &[&["law.f1_per_s2=30", "law.f2_per_s=1"], &times[..]].concat());
+    let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
+    // The folder of a run is its recording.
+    let judged = audit(folder.path(), &["flown", "--json"]);
+    let whole = json(&judged.out);
+    assert_eq!((judged.exit, &whole["recording"]), (Some(1), &"flown/run.mcap".into()));
+    for key in ["min_m", "min_at_s", "min_pair"] {
+        assert_eq!(whole["separation"][key], report["separation"][key]);
+    }
+    assert_eq!(whole["audit"]["violations"], report["audit"]["violations"]);
+    // A limit of single vehicles does not hide them.
+    assert!(audit(folder.path(), &["flown", "--limit", "speed=100"]).out.starts_with("VIOLATION: "));
+    let exported = ran_by(TAUTLINE, folder.path(), &["export", "flown", "-o", "drawn.csv"]);
+    assert!(exported.exit == Some(0) && exported.err.contains("the run's audit of every step is not in drawn.csv"));
+    let drawn = ran_by(TAUTLINE, folder.path(), &["audit", "drawn.csv", "--delta", "2"]);
+    assert_eq!(drawn.exit, Some(0), "straight lines show the opposite: {drawn:?}");
+    let part = audit(folder.path(), &["flown", "--from", "0"]);
+    assert!(part.exit == Some(0) && part.err.contains("another question (VIOLATION: "), "{part:?}");
+}
+
+#[test]
+fn the_violations_of_an_obstacle_between_samples_are_those_of_the_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenario = "start.positions_m = [[0, 0], [0, 40]]\nformation = { shape = \"line\", spacing_m = 6.0 }\n\
+                    law = { kind = \"laplacian\", delta_m = 1.0 }\ntime = { duration_s = 12.0, record_hz = 1.0 }\n\
+                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\nclearance_m = 1.9\n";
+    fs::write(folder.path().join("past.toml"), scenario).expect("a file");
+    fly(folder.path(), "past.toml", &[]);
+    let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
+    let whole = json(&audit(folder.path(), &["flown", "--json", "--junit", "found.xml"]).out);
+    assert_eq!((&whole["status"], &whole["audit"]["status"]), (&"violation".into(), &"violation".into()));
+    for key in ["min_m", "min_at_s", "from_s", "to_s"] {
+        assert_eq!(whole["violations"][0][key], report["obstacles"]["violations"][0][key]);
+    }
+    assert!(audit(folder.path(), &["flown"]).out.starts_with("VIOLATION: 1 and ball came to "));
+    let cases = fs::read_to_string(folder.path().join("found.xml")).expect("cases");
+    assert!(!cases.contains("<testcase name=\"separation\" classname=\"tautline.audit\"/>"), "{cases}");
+}
+
+#[test]
+fn a_run_whose_scenario_cannot_be_read_is_not_judged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = Header::new("newer", "name = \"newer\"\n[law]\ndelta_n = 1.0\n", 2, 1.0);
+    let mut recorder = McapRecorder::create(&folder.path().join("newer.mcap"), &header).expect("made");
+    for time_s in [0.0, 1.0] {
+        let swarm = Swarm::at_rest(Rows::from_fn(2, |i, axis| if axis == 0 { 9.0 * i as f64 } else { 0.0 }));
+        let control = Rows::zeros(2);
+        let step = if time_s == 0.0 { 0 } else { 240 };
+        let sample = Sample::new(time_s, step, &swarm, &control);
+        recorder.sample(&sample).expect("recorded");
+    }
+    recorder.finish().expect("closed");
+    let judged = ran_by(TAUTLINE, folder.path(), &["audit", "newer.mcap", "--delta", "1"]);
+    assert!(judged.exit == Some(2) && judged.err.contains("its scenario cannot be read: "), "{judged:?}");
+    assert!(judged.err.contains("delta_n") && judged.err.contains("export it as CSV"), "{judged:?}");
+    let exported = ran_by(TAUTLINE, folder.path(), &["export", "newer.mcap", "-o", "drawn.csv"]);
+    assert_eq!(exported.exit, Some(0), "{exported:?}");
+    assert!(exported.err.contains("the run's audit of every step is not in drawn.csv"), "{exported:?}");
 }

@@ -60,7 +60,7 @@ class Arrays(Case):
 
     def test_a_flight_has_the_verdict_of_its_run_and_by_its_samples_alone_another(self) -> None:
         f = tl.fly("pentagon", set={"time.duration_s": 3})
-        self.assertEqual(f.audit().verdict, "CLEAR as the run judged every step")
+        self.assertEqual(f.audit().verdict, "PROVED CLEAR by the run's audit of every step")
         self.assertEqual(f.audit().separation_m, f.separation_m)
         self.assertEqual(f.audit(independent=True, delta=2.0).verdict, "CLEAR if straight between samples")
         with self.assertRaises(ValueError):

@@ -16,7 +16,7 @@ use super::sweep::RelativeMotion;
 const MOST_CHORDS: u32 = 64;
 /// How far a chord may stray from the curve, as a fraction of the limit, where the number of chords allows it.
 const CHORD_OVER_LIMIT: f64 = 1e-6;
-/// Places on a segment at which the distance from an obstacle is measured again.
+/// Points of a segment at which the distance from an obstacle is measured again.
 const PLACES: u32 = 8;
 /// Relative difference of two distances from an obstacle that rounding explains: each is a handful of operations.
 const ROUNDING: f64 = 1e-12;

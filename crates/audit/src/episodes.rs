@@ -22,12 +22,7 @@ pub(super) struct Episodes<T: Finding> {
     /// Indices of each pair's findings, in order of time.
     of_pair: BTreeMap<T::On, Vec<usize>>,
     settled: Option<Settled<T>>,
-    /// Findings that were counted and are not listed, and how many were counted when the sweep ended.
-    dropped: u64,
-    counted: Option<u64>,
     is_exact: bool,
-    /// Whether the list is corrected after the sweep.
-    is_corrected: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -44,15 +39,7 @@ struct Settled<T: Finding> {
 
 impl<T: Finding> Default for Episodes<T> {
     fn default() -> Self {
-        Self {
-            all: Vec::new(),
-            of_pair: BTreeMap::new(),
-            settled: None,
-            dropped: 0,
-            counted: None,
-            is_exact: true,
-            is_corrected: false,
-        }
+        Self { all: Vec::new(), of_pair: BTreeMap::new(), settled: None, is_exact: true }
     }
 }
 
@@ -73,21 +60,8 @@ impl<T: Finding> Episodes<T> {
         Self { settled: Some(settled), ..Self::default() }
     }
 
-    /// Keeps more of them, for what corrects them at the end.
-    pub(super) fn expect_corrections(&mut self, capacity: usize) {
-        self.is_corrected = true;
-        if let Some(settled) = &mut self.settled {
-            settled.list.set_capacity(capacity);
-        }
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty() && self.settled.as_ref().is_none_or(|settled| settled.list.is_empty())
-    }
-
-    /// Whether some were counted, and are no longer known.
-    pub(super) fn are_some_dropped(&self) -> bool {
-        self.dropped > 0
     }
 
     /// Whether a finding was found over the window before: straight motion is judged whole, wherever windows end.
@@ -106,18 +80,9 @@ impl<T: Finding> Episodes<T> {
 
     /// Enters a finding that continues none; returns its index.
     pub(super) fn add(&mut self, new: T) -> usize {
-        if let Some(counted) = &mut self.counted {
-            *counted += 1;
-        }
         self.of_pair.entry(new.on()).or_default().push(self.all.len());
         self.all.push(new);
         self.all.len() - 1
-    }
-
-    /// Keeps those of which something holds.
-    pub(super) fn retain(&mut self, holds: impl FnMut(&T) -> bool) {
-        self.all.retain(holds);
-        self.index();
     }
 
     fn index(&mut self) {
@@ -173,28 +138,12 @@ impl<T: Finding> Episodes<T> {
         self.index();
     }
 
-    /// Ends the sweep: all that are kept are in the list from here on.
-    pub(super) fn close(&mut self) {
-        let Some(Settled { list, mut count, .. }) = self.settled.take() else { return };
-        count += self.all.len() as u64;
-        let mut all = list.into_list();
-        all.append(&mut self.all);
-        self.dropped = count.saturating_sub(all.len() as u64);
-        self.counted = Some(count);
-        self.all = all;
-        self.index();
-    }
-
-    /// The list, in the order of their beginning and then by pair, shortened where it is long, and how many there are.
-    pub(super) fn finish(mut self, is_bounded: bool) -> (Vec<T>, Tally) {
-        self.close();
-        let known = self.all.len() as u64;
-        let (count, is_exact) = match self.counted {
-            Some(counted) if !self.is_corrected => (counted, self.is_exact),
-            // Of those that are no longer known any may have been corrected.
-            _ => (known, self.is_exact && self.dropped == 0),
-        };
-        let mut list = self.all;
+    /// Returns the findings in the order of their beginning and then by pair, shortened where the list is long, and their
+    /// number.
+    pub(super) fn finish(self, is_bounded: bool) -> (Vec<T>, Tally) {
+        let (mut list, settled) = self.settled.map_or((Vec::new(), 0), |of| (of.list.into_list(), of.count));
+        let count = settled + self.all.len() as u64;
+        list.extend(self.all);
         if is_bounded && list.len() > LISTED {
             let mut shortlist = Shortlist::new(LISTED);
             // The first of each pair comes first.
@@ -204,7 +153,7 @@ impl<T: Finding> Episodes<T> {
         } else {
             list.sort_by(|a, b| a.start_s().total_cmp(&b.start_s()).then(a.on().cmp(&b.on())));
         }
-        let tally = Tally { count, listed: list.len(), is_exact };
+        let tally = Tally { count, listed: list.len(), is_exact: self.is_exact };
         (list, tally)
     }
 }

@@ -9,9 +9,6 @@ use super::parry::{CrossCheck, KeepOut};
 use super::shortlist::{Finding, Tally};
 use super::sweep::{Interval, RelativeMotion};
 
-/// Findings that are kept where the recording itself corrects them at the end.
-const KEPT_FOR_CORRECTION: usize = 1 << 16;
-
 /// The findings on pairs that are named by `P`.
 #[derive(Clone, Debug)]
 pub(super) struct Ledger<P: Copy + Ord + fmt::Debug> {
@@ -92,11 +89,6 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         Self { violations, undecided, is_bounded: true, ..Self::default() }
     }
 
-    /// Keeps enough for what the recording itself says to correct it at the end.
-    pub(super) fn expect_corrections(&mut self) {
-        self.violations.expect_corrections(KEPT_FOR_CORRECTION);
-    }
-
     /// The window that is swept from now on, behind all that were.
     pub(super) fn begin(&mut self, window: Interval) {
         self.violations.begin(window);
@@ -107,12 +99,6 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     pub(super) fn settle(&mut self) {
         self.violations.settle();
         self.undecided.settle();
-    }
-
-    /// Ends the sweep; what is entered from here on corrects what was found.
-    pub(super) fn close(&mut self) {
-        self.violations.close();
-        self.undecided.close();
     }
 
     /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
@@ -194,11 +180,9 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         }
     }
 
-    /// Whether nothing was left open: no time that cannot be decided, no contradiction of the two detectors, and no violation that
-    /// is no longer known and might hold where all that are known were corrected.
+    /// Whether every time is decided and the two detectors agree.
     pub(super) fn is_decided(&self) -> bool {
-        let are_all_known = !(self.violations.is_empty() && self.violations.are_some_dropped());
-        self.undecided.is_empty() && self.parry.disagreements == 0 && are_all_known
+        self.undecided.is_empty() && self.parry.disagreements == 0
     }
 
     /// What was found, in the order of its beginning and then by pair.

@@ -42,12 +42,6 @@ impl ClosestPairs {
         known.map_or(to_be_kept, |kept| if kept.is_known() { kept.lower_m } else { kept.upper_m })
     }
 
-    /// Keeps those of which something holds; from then on any pair can be among the closest.
-    pub(super) fn retain(&mut self, holds: impl FnMut(&Approach) -> bool) {
-        self.kept.retain(holds);
-        self.threshold = f64::INFINITY;
-    }
-
     /// Keeps the closer of two approaches of one pair, and the closest pairs.
     pub(super) fn offer(&mut self, approach: Approach) {
         let key = self.key(&approach);
@@ -82,8 +76,6 @@ pub(super) struct Results {
     pub(super) ledger: Ledger<ObjectPair>,
     pub(super) closest: ClosestPairs,
     pub(super) obstacles: ClosestPairs,
-    /// What the recording itself told of how close two came.
-    pub(super) told: Vec<Approach>,
     /// Segments of pairs that were swept.
     pub(super) swept: u64,
     /// Says whether the sweep is to stop.
@@ -101,12 +93,6 @@ impl Results {
     pub(super) fn goes_on(&mut self) -> bool {
         self.ledger.settle();
         !self.interruption.is_set()
-    }
-
-    /// Enters what the recording itself told.
-    pub(super) fn enter(&mut self, told: Approach) {
-        self.closest.offer(told);
-        self.told.push(told);
     }
 
     /// The table that an approach belongs to.

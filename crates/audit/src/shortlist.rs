@@ -95,10 +95,6 @@ impl<T: Finding> Shortlist<T> {
         Self { capacity, worst: BTreeMap::new(), firsts: BTreeMap::new(), begins: BTreeSet::new() }
     }
 
-    pub(super) fn set_capacity(&mut self, capacity: usize) {
-        self.capacity = capacity;
-    }
-
     pub(super) fn offer(&mut self, finding: T) {
         let (begin, on) = ((Ordered(finding.start_s()), finding.on()), finding.on());
         let key = (Ordered(finding.excess()), Reverse(begin));

@@ -86,16 +86,6 @@ impl Slices {
         }
     }
 
-    /// Enters an approach at its time, in the slice that holds it or as one of no width.
-    pub fn enter(&mut self, closest: Approach) {
-        let at_s = closest.time_s;
-        let place = self.all.partition_point(|slice| slice.to_s < at_s);
-        match self.all.get_mut(place) {
-            Some(slice) if slice.from_s <= at_s => slice.closest = nearer(slice.closest, closest),
-            _ => self.all.insert(place, Slice { from_s: at_s, to_s: at_s, closest, is_whole: true }),
-        }
-    }
-
     fn thin(&mut self, most: usize) {
         let known_s: f64 = self.all.iter().map(|slice| slice.to_s - slice.from_s).sum();
         self.width_s = self.width_s.max(known_s / most as f64);
@@ -212,22 +202,6 @@ mod tests {
         let mut instants = Slices::new(100);
         (0..10_000).map(slice).for_each(|of| instants.take(Slice { to_s: of.from_s, ..of }));
         assert!(instants.all.len() <= 100 && instants.finish(7).len() <= 7);
-    }
-
-    #[test]
-    fn what_is_entered_counts_in_its_slice_or_has_one_of_its_own() {
-        let mut slices = Slices::new(10);
-        for of in [slice(0), slice(5)] {
-            slices.take(of);
-        }
-        for of in [approach(0.25, 0.1), approach(3.0, 0.2), approach(9.0, 9.0)] {
-            slices.enter(of);
-        }
-        let found: Vec<_> = slices.finish(10).iter().map(|of| (of.from_s, of.to_s, of.closest.lower_m)).collect();
-        assert_eq!(found, [(0.0, 1.0, 0.1), (3.0, 3.0, 0.2), (5.0, 6.0, 7.0), (9.0, 9.0, 9.0)]);
-        let mut none = Slices::new(10);
-        none.take(Slice { closest: approach(0.5, f64::NAN), ..slice(0) });
-        assert_eq!((none.closest(), none.finish(10).len()), (None, 0));
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub enum RenderError {
     #[error("the picture cannot be made: {0}")]
     Picture(String),
     /// The name of the file does not say which format a film is to be.
-    #[error("`{0}` does not end in .mp4, .gif or .png")]
+    #[error("`{0}` does not end in .mp4 or .gif")]
     UnknownFilm(String),
     /// The format does not allow this number of pictures a second.
     #[error("{0}")]
@@ -119,11 +119,11 @@ impl RenderError {
             }
             E::PictureSize(_) => "give another size with --size",
             E::Driver(_) => "try a smaller picture, or another driver with --adapter software",
-            E::UnknownFilm(_) => "name the film something.mp4, something.gif or something.png",
+            E::UnknownFilm(_) => "name the film something.mp4 or something.gif",
             E::FilmRate(_) => "give another rate with --fps",
             E::FilmSize(_) => "give another size with --size, or another format",
             E::Write(_) => "free some space or write to another folder",
-            E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif or .png film",
+            E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif film",
             E::NoDisplay(_) => "run it on a machine with a screen, or draw without one: tautline render RECORDING",
             E::Record(_) | E::Picture(_) | E::Film(_) | E::NoWindow(_) => return None,
         })

@@ -2,7 +2,7 @@
 //!
 //! Every [`Limit`] is on something that must not exceed a number: speeds, accelerations and heights, and how far a vehicle
 //! is outside of a [`Fence`]. Over each stretch of a recording its largest value is enclosed, by what is taken to happen
-//! between samples ([`Motion`](super::recorded::Motion)):
+//! between samples ([`Interpolation`](super::recorded::Interpolation)):
 //!
 //! - On a **straight** line at constant speed it is known. An acceleration is what the parabola through three samples in a row
 //!   has, 2 |v2 - v1| / (h1 + h2) with the mean velocities v over intervals h; no motion through them does with less.

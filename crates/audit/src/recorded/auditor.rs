@@ -3,14 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::error::RecordedError;
-use super::gaps::Gaps;
-use super::outcome::{Outcome, Tallies, Told, ToldViolation, alone};
-use super::presence::absences;
-use super::rates::Rates;
-use super::settings::{LARGEST, Settings};
+use super::outcome::{Outcome, Tallies, alone};
+use super::presence::{Gaps, Rates, absences};
+use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::Smallest;
-use super::told::{AllTold, Counted};
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::envelope::Watch;
@@ -46,7 +42,6 @@ pub struct TrackAuditor {
     gaps: Gaps,
     smallest: Option<Smallest>,
     envelope: Option<Watch>,
-    told: AllTold,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and of the last one before that time \[s\].
@@ -68,13 +63,6 @@ pub fn audit(names: &[String], items: &[Item], settings: Settings) -> Result<Out
     auditor.finish()
 }
 
-/// What is known of a vehicle that is judged.
-fn counted(vehicles: &[Vehicle], settings: &Settings, vehicle: usize) -> Option<Counted> {
-    let of = vehicles.get(vehicle).filter(|of| of.asked_for)?;
-    let offset_s = settings.vehicles.get(&of.name).map_or(0.0, |of| of.offset_s);
-    Some(Counted { radius_m: of.radius_m.unwrap_or(0.0), offset_s })
-}
-
 impl TrackAuditor {
     /// An auditor with settings.
     ///
@@ -93,7 +81,6 @@ impl TrackAuditor {
             results: Results::bounded(Interruption::default()),
             gaps: Gaps::default(),
             smallest: None,
-            told: AllTold::default(),
             now_s: f64::NEG_INFINITY,
             before_s: f64::NEG_INFINITY,
             done_s: f64::NEG_INFINITY,
@@ -146,24 +133,6 @@ impl TrackAuditor {
             self.take(item)?;
         }
         Ok(())
-    }
-
-    /// Takes what the recording itself says of the time since the instant before; in order of time, and before anything is judged.
-    /// A reported finding replaces the interpolated one. With different clock offsets, with ellipsoids or near the ground it does not
-    /// say enough: where it then contradicts the interpolation, the pair is undecided, and so is each other pair that it does
-    /// not exclude.
-    pub fn tell(&mut self, told: Told) {
-        self.results.ledger.expect_corrections();
-        self.told.push(told);
-    }
-
-    /// Takes what the recording itself says of two vehicles that were too close for a while, as [`TrackAuditor::tell`].
-    pub fn tell_violation(&mut self, told: ToldViolation) {
-        // A file may say anything.
-        if told.from_s <= told.to_s && told.least_m <= told.min_m && told.min_m < told.limit_m {
-            self.results.ledger.expect_corrections();
-            self.told.push_violation(told);
-        }
     }
 
     #[inline]
@@ -245,10 +214,7 @@ impl TrackAuditor {
             self.windows.judge(&self.vehicles, window, &mut self.results);
         }
         if let Some(smallest) = &mut self.smallest {
-            let (told, settings, vehicles) = (&self.told, &self.settings, &self.vehicles);
-            smallest.follow(vehicles, window, |drawn| {
-                told.nearest_of(drawn, settings, |vehicle| counted(vehicles, settings, vehicle))
-            });
+            smallest.follow(&self.vehicles, window);
         }
         for vehicle in &mut self.vehicles {
             self.segments += vehicle.forget(to_s) as u64;
@@ -308,19 +274,16 @@ impl TrackAuditor {
         let obstructed = !self.settings.obstacles.is_empty();
         let (gaps, gaps_tally, is_gapless) = self.gaps.finish(&presence, obstructed, envelope.is_some());
         let envelope = envelope.unwrap_or_default();
-        let counts = |vehicle: usize| counted(&self.vehicles, &self.settings, vehicle);
-        self.results.ledger.close();
-        let all_listed = self.told.correct(&mut self.results, &self.settings, self.vehicles.len(), counts);
         let absences = absences(&self.vehicles, &self.settings, span_s);
         if self.results.interruption.is_set() {
             return Err(RecordedError::Interrupted);
         }
-        let Results { ledger, closest, obstacles, told, swept, .. } = self.results;
+        let Results { ledger, closest, obstacles, swept, .. } = self.results;
         let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let alone = if obstructed || !separates { Vec::new() } else { alone(&presence) };
         let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
-        let of_pairs = looked_at && all_listed && parry.disagreements == 0 && contradiction.is_none();
+        let of_pairs = looked_at && parry.disagreements == 0 && contradiction.is_none();
         let Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz } = ledger.into_lists();
         let tallies = Tallies { violations: violations_tally, undecided: undecided_tally, gaps: gaps_tally };
         let is_everyone_there = !self.settings.require_presence || absences.is_empty();
@@ -339,7 +302,7 @@ impl TrackAuditor {
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
-            smallest: self.smallest.filter(|_| separates).map_or_else(Vec::new, |smallest| smallest.finish(&told)),
+            smallest: self.smallest.filter(|_| separates).map_or_else(Vec::new, Smallest::finish),
             violations,
             undecided,
             gaps,

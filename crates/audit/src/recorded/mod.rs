@@ -1,7 +1,7 @@
 //! The audit of recorded motion: did any two vehicles come too close, by what a recording says?
 //!
 //! A recording is a stream of [`Item`](tautline_core::track::Item)s, each vehicle at times of its own. What happens between two samples is stated
-//! ([`Motion`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
+//! ([`Interpolation`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
 //! **violation**, or **undecided**, with the interval in which the smallest distance lies.
 //!
 //! - Straight flight and jumps are swept in closed form, like the steps of [`super::Auditor`].
@@ -18,9 +18,6 @@
 //! Every instant counts, the first and the last too, and a vehicle that was seen once is judged where it was seen. A
 //! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
 //! [`Settings::max_gap_s`], nothing is known of it. Where there never were two to keep apart nothing is clear.
-//!
-//! A run knows more than it records: what it says of the time between two instants ([`Told`], [`ToldViolation`]) goes before what is drawn
-//! between them.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -42,27 +39,19 @@
 //! ```
 
 mod auditor;
-mod company;
-mod error;
-mod gaps;
+mod lookup;
 mod outcome;
-mod places;
 mod presence;
 mod proof;
-mod rates;
-mod series;
 mod settings;
 mod smallest;
-mod told;
 mod vehicle;
 mod window;
 
 pub use super::error::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
-pub use error::RecordedError;
-pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies, Told, ToldViolation};
-pub use places::Places;
+pub use lookup::{PairSample, PairSeries, PositionLookup};
+pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
 pub use proof::{Proof, ProofBuilder, ProofWindow};
-pub use series::{PairSample, PairSeries};
-pub use settings::{Motion, Settings, VehicleSettings};
+pub use settings::{Interpolation, RecordedError, Settings, VehicleSettings};

@@ -2,18 +2,12 @@
 
 use serde::Serialize;
 
-use super::settings::Settings;
 use crate::envelope::EnvelopeOutcome;
 use crate::obstacle::Obstacle;
 use crate::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
-use crate::results::KEPT;
 use crate::shortlist::Tally;
 use crate::slices::Slice;
 use crate::sweep::Interval;
-use tautline_core::swarm::{ClosestApproach, Pair};
-
-/// Relative difference of two distances of the same instant that were computed in two ways.
-const SAME: f64 = 1e-9;
 
 /// A time during which a vehicle was not seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -98,44 +92,6 @@ pub(super) fn alone(presence: &[Option<Presence>]) -> Vec<usize> {
     alone
 }
 
-/// What a recording itself says of the time between two of its instants: the closest that any two of its vehicles came.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
-    /// From \[s\].
-    pub from_s: f64,
-    /// To \[s\].
-    pub to_s: f64,
-    /// Who it was, how close \[m\] and when \[s\].
-    pub closest: ClosestApproach,
-    /// How far apart straight lines between the two instants have them then \[m\].
-    pub drawn_m: f64,
-    /// All pairs were at least so far apart while no violation of them is told \[m\].
-    pub others_m: f64,
-    /// Smallest and largest height of the higher of them at the two instants \[m\].
-    pub height_m: [f64; 2],
-}
-
-/// A time during which two vehicles were too close, by what a recording itself says.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToldViolation {
-    /// Which.
-    pub pair: Pair,
-    /// From \[s\].
-    pub from_s: f64,
-    /// To \[s\].
-    pub to_s: f64,
-    /// Their smallest distance within is at least this \[m\].
-    pub least_m: f64,
-    /// It is at most this \[m\], mostly the same.
-    pub min_m: f64,
-    /// When they were as near as that \[s\], where it is told.
-    pub min_at_s: Option<f64>,
-    /// What they were nearer than all along \[m\].
-    pub limit_m: f64,
-    /// Smallest and largest height of the higher of them at the instants around it \[m\].
-    pub height_m: [f64; 2],
-}
-
 /// Where a recording contradicts the bound on acceleration that it is judged by.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contradiction {
@@ -208,98 +164,6 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Adds a violation of a distance that two are to keep, from what else is known of the recording.
-    pub fn violate(&mut self, violation: Violation<ObjectPair>) {
-        self.violations.push(violation);
-        self.tallies.violations.count += 1;
-        self.tallies.violations.listed += 1;
-        self.status = Status::Violation;
-        self.separation = Some(Status::Violation);
-    }
-
-    /// Drops the violations of which something does not hold.
-    pub fn retain_violations(&mut self, holds: impl FnMut(&Violation<ObjectPair>) -> bool) {
-        let before = self.violations.len();
-        self.violations.retain(holds);
-        let gone = before - self.violations.len();
-        self.tallies.violations.count = self.tallies.violations.count.saturating_sub(gone as u64);
-        self.tallies.violations.listed = self.violations.len();
-    }
-
-    /// Removes the violations for which `is_refuted` holds. The verdict is recomputed if no violation remains and all of them
-    /// were listed.
-    pub fn refute_violations(
-        &mut self,
-        mut is_refuted: impl FnMut(&Violation<ObjectPair>) -> bool,
-        settings: &Settings,
-    ) {
-        let Tally { count, listed, is_exact } = self.tallies.violations;
-        let before = self.violations.len();
-        self.retain_violations(|violation| !is_refuted(violation));
-        if self.violations.len() == before || !self.violations.is_empty() || !is_exact || count > listed as u64 {
-            return;
-        }
-        let is_open = !self.undecided.is_empty() || !self.gaps.is_empty();
-        let decided = !is_open && self.contradiction.is_none() && self.parry.disagreements == 0;
-        self.separation = self.separation.map(|_| Status::new(false, decided));
-        let is_everyone_there = !settings.require_presence || self.absences.is_empty();
-        self.status = Status::new(self.envelope.is_exceeded(), decided && self.envelope.is_kept() && is_everyone_there);
-    }
-
-    /// Adds a time of two that keep a distance that cannot be decided.
-    pub fn leave_open(&mut self, undecided: Undecided<ObjectPair>) {
-        self.deciding_rate_hz = if self.undecided.is_empty() {
-            undecided.rate_hz
-        } else {
-            self.deciding_rate_hz.zip(undecided.rate_hz).map(|(a, b)| a.max(b))
-        };
-        self.undecided.push(undecided);
-        self.tallies.undecided.count += 1;
-        self.tallies.undecided.listed += 1;
-        if self.status == Status::Clear {
-            self.status = Status::Undecided;
-        }
-        if self.separation == Some(Status::Clear) {
-            self.separation = Some(Status::Undecided);
-        }
-    }
-
-    /// Whether the judged motion contains a pair that came closer than `closest`, beyond rounding.
-    #[must_use]
-    pub fn contradicts(&self, closest: ClosestApproach) -> bool {
-        self.closest.iter().any(|of| of.upper_m < closest.separation_m * (1.0 - SAME))
-    }
-
-    /// Raises closest approaches to the smallest separation that an audit of finer steps found.
-    ///
-    /// Straight lines between samples can lead a pair closer than that. Where the two distances differ only by rounding, the
-    /// smaller one is kept.
-    pub fn raise_to(&mut self, closest: ClosestApproach) {
-        let (pair, claimed_m) = (ObjectPair::Vehicles(closest.pair), closest.separation_m);
-        let is_judged = self.span_s.is_some_and(|(from_s, to_s)| from_s <= closest.time_s && closest.time_s <= to_s);
-        for of in &mut self.closest {
-            let is_the_same = is_judged && of.lower_m <= claimed_m * (1.0 + SAME);
-            let least_m = if of.lower_m < claimed_m * (1.0 - SAME) { claimed_m } else { claimed_m.min(of.lower_m) };
-            of.lower_m = of.lower_m.max(least_m);
-            of.upper_m = of.upper_m.max(of.lower_m);
-            if of.pair == pair && is_the_same {
-                (of.lower_m, of.upper_m, of.time_s) = (least_m, least_m, closest.time_s);
-            }
-        }
-        self.closest.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m).then((a.pair != pair).cmp(&(b.pair != pair))));
-    }
-
-    /// Takes how close a vehicle came to an obstacle, where that is closer than was found.
-    pub fn offer_past_obstacle(&mut self, told: Approach) {
-        match self.obstacles.iter_mut().find(|known| known.pair == told.pair) {
-            Some(known) if known.lower_m > told.lower_m => *known = told,
-            Some(_) => {}
-            None => self.obstacles.push(told),
-        }
-        self.obstacles.sort_by(|a, b| a.lower_m.total_cmp(&b.lower_m));
-        self.obstacles.truncate(KEPT);
-    }
-
     /// The name of a vehicle: its number from 1 where there is no name.
     #[must_use]
     pub fn name(&self, vehicle: usize) -> String {

@@ -5,9 +5,8 @@
 
 use serde::Serialize;
 
-use super::error::RecordedError;
 use super::outcome::Outcome;
-use super::settings::Settings;
+use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
 use super::window::within;
 use crate::pair_sweep::overlaps;

@@ -1,14 +1,13 @@
-//! What is asked of a recording.
+//! The question of an audit, and errors in it or in the recording.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::error::RecordedError;
 use crate::envelope::{Envelope, Limit, Quantity};
 use crate::error::{Limits, TOUCHING_ELLIPSOIDS};
-use crate::obstacle::Obstacle;
+use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 
 /// Largest number that is accepted, be it a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
@@ -17,7 +16,7 @@ pub(super) const LARGEST: f64 = MAX_LENGTH_M;
 /// How vehicles are taken to move between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Motion {
+pub enum Interpolation {
     /// On a straight line at constant speed. The sweep is exact.
     Linear,
     /// Not at all, with a jump at each sample. The jump is swept like a straight flight that takes no time; vehicles that
@@ -30,7 +29,7 @@ pub enum Motion {
     Bounded,
 }
 
-impl Motion {
+impl Interpolation {
     /// All motions.
     pub const ALL: [Self; 4] = [Self::Linear, Self::Hold, Self::Polynomial, Self::Bounded];
 
@@ -68,16 +67,13 @@ pub struct Settings {
     pub delta_m: Option<f64>,
     /// What happens between samples. `None` asks for straight lines between samples, and curves where the recording has
     /// curves.
-    pub motion: Option<Motion>,
-    /// Largest acceleration \[m/s^2\] of every vehicle, for [`Motion::Bounded`].
+    pub motion: Option<Interpolation>,
+    /// Largest acceleration \[m/s^2\] of every vehicle, for [`Interpolation::Bounded`].
     pub max_accel_m_s2: Option<f64>,
     /// Radius \[m\] of every vehicle of which nothing else is said; it goes before those of the recording.
     pub radius_m: Option<f64>,
     /// Half axes \[m\] of the ellipsoid around each vehicle, such as a downwash that reaches far down.
     pub ellipsoid_m: Option<Vector3<f64>>,
-    /// Whether what is told of the time between samples ([`super::TrackAuditor::tell`]) is of lengths over the axes of the ellipsoid
-    /// already, and not of metres.
-    pub is_told_scaled: bool,
     /// Judge from here on \[s\].
     pub from_s: Option<f64>,
     /// Judge up to here \[s\].
@@ -173,10 +169,10 @@ impl Settings {
         }
         check("the window of accelerations", self.accel_window_s, POSITIVE)?;
         let is_limited = self.envelope.limits.iter().any(|limit| limit.quantity == Quantity::Acceleration);
-        if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Motion::Bounded)) {
+        if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Interpolation::Bounded)) {
             return Err(RecordedError::NoAccelWindow);
         }
-        if let Some(quantity) = self.envelope.of_motion().filter(|_| self.motion == Some(Motion::Hold)) {
+        if let Some(quantity) = self.envelope.of_motion().filter(|_| self.motion == Some(Interpolation::Hold)) {
             return Err(RecordedError::LimitOfJumps { limit: quantity.name() });
         }
         if self.ellipsoid_m.is_some() && !self.obstacles.is_empty() {
@@ -184,4 +180,135 @@ impl Settings {
         }
         self.obstacles.iter().try_for_each(|obstacle| Ok(obstacle.check()?))
     }
+}
+
+/// Why a recording cannot be judged as asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordedError {
+    /// A number of the settings is out of range.
+    #[error("{what} must be {range}, not {value:?}")]
+    OutOfRange {
+        /// What it is.
+        what: String,
+        /// What it may be.
+        range: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// The window is empty.
+    #[error("the window from {from_s:?} s to {to_s:?} s holds no time")]
+    EmptyWindow {
+        /// Its start \[s\].
+        from_s: f64,
+        /// Its end \[s\].
+        to_s: f64,
+    },
+    /// Bounded motion without a bound.
+    #[error("bounded motion of vehicle {vehicle} needs its largest acceleration")]
+    NoBound {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// Neither a safety distance nor a radius.
+    #[error("nothing says how close vehicle {vehicle} may come: there is no delta, and no radius for it")]
+    NoLimit {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// Something was said of a vehicle that is not there.
+    #[error("the recording has no vehicle {name}; it has {known}")]
+    UnknownVehicle {
+        /// The name.
+        name: String,
+        /// The names there are, shortened.
+        known: String,
+    },
+    /// Samples where curves were asked for.
+    #[error("vehicle {vehicle} has samples and no curve: what happens between samples must be stated")]
+    NotACurve {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// Curves where a motion between samples was asked for.
+    #[error("vehicle {vehicle} has a curve: there is nothing between samples to be stated")]
+    NotSamples {
+        /// The vehicle.
+        vehicle: String,
+    },
+    /// A vehicle that has no name.
+    #[error("there is no name for vehicle {} (from 1)", vehicle + 1)]
+    Unnamed {
+        /// The vehicle.
+        vehicle: usize,
+    },
+    /// A time not later than the one before.
+    #[error("vehicle {vehicle}: the time {time_s:?} s is not later than {previous_s:?} s before it")]
+    TimeNotIncreasing {
+        /// The vehicle.
+        vehicle: String,
+        /// The time before \[s\].
+        previous_s: f64,
+        /// The time \[s\].
+        time_s: f64,
+    },
+    /// Items out of order.
+    #[error("the item of vehicle {vehicle} at {time_s:?} s comes after one at {previous_s:?} s")]
+    OutOfOrder {
+        /// The vehicle.
+        vehicle: String,
+        /// The time before \[s\].
+        previous_s: f64,
+        /// The time \[s\].
+        time_s: f64,
+    },
+    /// Vehicles whose times cannot be of one clock.
+    #[error("vehicles {first} and {second} are first seen {days} days apart, which is no flight by one clock")]
+    TwoClocks {
+        /// The one that is seen first.
+        first: String,
+        /// The one that is seen last.
+        second: String,
+        /// How long after it \[days\].
+        days: u64,
+    },
+    /// A sample or a curve that is none: a number that is not finite or too large, no coefficients.
+    #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
+    Item {
+        /// The vehicle.
+        vehicle: String,
+        /// When \[s\].
+        time_s: f64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A radius that is not the same throughout.
+    #[error("vehicle {vehicle} at {time_s:?} s: the radius changes to {radius_m:?} m")]
+    RadiusChanges {
+        /// The vehicle.
+        vehicle: String,
+        /// When \[s\].
+        time_s: f64,
+        /// What it changes to \[m\].
+        radius_m: f64,
+    },
+    /// A limit on speeds or accelerations of vehicles that jump.
+    #[error("vehicles that are held between samples jump: nothing can be said of their {limit}")]
+    LimitOfJumps {
+        /// What was to be limited.
+        limit: &'static str,
+    },
+    /// A window of accelerations where none are limited, or where a bound on them is assumed.
+    #[error(
+        "a window of accelerations says nothing where no acceleration is limited, or where accelerations are bounded"
+    )]
+    NoAccelWindow,
+    /// Obstacles and an ellipsoid.
+    #[error("obstacles cannot be judged by an ellipsoid")]
+    ObstaclesAndEllipsoid,
+    /// The work was interrupted ([`super::TrackAuditor::with_interruption`]).
+    #[error("interrupted")]
+    Interrupted,
+    /// An obstacle that is none.
+    #[error(transparent)]
+    Obstacle(#[from] ObstacleError),
 }

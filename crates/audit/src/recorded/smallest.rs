@@ -1,12 +1,12 @@
-//! The smallest distance of all pairs over time.
+//! The smallest distance of all pairs over time, in the intervals in which at least two vehicles are present.
 
-use super::company::Company;
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use super::window::{Windows, within};
 use crate::error::Interruption;
 use crate::outcome::Approach;
 use crate::results::Results;
+use crate::segment::Segment;
 use crate::slices::{Slice, Slices};
 use crate::sweep::Interval;
 
@@ -37,17 +37,11 @@ impl Smallest {
         self.interruption = interruption;
     }
 
-    /// Looks at a window, in slices between the samples in it and the instants at which anybody comes or goes. `nearest` says which
-    /// of those that were drawn closest, the closest first, counts.
-    pub(super) fn follow(
-        &mut self,
-        vehicles: &[Vehicle],
-        window: Interval,
-        nearest: impl Fn(&[Approach]) -> Option<Approach>,
-    ) {
-        let company = Company::over(vehicles, window);
+    /// Judges a window in slices between its samples and the instants at which a vehicle appears or leaves.
+    pub(super) fn follow(&mut self, vehicles: &[Vehicle], window: Interval) {
+        let intervals = PresenceIntervals::over(vehicles, window);
         let mut parts: Option<Vec<Vehicle>> = None;
-        for two in ends(vehicles, window, &company).windows(2) {
+        for two in ends(vehicles, window, &intervals).windows(2) {
             let over = Interval { from_s: two[0], to_s: two[1] };
             let mut drawn = self.closest(vehicles, over);
             // Straight segments are judged whole: what they come to outside of the slice is of another.
@@ -60,8 +54,8 @@ impl Smallest {
                 }
                 drawn = self.closest(parts, over);
             }
-            if let Some(closest) = nearest(&drawn) {
-                self.slices.take(company.slice(over, closest));
+            if let Some(&closest) = drawn.first() {
+                self.slices.take(intervals.slice(over, closest));
             }
         }
     }
@@ -72,17 +66,13 @@ impl Smallest {
         results.closest.kept
     }
 
-    /// The slices, with what the recording itself told.
-    pub(super) fn finish(mut self, told: &[Approach]) -> Vec<Slice> {
-        for closest in told {
-            self.slices.enter(*closest);
-        }
+    pub(super) fn finish(self) -> Vec<Slice> {
         self.slices.finish(MOST_KEPT)
     }
 }
 
 /// Where slices of a window begin and end \[s\].
-fn ends(vehicles: &[Vehicle], window: Interval, company: &Company) -> Vec<f64> {
+fn ends(vehicles: &[Vehicle], window: Interval, intervals: &PresenceIntervals) -> Vec<f64> {
     let parts = || vehicles.iter().map(|vehicle| &vehicle.segments[within(&vehicle.segments, window)]);
     let mut samples: Vec<_> = parts().flatten().flat_map(|part| [part.from_s, part.to_s]).collect();
     samples.sort_unstable_by(f64::total_cmp);
@@ -90,10 +80,10 @@ fn ends(vehicles: &[Vehicle], window: Interval, company: &Company) -> Vec<f64> {
     // Vehicles that are seen at instants of their own do not make slices much shorter than what lies between two of them.
     let of_one = parts().map(<[_]>::len).max().unwrap_or(0);
     let most_samples = (2 * of_one).clamp(FEWEST_SAMPLES, MOST_SAMPLES);
-    let stretches: Vec<_> = company.stretches.iter().flat_map(|stretch| [stretch.from_s, stretch.to_s]).collect();
+    let stretches: Vec<_> = intervals.stretches.iter().flat_map(|stretch| [stretch.from_s, stretch.to_s]).collect();
     let mut ends = vec![window.from_s, window.to_s];
     for (times_s, most) in
-        [(&samples, most_samples), (&stretches, 2 * MOST_STRETCHES), (&company.changes_s, MOST_CHANGES)]
+        [(&samples, most_samples), (&stretches, 2 * MOST_STRETCHES), (&intervals.changes_s, MOST_CHANGES)]
     {
         ends.extend(times_s.iter().step_by(times_s.len().div_ceil(most).max(1)));
     }
@@ -103,13 +93,88 @@ fn ends(vehicles: &[Vehicle], window: Interval, company: &Company) -> Vec<f64> {
     if ends.len() == 1 { vec![window.from_s, window.to_s] } else { ends }
 }
 
+/// Intervals of a window in which at least two vehicles are present, not all of them on the ground.
+#[derive(Clone, Debug)]
+pub(super) struct PresenceIntervals {
+    /// When a vehicle appears, leaves, takes off or lands within the window \[s\].
+    pub(super) changes_s: Vec<f64>,
+    /// The intervals in order of time; no two of them touch.
+    pub(super) stretches: Vec<Interval>,
+}
+
+impl PresenceIntervals {
+    pub(super) fn over(vehicles: &[Vehicle], window: Interval) -> Self {
+        // When how many more are there, and how many more are not on the ground.
+        let mut events: Vec<(f64, [i32; 2])> = Vec::new();
+        for vehicle in vehicles {
+            let parts = &vehicle.segments[within(&vehicle.segments, window)];
+            let aloft = parts.iter().filter(|part| part.grounded != Some(true));
+            for_each_run(parts.iter(), |run| events.extend([(run.from_s, [1, 0]), (run.to_s, [-1, 0])]));
+            for_each_run(aloft, |run| events.extend([(run.from_s, [0, 1]), (run.to_s, [0, -1])]));
+        }
+        events.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut intervals = Self { changes_s: Vec::new(), stretches: Vec::new() };
+        let (mut there, mut aloft, mut since_s) = (0, 0, window.from_s);
+        for together in events.chunk_by(|a, b| a.0 == b.0) {
+            let now_s = together[0].0;
+            intervals.take(Interval { from_s: since_s, to_s: now_s.min(window.to_s) }, there > 1 && aloft > 0);
+            if window.from_s < now_s && now_s < window.to_s {
+                intervals.changes_s.push(now_s);
+            }
+            since_s = now_s.max(window.from_s);
+            (there, aloft) = together.iter().fold((there, aloft), |(a, b), (_, more)| (a + more[0], b + more[1]));
+        }
+        intervals
+    }
+
+    fn take(&mut self, next: Interval, are_two: bool) {
+        if !are_two || next.to_s <= next.from_s {
+            return;
+        }
+        match self.stretches.last_mut() {
+            Some(last) if last.to_s == next.from_s => last.to_s = next.to_s,
+            _ => self.stretches.push(next),
+        }
+    }
+
+    /// What the closest approach of a time within the window says of that time: nothing of any part of it at which no two are there.
+    pub(super) fn slice(&self, over: Interval, closest: Approach) -> Slice {
+        let Interval { from_s, to_s } = over;
+        let stretch = self.stretches.get(self.stretches.partition_point(|stretch| stretch.to_s < to_s));
+        if stretch.is_some_and(|stretch| stretch.from_s <= from_s && from_s < to_s) {
+            return Slice { from_s, to_s, closest, is_whole: true };
+        }
+        let change = self.changes_s.get(self.changes_s.partition_point(|change_s| *change_s <= from_s));
+        if change.is_some_and(|change_s| *change_s < to_s) {
+            return Slice { from_s, to_s, closest, is_whole: false };
+        }
+        // All the time there are fewer, and two for no longer than an instant at either end.
+        let at_s = closest.time_s.max(from_s).min(to_s);
+        Slice { from_s: at_s, to_s: at_s, closest, is_whole: true }
+    }
+}
+
+/// Calls `f` with each time without a break that segments in order of time take.
+fn for_each_run<'a>(mut segments: impl Iterator<Item = &'a Segment>, mut f: impl FnMut(Interval)) {
+    let Some(Segment { from_s, to_s, .. }) = segments.next() else { return };
+    let mut run = Interval { from_s: *from_s, to_s: *to_s };
+    for next in segments {
+        if next.from_s > run.to_s {
+            f(run);
+            run.from_s = next.from_s;
+        }
+        run.to_s = next.to_s.max(run.to_s);
+    }
+    f(run);
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::recorded::{Motion, TrackAuditor};
+    use crate::recorded::{Interpolation, TrackAuditor};
     use tautline_core::track::{Item, Sample};
 
     /// When a vehicle is seen \[s\], and where on a line \[m\].
@@ -233,7 +298,7 @@ mod tests {
         // One that stands aside, seen more often at the beginning.
         items.extend((1..=20).map(|k| at(2, 0.25 * f64::from(k), 0.0)));
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        let settings = Settings { above_m: Some(2.0), motion: Some(Motion::Linear), ..with_gaps(10.0) };
+        let settings = Settings { above_m: Some(2.0), motion: Some(Interpolation::Linear), ..with_gaps(10.0) };
         let mut auditor = TrackAuditor::new(settings).expect("settings").with_smallest();
         auditor.push(&["a", "b", "c"].map(str::to_owned), &items).expect("right");
         let found = auditor.finish().expect("judged").smallest;

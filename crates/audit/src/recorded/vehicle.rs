@@ -2,9 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::error::RecordedError;
 use super::outcome::{Contradiction, Gap, Presence};
-use super::settings::{Motion, Settings};
+use super::settings::{Interpolation, RecordedError, Settings};
 use crate::envelope::Seen;
 use crate::polynomial::{BernsteinBasis, parts_told};
 use crate::segment::{Curve, Deviation, Segment};
@@ -33,7 +32,7 @@ pub(super) struct Vehicle {
     /// Whether it is judged.
     pub(super) asked_for: bool,
     offset_s: f64,
-    motion: Option<Motion>,
+    motion: Option<Interpolation>,
     /// Largest acceleration \[m/s^2\]; NaN where none is given.
     max_accel_m_s2: f64,
     /// 1 over the axes of the ellipsoid.
@@ -85,7 +84,7 @@ impl Vehicle {
 
     /// Whether it can be judged, once it was seen.
     pub(super) fn check(&self, settings: &Settings) -> Result<(), RecordedError> {
-        if self.motion == Some(Motion::Bounded) && self.max_accel_m_s2.is_nan() {
+        if self.motion == Some(Interpolation::Bounded) && self.max_accel_m_s2.is_nan() {
             return Err(RecordedError::NoBound { vehicle: self.name.clone() });
         }
         if settings.asks_for_separation() && !self.has_limit(settings) {
@@ -107,7 +106,7 @@ impl Vehicle {
 
     /// How its items are taken by what follows it alone.
     pub(super) fn seen(&self, after_gap: bool) -> Seen {
-        let bounded_by_m_s2 = (self.motion == Some(Motion::Bounded)).then_some(self.max_accel_m_s2);
+        let bounded_by_m_s2 = (self.motion == Some(Interpolation::Bounded)).then_some(self.max_accel_m_s2);
         Seen { offset_s: self.offset_s, after_gap, bounded_by_m_s2 }
     }
 
@@ -139,8 +138,8 @@ impl Vehicle {
     /// Takes a sample; returns the gap before it, if there is one.
     #[inline]
     fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
-        let motion = self.motion.unwrap_or(Motion::Linear);
-        if motion == Motion::Polynomial {
+        let motion = self.motion.unwrap_or(Interpolation::Linear);
+        if motion == Interpolation::Polynomial {
             return Err(RecordedError::NotACurve { vehicle: self.name.clone() });
         }
         self.check_sample(sample)?;
@@ -165,12 +164,12 @@ impl Vehicle {
                 self.joined = (self.joined.0 + 1, self.joined.1 + (time_s - from_s));
                 let to = self.scaled(sample.position_m);
                 match motion {
-                    Motion::Linear | Motion::Polynomial => self.keep_straight((from_s, time_s), from, to),
-                    Motion::Hold => {
+                    Interpolation::Linear | Interpolation::Polynomial => self.keep_straight((from_s, time_s), from, to),
+                    Interpolation::Hold => {
                         self.keep_straight((from_s, time_s), from, from);
                         self.keep_straight((time_s, time_s), from, to);
                     }
-                    Motion::Bounded => {
+                    Interpolation::Bounded => {
                         let last = *last;
                         self.compare_with_bound(&last, &seen);
                         self.keep_bounded(&last, &seen);
@@ -190,7 +189,7 @@ impl Vehicle {
 
     /// Takes a piece of a curve; returns the gap before it, if there is one.
     fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
-        if !matches!(self.motion, None | Some(Motion::Polynomial)) {
+        if !matches!(self.motion, None | Some(Interpolation::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
         }
         let (from_s, to_s) = (piece.from_s + self.offset_s, piece.to_s + self.offset_s);

@@ -18,7 +18,7 @@ use crate::recorded::names;
 const CASES: u32 = 40;
 /// Longer than a case takes, on a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Places on a stretch that two curves share, and on a jump.
+/// Points of a stretch that two curves share, and on a jump.
 const PLACES: u32 = 600;
 /// Rounding of a place on a curve, relative to the sum of the sizes of its terms.
 const ROUNDING: f64 = 1e-13;

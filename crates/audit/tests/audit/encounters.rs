@@ -1,7 +1,7 @@
 //! What figures show of two that came close, and straight ways beside curves.
 
 use nalgebra::Vector3;
-use tautline_audit::recorded::{Motion, ObjectPair, Outcome, PairSample, PairSeries, Settings};
+use tautline_audit::recorded::{Interpolation, ObjectPair, Outcome, PairSample, PairSeries, Settings};
 use tautline_audit::{Shape, Status};
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Piece, Sample};
@@ -132,7 +132,7 @@ fn what_is_drawn_through_positions_and_velocities_is_their_cubic() {
         sample(0, 8.0, 0.0, 0.0),
         sample(1, 8.0, 3.0, 0.0),
     ];
-    let settings = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(6.0), ..Settings::delta(0.1) };
+    let settings = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(6.0), ..Settings::delta(0.1) };
     let settings = Settings { max_gap_s: Some(9.0), ..settings };
     let outcome = asked(&items, settings.clone());
     assert_eq!(outcome.contradiction, None);

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use tautline_audit::Status;
 use tautline_audit::envelope::{Envelope, Fence, Limit, LimitOutcome, Quantity};
-use tautline_audit::recorded::{Motion, RecordedError, Settings, audit};
+use tautline_audit::recorded::{Interpolation, RecordedError, Settings, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
 const RADIUS_M: f64 = 5.0;
@@ -46,7 +46,7 @@ fn judged(items: &[Item], settings: Settings) -> (Status, Vec<LimitOutcome>) {
 fn chords_tell_no_more_speed_than_was_flown_and_bounds_no_less() {
     for (hz, with_velocity) in [(10, false), (10, true), (50, false), (50, true)] {
         let bounded = Settings {
-            motion: Some(Motion::Bounded),
+            motion: Some(Interpolation::Bounded),
             max_accel_m_s2: Some(ACCEL * 1.01),
             ..asked(limits(&[(Quantity::Speed, SPEED), (Quantity::HorizontalSpeed, 2.0 * SPEED)]))
         };
@@ -62,7 +62,7 @@ fn chords_tell_no_more_speed_than_was_flown_and_bounds_no_less() {
 #[test]
 fn a_limit_between_what_samples_show_and_what_a_bound_allows_is_undecided() {
     let settings = |limit| Settings {
-        motion: Some(Motion::Bounded),
+        motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(ACCEL * 1.01),
         ..asked(limits(&[(Quantity::Speed, limit)]))
     };
@@ -193,11 +193,11 @@ fn what_is_not_seen_is_not_said_to_be_kept() {
     let (status, found) = judged(&once, asked(slow()));
     assert_eq!((status, found[0].status, found[1].status), (Status::Undecided, Status::Undecided, Status::Clear));
     assert_eq!(found[0].unknown, [0]);
-    let hold = Settings { motion: Some(Motion::Hold), ..asked(slow()) };
+    let hold = Settings { motion: Some(Interpolation::Hold), ..asked(slow()) };
     let refused = audit(&["one".to_owned()], &gap, hold).expect_err("jumps have no speed");
     assert_eq!(refused, RecordedError::LimitOfJumps { limit: "speed" });
     // A recording that contradicts the bound proves nothing.
-    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.5 * ACCEL), ..asked(slow()) };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.5 * ACCEL), ..asked(slow()) };
     assert_eq!(judged(&circle(20, false), bounded).0, Status::Undecided);
 }
 
@@ -254,7 +254,7 @@ fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
         .map(|(t, x)| sample(t, Vector3::new(x, 0.0, 1.0), None))
         .into();
     let settings = |from_s, to_s| Settings {
-        motion: Some(Motion::Bounded),
+        motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(10.0),
         from_s,
         to_s,
@@ -371,7 +371,7 @@ fn a_window_of_accelerations_needs_accelerations_that_are_limited_and_not_bounde
     let accel = || limits(&[(Quantity::Acceleration, 100.0)]);
     assert_eq!(window(accel(), None, 0.2), Ok(Status::Clear));
     assert_eq!(window(limits(&[(Quantity::Speed, 9.0)]), None, 0.2), Err(RecordedError::NoAccelWindow));
-    assert_eq!(window(accel(), Some(Motion::Bounded), 0.2), Err(RecordedError::NoAccelWindow));
+    assert_eq!(window(accel(), Some(Interpolation::Bounded), 0.2), Err(RecordedError::NoAccelWindow));
     for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(window(accel(), None, wrong), Err(RecordedError::OutOfRange { .. })), "{wrong}");
     }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use num_rational::BigRational;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Motion, Outcome, Settings, audit};
+use tautline_audit::recorded::{Interpolation, Outcome, Settings, audit};
 
 use crate::recorded::{asked, seen};
 use crate::scenes::{Random, Tracks, exact, exact_place, exact_squared, instants, items, scene};
@@ -124,7 +124,7 @@ fn equality_is_no_violation_wherever_the_digits_lie() {
     ];
     clear(&items, 100.0);
     // A jump past one that rests.
-    let held = |limit_m: f64| Settings { motion: Some(Motion::Hold), ..Settings::delta(limit_m) };
+    let held = |limit_m: f64| Settings { motion: Some(Interpolation::Hold), ..Settings::delta(limit_m) };
     let jump = [
         seen(0, 0.0, [-5.0, 0.0, 0.0]),
         seen(1, 0.0, [0.0, 0.3, 0.4]),

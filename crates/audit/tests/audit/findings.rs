@@ -1,7 +1,7 @@
 //! What the judge of recordings lists: everything that it found, once, with its own numbers.
 
 use nalgebra::Vector3;
-use tautline_audit::recorded::{Motion, Outcome, Settings, audit};
+use tautline_audit::recorded::{Interpolation, Outcome, Settings, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
 /// Rounding of a handful of operations on numbers around ten.
@@ -44,7 +44,7 @@ fn every_time_too_close_and_every_doubt_is_listed_once_with_its_own_smallest_dis
         assert_eq!(found, expected);
         assert!(count > 2 || outcome.swept == 1 + 2 * near.len() as u64, "{}", outcome.swept);
     }
-    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(4.0), ..Settings::delta(1.0) };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(4.0), ..Settings::delta(1.0) };
     // Two accelerations of 4 m/s^2 over 1 s: at most 1 m of deviation together.
     let outcome = asked(&visits(&[1.3, 9.0, 1.9]), bounded);
     let found: Vec<_> = outcome.undecided.iter().map(|u| (u.from_s, u.to_s, u.lower_m.max(0.0))).collect();
@@ -97,7 +97,7 @@ fn a_sample_of_both_bounds_what_is_listed_from_above() {
     ];
     let settings = Settings {
         max_gap_s: Some(5.0),
-        motion: Some(Motion::Bounded),
+        motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(1.0),
         ..Settings::delta(4.6)
     };

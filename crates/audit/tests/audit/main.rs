@@ -12,4 +12,3 @@ mod recorded;
 mod recorded_curves;
 mod scenes;
 mod times;
-mod told;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Envelope, Fence, Limit, Quantity};
-use tautline_audit::recorded::{Motion, Outcome, RecordedError, Settings, TrackAuditor, audit};
+use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, TrackAuditor, audit};
 use tautline_audit::{LISTED, Status};
 use tautline_core::track::{Item, Piece, Sample};
 
@@ -121,7 +121,7 @@ fn the_count_and_the_list_are_those_of_every_pair_judged_alone() {
 fn undecided_times_are_bounded_too_and_the_rate_is_that_of_all() {
     let count = 200;
     let settings = |max_accel_m_s2| Settings {
-        motion: Some(Motion::Bounded),
+        motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(max_accel_m_s2),
         ..Settings::delta(1e-3)
     };

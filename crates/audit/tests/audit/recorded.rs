@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use tautline_audit::recorded::{
-    Motion, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, audit,
+    Interpolation, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, audit,
 };
 use tautline_audit::{Obstacle, Shape, Status};
 use tautline_core::track::{Item, Piece, Sample};
@@ -99,7 +99,7 @@ fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    let held = Settings { motion: Some(Motion::Hold), ..Settings::delta(2.0) };
+    let held = Settings { motion: Some(Interpolation::Hold), ..Settings::delta(2.0) };
     let found = asked(&items(1.0), held.clone());
     assert_eq!((found.status, found.violations[0].from_s, found.violations[0].to_s), (Status::Violation, 1.0, 1.0));
     assert_eq!(status(&items(3.0), held.clone()), Status::Clear);
@@ -107,8 +107,8 @@ fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
     let mut crossing = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [6.0, 6.0, 0.0])];
     crossing.extend([seen(1, 0.5, [6.0, 0.0, 0.0]), seen(1, 0.9, [1.0, 0.0, 0.0]), seen(0, 1.0, [0.0, 60.0, 0.0])]);
     let patient = |motion| Settings { motion: Some(motion), max_gap_s: Some(9.0), ..Settings::delta(2.0) };
-    assert_eq!(status(&crossing, patient(Motion::Hold)), Status::Violation);
-    assert_eq!(status(&crossing, patient(Motion::Linear)), Status::Clear);
+    assert_eq!(status(&crossing, patient(Interpolation::Hold)), Status::Violation);
+    assert_eq!(status(&crossing, patient(Interpolation::Linear)), Status::Clear);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
     assert_eq!(outcome.violations[0].from_s, 0.5, "{outcome:?}");
     assert!((outcome.closest[0].lower_m - 1.0_f64.hypot(0.25)).abs() < ROUNDING);
     // On curves, and under a bound, which may leave the ground sooner.
-    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.01), ..above };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.01), ..above };
     assert!(asked(&items(1.0), bounded).violations[0].from_s < 0.5);
 }
 
@@ -143,7 +143,7 @@ fn one_who_begins_to_climb_at_the_instant_another_ends_was_on_the_ground_with_it
             seen(1, 2.0, [0.3, 0.0, 4.0]),
         ]
     };
-    for (above_m, motion) in [(0.0, Motion::Linear), (0.0, Motion::Hold), (0.1, Motion::Linear)] {
+    for (above_m, motion) in [(0.0, Interpolation::Linear), (0.0, Interpolation::Hold), (0.1, Interpolation::Linear)] {
         let settings = Settings { above_m: Some(above_m), motion: Some(motion), ..Settings::delta(1.0) };
         let outcome = asked(&items(above_m), settings.clone());
         assert_eq!(outcome.violations, [], "{above_m} {motion:?}");
@@ -159,7 +159,7 @@ fn no_interval_is_too_short_to_be_judged() {
         [a(0), b(0, 5.0), a(1), b(1, 0.1), a(2), b(2, 5.0)]
     };
     assert_eq!(status(&items(1e-60), Settings::delta(1.0)), Status::Violation);
-    let bounded = Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(1.0), ..Settings::delta(1.0) };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(1.0), ..Settings::delta(1.0) };
     assert_ne!(status(&items(1e-60), bounded), Status::Clear);
     let refused = audit(&names(2), &items(3e-310), Settings::delta(1.0));
     assert!(matches!(refused, Err(RecordedError::TimeNotIncreasing { .. })), "{refused:?}");
@@ -355,9 +355,9 @@ fn wrong_recordings_and_questions_are_refused_by_name() {
     assert!(refused(&back, Settings::delta(1.0)).contains("comes after one at 1.0 s"));
     assert!(refused(&[seen(7, 1.0, [0.0; 3])], Settings::delta(1.0)).contains("no name for vehicle 8"));
     let with = |motion| Settings { motion: Some(motion), ..Settings::delta(1.0) };
-    assert!(refused(&pass(1.0), with(Motion::Polynomial)).contains("has samples and no curve"));
-    assert!(refused(&curves(1.0), with(Motion::Linear)).contains("has a curve"));
-    assert!(refused(&pass(1.0), with(Motion::Bounded)).contains("needs its largest acceleration"));
+    assert!(refused(&pass(1.0), with(Interpolation::Polynomial)).contains("has samples and no curve"));
+    assert!(refused(&curves(1.0), with(Interpolation::Linear)).contains("has a curve"));
+    assert!(refused(&pass(1.0), with(Interpolation::Bounded)).contains("needs its largest acceleration"));
     for settings in [
         Settings::delta(0.0),
         Settings::delta(f64::NAN),
@@ -414,7 +414,7 @@ proptest! {
         if sorted {
             items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         }
-        let motion = [None, Some(Motion::Linear), Some(Motion::Hold), Some(Motion::Polynomial), Some(Motion::Bounded)]
+        let motion = [None, Some(Interpolation::Linear), Some(Interpolation::Hold), Some(Interpolation::Polynomial), Some(Interpolation::Bounded)]
             [usize::from(motion)];
         let obstacles = vec![thing(Shape::Ball { radius_m: 1.0 }, [0.0; 3])];
         let settings =

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Approach, Motion, RecordedError, Settings, VehicleSettings, WIDTH_M, audit};
+use tautline_audit::recorded::{Approach, Interpolation, RecordedError, Settings, VehicleSettings, WIDTH_M, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
 use super::recorded::{ROUNDING, asked, names, of, pass, seen, status};
@@ -96,8 +96,10 @@ fn the_minimum_on_curves_is_enclosed_and_not_sampled() {
         assert_eq!(outcome.parry.disagreements, 0);
     }
     // A curve is not its samples, which look better.
-    let samples =
-        asked(&sampled(&curves(0.25), 10, false), Settings { motion: Some(Motion::Hold), ..Settings::delta(0.2) });
+    let samples = asked(
+        &sampled(&curves(0.25), 10, false),
+        Settings { motion: Some(Interpolation::Hold), ..Settings::delta(0.2) },
+    );
     assert_eq!(samples.status, Status::Clear);
     let near = asked(&curves(0.25), Settings::delta(0.25 - 2.0 * WIDTH_M)).status;
     let beyond = asked(&curves(0.25), Settings::delta(0.25 + 2.0 * WIDTH_M)).status;
@@ -116,7 +118,7 @@ fn the_time_below_delta_on_curves_ends_where_delta_is_reached() {
 }
 
 fn bounded(delta_m: f64, max_accel_m_s2: f64) -> Settings {
-    Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Settings::delta(delta_m) }
+    Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(max_accel_m_s2), ..Settings::delta(delta_m) }
 }
 
 #[test]
@@ -154,7 +156,7 @@ fn the_rate_that_is_said_to_decide_does() {
     let both = |accels: [f64; 2]| {
         let settings = |accel| VehicleSettings { max_accel_m_s2: Some(accel), ..VehicleSettings::default() };
         let vehicles = of(&[("alpha", settings(accels[0])), ("bravo", settings(accels[1]))]);
-        Settings { motion: Some(Motion::Bounded), vehicles, max_gap_s: Some(1.0), ..Settings::delta(2.9) }
+        Settings { motion: Some(Interpolation::Bounded), vehicles, max_gap_s: Some(1.0), ..Settings::delta(2.9) }
     };
     // The same rate and acceleration of both, and a slow one beside a quick one that is seen often.
     for (rates_hz, accels) in [([1.0, 1.0], [4.0, 4.0]), ([1.0, 10.0], [8.0, 400.0])] {

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Motion, RecordedError, Settings, VehicleSettings, audit};
+use tautline_audit::recorded::{Interpolation, RecordedError, Settings, VehicleSettings, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
 use crate::recorded::{asked, names, seen};
@@ -103,8 +103,11 @@ fn a_straight_flight_far_from_the_origin_needs_no_acceleration() {
             })
         };
         let items: Vec<_> = (0..100).flat_map(at).collect();
-        let bounded =
-            |delta_m| Settings { motion: Some(Motion::Bounded), max_accel_m_s2: Some(0.0), ..Settings::delta(delta_m) };
+        let bounded = |delta_m| Settings {
+            motion: Some(Interpolation::Bounded),
+            max_accel_m_s2: Some(0.0),
+            ..Settings::delta(delta_m)
+        };
         let outcome = asked(&items, bounded(4.9));
         assert_eq!((outcome.contradiction, outcome.status), (None, Status::Clear), "{with_velocity}");
         // One who is elsewhere in one sample needs some.

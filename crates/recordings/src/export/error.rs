@@ -23,7 +23,7 @@ pub enum ExportError {
     #[error("curves cannot be sampled at {0} Hz")]
     SampleRate(f64),
     /// Nothing writes the format.
-    #[error("nothing writes {}", .0.title())]
+    #[error("nothing writes {}", .0.title)]
     NotWritten(Format),
     /// The name of a vehicle cannot be written in the format.
     #[error("the name {0:?} of a vehicle cannot be written in this format")]

@@ -10,7 +10,7 @@ use super::error::ExportError;
 use super::source::{About, Source};
 use crate::mcap::topic::{TopicWriter, encode, log_time_ns};
 use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};
-use crate::read::mcap::exported::{Instant, TRACKS, VEHICLES, Vehicles};
+use crate::read::mcap::own::{Instant, TRACKS, VEHICLES, Vehicles};
 use tautline_core::track::Sample;
 
 /// Size at which a chunk is closed \[bytes\].

@@ -5,13 +5,11 @@
 //! read several times, so that memory is bounded by an instant and a block, not by the recording. Curves cannot be
 //! written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
 
-mod beside;
 mod csv;
 mod error;
 mod mcap;
 mod npz;
 mod parquet;
-mod sampled;
 mod source;
 
 pub use crate::read::Format;
@@ -23,7 +21,7 @@ use crate::read::{Channels, ReadError, Recording};
 use source::Source;
 
 /// The formats that are written; files of each have its name as their extension.
-pub const WRITTEN: &[Format] = &[Format::Csv, Format::Parquet, Format::Npz, Format::Mcap];
+pub const WRITTEN: &[Format] = &[Format::CSV, Format::PARQUET, Format::NPZ, Format::MCAP];
 
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,12 +71,16 @@ pub fn export_with(
     let source = Source { open, channels, sample_hz: options.sample_hz };
     let about = source.survey()?;
     let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
-    match format {
-        Format::Csv => exported.notes.extend(csv::write(&source, &about, file)?),
-        Format::Parquet => parquet::write(&source, &about, file)?,
-        Format::Npz => npz::write(&source, &about, file)?,
-        Format::Mcap => mcap::write(&source, &about, file)?,
-        other => return Err(ExportError::NotWritten(other)),
+    if format == Format::CSV {
+        exported.notes.extend(csv::write(&source, &about, file)?);
+    } else if format == Format::PARQUET {
+        parquet::write(&source, &about, file)?;
+    } else if format == Format::NPZ {
+        npz::write(&source, &about, file)?;
+    } else if format == Format::MCAP {
+        mcap::write(&source, &about, file)?;
+    } else {
+        return Err(ExportError::NotWritten(format));
     }
     Ok(exported)
 }

@@ -5,15 +5,15 @@
 //! The recording is read once for each array, so that none of them is in memory.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
 
 use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::beside::Written;
 use super::error::ExportError;
-use super::source::{About, Source};
+use super::source::{About, Source, Written};
 use tautline_core::track::Sample;
 
 /// Arrays that mean something to who reads motion.

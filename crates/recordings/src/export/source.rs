@@ -1,11 +1,13 @@
-//! A recording that is exported, instant by instant.
+//! A recording that is exported: its instants, its curves as samples, and the channels beside positions.
 
-use super::beside::Beside;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
 use super::error::ExportError;
-use super::sampled::Sampled;
-use crate::read::{Channels, ReadError, Recording};
+use crate::read::{Channels, ReadError, Recording, is_read};
 use tautline_core::record::Channel;
-use tautline_core::track::{Clock, Item, Sample};
+use tautline_core::track::{Clock, Item, Piece, Sample, Tracks};
 
 /// A recording that can be read again and again.
 pub(super) struct Source<'a> {
@@ -126,5 +128,186 @@ impl Source<'_> {
             take(&instant)?;
         }
         Ok(recording)
+    }
+}
+
+/// The channels that are written, in order of first appearance.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Beside {
+    pub(super) channels: Vec<Written>,
+}
+
+/// A channel that is written.
+#[derive(Clone, Debug)]
+pub(super) struct Written {
+    pub(super) name: Arc<str>,
+    pub(super) columns: Arc<[String]>,
+}
+
+impl Written {
+    /// The channel at an instant; none where the instant does not have it.
+    pub(super) fn of<'a>(&self, channels: &'a [Channel]) -> Option<&'a Channel> {
+        channels.iter().find(|channel| self.name == channel.name && self.columns == channel.columns)
+    }
+
+    /// The row of a vehicle at an instant.
+    pub(super) fn row<'a>(&self, channels: &'a [Channel], row: usize) -> Option<&'a [f64]> {
+        let width = self.columns.len();
+        self.of(channels)?.values.get(row * width..(row + 1) * width)
+    }
+}
+
+impl Beside {
+    /// Takes note of the channels of an instant. Of two of one name the first is written.
+    pub(super) fn note(&mut self, channels: &[Channel]) {
+        for channel in channels {
+            if self.channels.iter().all(|known| known.name != channel.name) {
+                let (name, columns) = (channel.name.clone(), channel.columns.clone());
+                self.channels.push(Written { name, columns });
+            }
+        }
+    }
+
+    /// Names of the columns of all channels in a long table: as the channels call them, behind the name of the channel where
+    /// one would be taken for another.
+    pub(super) fn columns(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for channel in &self.channels {
+            for column in &*channel.columns {
+                let taken = is_read(column) || names.contains(column);
+                names.push(if taken { format!("{}_{column}", channel.name) } else { column.clone() });
+            }
+        }
+        names
+    }
+
+    /// Appends what stands in those columns in a row of an instant; NaN where nothing is known.
+    pub(super) fn cells(&self, channels: &[Channel], row: usize, cells: &mut Vec<f64>) {
+        for channel in &self.channels {
+            match channel.row(channels, row) {
+                Some(known) => cells.extend(known),
+                None => cells.extend(std::iter::repeat_n(f64::NAN, channel.columns.len())),
+            }
+        }
+    }
+}
+
+/// Most samples that are made of the curves of a recording.
+const MOST_SAMPLES: f64 = 1e9;
+
+/// Curves in memory, to be looked at in regular intervals.
+pub(super) struct Sampled {
+    /// The pieces of each vehicle, in order of time.
+    pieces: Vec<Vec<Piece>>,
+    /// What was recorded as samples, in order of time.
+    samples: Vec<Sample>,
+    hz: f64,
+    from_s: f64,
+}
+
+impl Sampled {
+    pub(super) fn new(recording: &mut dyn Tracks<Error = ReadError>, hz: f64) -> Result<Self, ExportError> {
+        let mut items = Vec::new();
+        while recording.read(&mut items)? {}
+        let (mut pieces, mut samples) = (Vec::new(), Vec::new());
+        pieces.resize_with(recording.vehicles().len(), Vec::new);
+        let (mut from_s, mut to_s, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        for item in items {
+            match item {
+                Item::Sample(sample) => samples.push(sample),
+                Item::Piece(piece) => {
+                    (from_s, to_s) = (from_s.min(piece.from_s), to_s.max(piece.to_s));
+                    count += (piece.to_s - piece.from_s) * hz;
+                    pieces[piece.vehicle].push(piece);
+                }
+            }
+        }
+        if from_s > to_s {
+            return Err(ExportError::NoCurves);
+        }
+        if !(hz > 0.0 && hz.is_finite() && count <= MOST_SAMPLES) {
+            return Err(ExportError::SampleRate(hz));
+        }
+        Ok(Self { pieces, samples, hz, from_s })
+    }
+
+    /// When the curves are looked at \[s\]: in regular intervals, and where the curve of a vehicle ends.
+    fn times_s(&self) -> impl Iterator<Item = f64> + '_ {
+        let mut ends: Vec<f64> = self.pieces.iter().filter_map(|pieces| Some(pieces.last()?.to_s)).collect();
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let mut ends = ends.into_iter().peekable();
+        let mut regular = (0_u64..).map(|k| self.from_s + k as f64 / self.hz).peekable();
+        std::iter::from_fn(move || {
+            let end_s = *ends.peek()?;
+            let regular_s = regular.next_if(|&time_s| time_s <= end_s);
+            if regular_s.is_none_or(|time_s| time_s == end_s) {
+                ends.next();
+            }
+            regular_s.or(Some(end_s))
+        })
+    }
+
+    /// Calls `take` with the samples of each instant, in order of time.
+    pub(super) fn each_instant(
+        &self,
+        take: &mut impl FnMut(&[Sample]) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        let mut recorded = self.samples.chunk_by(|a, b| a.time_s == b.time_s).peekable();
+        let mut current = vec![0; self.pieces.len()];
+        let mut instant = Vec::new();
+        for time_s in self.times_s() {
+            while let Some(before) = recorded.next_if(|samples| samples[0].time_s < time_s) {
+                take(before)?;
+            }
+            instant.clear();
+            for (pieces, current) in self.pieces.iter().zip(&mut current) {
+                while pieces.get(*current + 1).is_some_and(|next| next.from_s <= time_s) {
+                    *current += 1;
+                }
+                instant.extend(pieces.get(*current).and_then(|piece| sample(piece, time_s)));
+            }
+            if let Some(same) = recorded.next_if(|samples| samples[0].time_s == time_s) {
+                instant.extend_from_slice(same);
+            }
+            if !instant.is_empty() {
+                take(&instant)?;
+            }
+        }
+        recorded.try_for_each(take)
+    }
+}
+
+/// Position and velocity of a piece; none outside of it.
+fn sample(piece: &Piece, time_s: f64) -> Option<Sample> {
+    if !(piece.from_s..=piece.to_s).contains(&time_s) {
+        return None;
+    }
+    let dt = time_s - piece.from_s;
+    let (mut position_m, mut velocity_m_s) = (Vector3::zeros(), Vector3::zeros());
+    for coefficient in piece.coefficients.iter().rev() {
+        velocity_m_s = velocity_m_s * dt + position_m;
+        position_m = position_m * dt + coefficient;
+    }
+    let vehicle = piece.vehicle;
+    Some(Sample { vehicle, time_s, position_m, velocity_m_s: Some(velocity_m_s), radius_m: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_column_of_a_channel_is_called_as_one_that_is_read() {
+        let mut beside = Beside::default();
+        beside.note(&[
+            Channel::new("attitude", &["qw", "qx"]),
+            Channel::new("gps", &["x", "y1", "t_s", "id", "radius", "vx", "qw"]),
+            Channel::new("wind", &["wind_x_m_s"]),
+        ]);
+        let expected =
+            ["qw", "qx", "gps_x", "gps_y1", "gps_t_s", "gps_id", "gps_radius", "gps_vx", "gps_qw", "wind_x_m_s"];
+        assert_eq!(beside.columns(), expected);
+        assert!(expected.iter().all(|name| !is_read(name)), "{expected:?}");
     }
 }

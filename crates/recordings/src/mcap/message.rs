@@ -31,11 +31,6 @@ impl Own {
         }
     }
 
-    /// Whether its messages are hashed as what the run tells beside its states, which have a hash of their own.
-    pub(super) fn is_told(self) -> bool {
-        self != Self::Swarm
-    }
-
     /// The topic of this name.
     pub(super) fn of(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|own| own.topic().name == name)
@@ -47,8 +42,7 @@ impl Own {
 }
 
 /// The topic that is declared and written when a run closes its recording.
-pub(super) const VERDICT: Topic<'static> =
-    Topic::cdr("/verdict", "tautline_msgs/msg/Verdict", include_str!("verdict.msg"));
+pub(super) const AUDIT: Topic<'static> = Topic::cdr("/audit", "tautline_msgs/msg/Audit", include_str!("audit.msg"));
 
 pub(super) fn fault(topic: &str, reason: impl Into<String>) -> ReadFault {
     ReadFault::Message { topic: topic.to_owned(), reason: reason.into() }

@@ -9,7 +9,7 @@
 //! | `/summary` | `tautline_msgs/msg/Summary` | each sample | closest approach and energy |
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
-//! | `/verdict` | `tautline_msgs/msg/Verdict` | once, last | the run's verdict, and hashes of everything before it |
+//! | `/audit` | `tautline_msgs/msg/Audit` | once, last | the run's own audit, and a hash of everything before it |
 //!
 //! Each [`Channel`](tautline_core::record::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
 //! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
@@ -38,7 +38,7 @@
 //! ```
 //!
 //! ```text
-#![doc = include_str!("verdict.msg")]
+#![doc = include_str!("audit.msg")]
 //! ```
 //!
 //! `log_time` and `publish_time` are simulated nanoseconds since the start; nothing in the file depends on the clock
@@ -56,13 +56,15 @@ pub(crate) mod topic;
 mod writer;
 
 pub(crate) use message::{CHANNEL_SCHEMA, ChannelMessage, SWARM_SCHEMA, channel_topic, topic_of_channel};
-pub use reader::{Entry, McapRecording};
+pub use reader::{Entry, McapRecording, StoredAudit};
 pub use topic::Topic;
 pub use writer::{ExtraTopic, FLUSH_BYTES, FLUSH_PERIOD_S, McapRecorder};
 
+use std::io;
+
 use serde::{Deserialize, Serialize};
 
-use tautline_core::record::sha256_hex;
+use tautline_core::record::{MessageHash, sha256_hex};
 
 /// What a recording says about the run as a whole: the fields of `scenario.msg`, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,30 +81,65 @@ pub struct Header {
     pub scenario_toml: String,
 }
 
-/// What a run says of itself when it closes its recording: the fields of `verdict.msg`, in order.
+/// The run's own audit of every step: the fields of `audit.msg`, in order.
 ///
-/// The hashes tell whether the recording is what the run wrote. They are no signature: a program that changes a recording can
-/// compute them anew.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RunVerdict {
-    /// `clear`, `violation` or `undecided`: the run's judge, over every step and every obstacle.
+/// Lengths are metres, or lengths over the half axes where the scenario has ellipsoids.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunAudit {
+    /// `clear`, `violation` or `undecided`.
     pub status: String,
-    /// Why the run ended before its time; empty where it was flown to its end.
+    /// Reason why the run ended before its time; empty where it was flown to its end.
     pub ended_early: String,
-    /// Smallest distance of two centres over the run \[m\]; NaN where that is not known.
-    pub separation_m: f64,
-    /// When it occurred \[s\].
-    pub separation_time_s: f64,
-    /// The pair, numbered from 1; zeros where that is not known.
-    pub pair: [u64; 2],
-    /// Steps that were judged.
-    pub steps: u64,
+    /// Whether the samples are all steps of the run and every step was straight.
+    pub holds_every_step: bool,
+    /// Smallest distance that two centres must keep \[m\].
+    pub limit_m: f64,
     /// Time flown \[s\].
     pub duration_s: f64,
-    /// [`StateHash`](tautline_core::record::StateHash) of every sample.
-    pub state_sha256: String,
-    /// Hash of the messages of `/scenario`, `/summary` and `/events`; the recorder computes it.
-    pub told_sha256: String,
+    /// Steps that were judged.
+    pub steps: u64,
+    /// Pairs that were swept, summed over the steps.
+    pub pairs_checked: u64,
+    /// Number of all violations.
+    pub violations_count: u64,
+    /// Closest approach of two vehicles, and the closest approaches to obstacles.
+    pub closest: Vec<RunFinding>,
+    /// Violations in order of time, a bounded number.
+    pub violations: Vec<RunFinding>,
+    /// Hash of the messages and of this audit, which [`McapRecorder::close`] computes. It shows changes of the file by accident or
+    /// by an editor. It is no signature: a program can compute it again.
+    pub sha256: String,
+}
+
+/// An approach or a violation of a [`RunAudit`]. Vehicles and obstacles are numbered from 1; 0 stands for none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunFinding {
+    /// The vehicle.
+    pub vehicle: u64,
+    /// The other vehicle, or 0.
+    pub other_vehicle: u64,
+    /// The obstacle, or 0.
+    pub obstacle: u64,
+    /// Distance that they must keep \[m\].
+    pub limit_m: f64,
+    /// Start of the violation \[s\]; of an approach the same as `min_at_s`.
+    pub from_s: f64,
+    /// End of the violation \[s\]; of an approach the same as `min_at_s`.
+    pub to_s: f64,
+    /// Smallest distance \[m\].
+    pub min_m: f64,
+    /// When it occurred \[s\].
+    pub min_at_s: f64,
+}
+
+impl RunAudit {
+    /// Returns the hash of this audit after the messages of its recording.
+    fn hash(&self, mut messages: MessageHash) -> io::Result<String> {
+        let mut bytes = Vec::new();
+        topic::encode(&Self { sha256: String::new(), ..self.clone() }, &mut bytes)?;
+        messages.take(message::AUDIT.name, &bytes);
+        Ok(messages.digits())
+    }
 }
 
 impl Header {

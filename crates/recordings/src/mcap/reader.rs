@@ -5,9 +5,9 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-use super::message::{CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, fault};
+use super::message::{AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, fault};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
-use super::{Header, RunVerdict};
+use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
 use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
 
@@ -18,6 +18,17 @@ pub enum Entry {
     Sample(OwnedSample),
     /// An event.
     Event(Event),
+}
+
+/// The run's own audit in a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StoredAudit {
+    /// The recording has none, or was not closed.
+    None,
+    /// The recording has one, and is not as the run wrote it.
+    Altered,
+    /// The recording is as the run wrote it.
+    AsWritten(Box<RunAudit>),
 }
 
 /// A recording opened for reading: an iterator over its samples and events that holds one chunk in memory.
@@ -65,16 +76,18 @@ impl McapRecording {
         self.topics.is_complete()
     }
 
-    /// What the run said of itself when it closed the recording; known once everything was read, and none where it did not.
+    /// Returns the run's own audit, once everything was read. The audit counts only as the last message of a closed file whose
+    /// messages, in their order, have the hash that the run computed.
     #[must_use]
-    pub fn verdict(&self) -> Option<&RunVerdict> {
-        self.contents.verdict.as_ref()
-    }
-
-    /// Hash of what was read of `/scenario`, `/summary` and `/events`, as [`RunVerdict::told_sha256`] has it.
-    #[must_use]
-    pub fn told_sha256(&self) -> String {
-        self.contents.told.digits()
+    pub fn stored_audit(&self) -> StoredAudit {
+        let Contents { audit, is_altered, messages, .. } = &self.contents;
+        let is_hash_of = |audit: &RunAudit| audit.hash(messages.clone()).is_ok_and(|hash| hash == audit.sha256);
+        match audit {
+            _ if !self.is_complete() || self.failed => StoredAudit::None,
+            Some(audit) if !is_altered && is_hash_of(audit) => StoredAudit::AsWritten(Box::new(audit.clone())),
+            None if !is_altered => StoredAudit::None,
+            _ => StoredAudit::Altered,
+        }
     }
 
     /// All remaining samples and events, each in order.
@@ -127,9 +140,11 @@ struct Contents {
     /// The last message of each channel since the last state.
     channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ready: VecDeque<Entry>,
-    verdict: Option<RunVerdict>,
-    /// Over the messages of all own topics but the states.
-    told: MessageHash,
+    audit: Option<RunAudit>,
+    /// Whether messages were read that a run does not write after its audit, or an audit that cannot be read.
+    is_altered: bool,
+    /// Over the messages of [`Own::ALL`].
+    messages: MessageHash,
 }
 
 impl Contents {
@@ -159,8 +174,9 @@ impl Contents {
     fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
         let Declared { topic, schema, encoding, .. } = message.of;
         let own = Own::of(topic);
-        if own.is_some_and(Own::is_told) {
-            self.told.take(topic, message.bytes);
+        if own.is_some() {
+            self.messages.take(topic, message.bytes);
+            self.is_altered |= self.audit.is_some();
         }
         match own {
             Some(Own::Scenario) => {
@@ -177,8 +193,10 @@ impl Contents {
             Some(Own::Events) => {
                 self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
             }
-            None if topic == VERDICT.name && schema == VERDICT.schema_name && encoding == CDR => {
-                self.verdict = Some(content(message)?);
+            None if topic == AUDIT.name => {
+                let read = (schema == AUDIT.schema_name && encoding == CDR).then(|| content(message).ok()).flatten();
+                self.is_altered |= read.is_none() || self.audit.is_some();
+                self.audit = read;
             }
             None if schema == CHANNEL_SCHEMA && encoding == CDR => {
                 let channel = content::<ChannelMessage<String, Vec<String>, Vec<f64>>>(message)?;

@@ -10,10 +10,10 @@ use mcap::write::NoSeek;
 use serde::Serialize;
 
 use super::message::{
-    ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, VERDICT, channel_topic, topic_of_channel,
+    AUDIT, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
-use super::{Header, RunVerdict};
+use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
 use tautline_core::record::{Channel, Event, RecordError, Sample, Sink};
 
@@ -61,8 +61,8 @@ pub struct McapRecorder {
     message: Vec<u8>,
     waiting_bytes: usize,
     flushed_at_s: f64,
-    /// Over the messages of all topics of its own but the states.
-    told: MessageHash,
+    /// Over the messages of [`Own::ALL`].
+    messages: MessageHash,
 }
 
 impl McapRecorder {
@@ -80,7 +80,7 @@ impl McapRecorder {
             message: Vec::new(),
             waiting_bytes: 0,
             flushed_at_s: f64::NEG_INFINITY,
-            told: MessageHash::default(),
+            messages: MessageHash::default(),
         };
         recorder.write(Own::Scenario as usize, 0.0, header)?;
         Ok(recorder)
@@ -104,21 +104,22 @@ impl McapRecorder {
         self.with_out(Out::finish)
     }
 
-    /// Writes what the finished run says of itself, and closes the file as [`McapRecorder::finish`] does.
+    /// Writes the audit of the finished run, with its hash, and closes the file as [`McapRecorder::finish`] does.
     ///
     /// # Errors
     /// [`RecordError::Write`] when the system refuses, or has refused before.
-    pub fn close(mut self, verdict: RunVerdict) -> Result<(), RecordError> {
-        let verdict = RunVerdict { told_sha256: self.told.digits(), ..verdict };
-        let place = self.with_out(|out| out.declare(&VERDICT))?;
-        self.write_if_due(place, verdict.duration_s, |bytes| encode(&verdict, bytes).map(|()| true))?;
+    pub fn close(mut self, audit: RunAudit) -> Result<(), RecordError> {
+        let sha256 = audit.hash(self.messages.clone()).map_err(|source| write_error(&self.path, source))?;
+        let audit = RunAudit { sha256, ..audit };
+        let place = self.with_out(|out| out.declare(&AUDIT))?;
+        self.write_if_due(place, audit.duration_s, |bytes| encode(&audit, bytes).map(|()| true))?;
         self.finish()
     }
 
     fn write(&mut self, topic: usize, time_s: f64, message: &impl Serialize) -> Result<(), RecordError> {
         self.write_if_due(topic, time_s, |bytes| encode(message, bytes).map(|()| true))?;
-        if let Some(own) = Own::ALL.get(topic).filter(|own| own.is_told()) {
-            self.told.take(own.topic().name, &self.message);
+        if let Some(own) = Own::ALL.get(topic) {
+            self.messages.take(own.topic().name, &self.message);
         }
         Ok(())
     }

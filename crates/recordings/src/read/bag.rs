@@ -1,7 +1,8 @@
 //! ROS 2 bags: a folder with `metadata.yaml` and files in MCAP, which follow each other and may be packed by zstd.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs;
+use std::fs::File;
 use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
@@ -11,8 +12,8 @@ use super::error::{Fault, Place, ReadError, quoted};
 use super::mcap;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::recognise::BAG;
 use super::source::{Source, ZSTD_MAGIC};
-use super::stranger::BAG;
 
 /// What a bag says of itself.
 const METADATA: &str = "metadata.yaml";

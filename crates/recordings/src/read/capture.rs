@@ -8,8 +8,7 @@ use nalgebra::Vector3;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::options::ReadOptions;
-use super::order::{About, Ordered, Recording};
-use super::rows::{BATCH, Row, Rows};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::{Lines, Source};
 
 /// When a row is.

@@ -12,8 +12,8 @@ use std::collections::BTreeSet;
 
 use super::axes::Axes;
 use super::error::Fault;
+use super::heading;
 use super::options::{ColumnNames, ReadOptions};
-use super::units;
 
 /// The remedy for positions that are relative to a place of each vehicle.
 pub(super) const GLOBAL: &str =
@@ -128,7 +128,7 @@ impl Convention {
         lower.iter().find(|name| name.starts_with("p_rs_r_x"))?;
         let mut truth = self.clone();
         for (column, name) in lower.iter().enumerate() {
-            let stem = units::bracketed(name).0;
+            let stem = heading::bracketed(name).0;
             if let Some(axis) = stem.strip_prefix("p_rs_r_") {
                 truth.header[column] = format!("{axis} [m]");
             } else if let Some(axis) = stem.strip_prefix("v_rs_r_") {
@@ -186,9 +186,9 @@ fn ned() -> Axes {
 /// A name without the unit at its end, and this end as it is written.
 fn without_unit(name: &str) -> (&str, &str) {
     let name = name.trim();
-    let stem = match units::bracketed(name) {
+    let stem = match heading::bracketed(name) {
         (stem, Some(_)) => stem,
-        (_, None) => units::endings(name).next().map_or(name, |(stem, ..)| stem),
+        (_, None) => heading::endings(name).next().map_or(name, |(stem, ..)| stem),
     };
     name.split_at(stem.len())
 }

@@ -10,15 +10,31 @@
 
 use nalgebra::Vector3;
 
-use super::cells::{Cells as _, number};
 use super::csv::Text;
 use super::curves::{Curves, piece};
 use super::error::{Fault, ReadError, quoted};
-use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Format, Packing, Reader, Takes};
 use super::source::Source;
+use super::table::{Cells as _, number};
 use tautline_core::track::Item;
+
+pub(super) const READER: Reader = Reader {
+    name: "crazyflie",
+    title: "a folder of Crazyflie polynomials",
+    extensions: &["csv"],
+    docs: "Crazyflie polynomials, a CSV for each vehicle in a folder",
+    magic: &[],
+    sniff: |head| {
+        let begin = b"duration,";
+        let begins = |line: &[u8]| line.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));
+        head.line.is_some_and(begins)
+    },
+    open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
+    takes: &[Takes::Starts, Takes::Axes],
+    packing: Packing::Archive,
+};
 
 /// Highest power that is read.
 const HIGHEST_POWER: usize = 15;
@@ -113,7 +129,7 @@ struct Curve {
 
 impl Curve {
     fn append(&mut self, file: &Source) -> Result<(), ReadError> {
-        let mut table = Text::open(file, Format::Crazyflie)?;
+        let mut table = Text::open(file, Format::CRAZYFLIE)?;
         let columns = Columns::of(table.header()).map_err(|fault| fault.at(Text::place(table.row())))?;
         let before = self.items.len();
         while table.advance()? {

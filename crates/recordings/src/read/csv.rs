@@ -9,18 +9,74 @@ use std::str;
 
 use csv_core::ReadRecordResult;
 
-use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
+use super::columns::Body;
+use super::conventions::Convention;
 use super::error::{Fault, Place, ReadError, quoted};
-use super::format::Format;
-use super::headerless;
-use super::heading;
+use super::identity::Slots;
 use super::layout::Layout;
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
+use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::table;
-use super::time_columns;
+use super::table::Cells;
+use super::{columns, heading, table};
+
+/// A table in CSV, or text without a row.
+pub(super) const CSV: Reader = Reader {
+    name: "csv",
+    title: "a table in CSV",
+    extensions: &["csv", "txt"],
+    docs: "Table in text with a header, long (`t,id,x,y,z`) or wide (`t,x1,y1,z1,x2,...`)",
+    magic: &[],
+    sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
+    open: |source, options| open(source, Format::CSV, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
+
+/// Numbers between blanks: any other text.
+pub(super) const TEXT: Reader = Reader {
+    name: "text",
+    title: "a table in plain text",
+    extensions: &["txt"],
+    docs: "Numbers between blanks: `t x y z x y z ...`",
+    magic: &[],
+    sniff: |head| head.text.is_some(),
+    open: |source, options| open(source, Format::TEXT, options),
+    takes: &[
+        Takes::TimeUnit,
+        Takes::Rows,
+        Takes::Dimensions,
+        Takes::Columns,
+        Takes::Origin,
+        Takes::Axes,
+        Takes::OneVehicle,
+    ],
+    packing: Packing::Any,
+};
+
+/// The table that a text of numbers may be; by its first bytes alone it is [`TEXT`].
+pub(super) const TRAJNET: Reader = Reader {
+    name: "trajnet",
+    title: "a table of TrajNet",
+    extensions: &["txt"],
+    docs: "Numbers between blanks: frame, vehicle, x and y",
+    magic: &[],
+    sniff: |_| false,
+    open: |source, options| open(source, Format::TRAJNET, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
+
+/// Whether a line is one of CSV and not of numbers between blanks or brackets.
+fn has_separators(line: &[u8]) -> bool {
+    let has = |byte| memchr::memchr(byte, line).is_some();
+    let is_number = |bytes: &[u8]| str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok());
+    let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
+    let has_tuples = begins_with_a_number && has(b'(');
+    (has(b',') && !has_tuples) || has(b';') || (has(b'\t') && !begins_with_a_number)
+}
 
 /// What stands between two fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +90,7 @@ enum Separator {
 const BLANKS: Separator = Separator::Any(b" \t");
 
 /// The columns of a table of `TrajNet`, which has no header.
-const TRAJNET: [&str; 4] = ["frame", "id", "x", "y"];
+const TRAJNET_COLUMNS: [&str; 4] = ["frame", "id", "x", "y"];
 
 /// Between the numbers of `t (x,y) (x,y)`.
 const TUPLES: Separator = Separator::Any(b" \t(),");
@@ -63,11 +119,11 @@ pub(super) struct Text {
 }
 
 /// Opens a table.
-pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut text = Text::open(source, format)?;
-    if format == Format::Text && !text.named && options.dimensions.is_none() {
+    if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            Likeness::Certain => text = Text::open(source, Format::Trajnet)?,
+            Likeness::Certain => text = Text::open(source, Format::TRAJNET)?,
             Likeness::Possible => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
                                whole";
@@ -82,7 +138,7 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
     let (stem, first) = (source.stem(), &text.first);
     let numbers = || {
         let dimensions = options.dimensions.or(text.tuples());
-        headerless::layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
+        layout(first, &ReadOptions { dimensions, ..options.clone() }, &stem)
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
@@ -147,13 +203,13 @@ impl Text {
         self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
         self.has_header = !numeric;
-        self.comments = numeric || format == Format::Crazyflie;
+        self.comments = numeric || format == Format::CRAZYFLIE;
         let named = |names: &[String]| names.iter().any(|name| heading::is_time(name) || heading::is_frame(name));
         let above = [self.separator, Separator::Byte(b','), BLANKS].map(|separator| names(comment, separator));
         let above = above.into_iter().filter_map(Result::ok);
         let above =
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
-        if format == Format::Trajnet && !(numeric && self.header.len() == TRAJNET.len()) {
+        if format == Format::TRAJNET && !(numeric && self.header.len() == TRAJNET_COLUMNS.len()) {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
             let remedy =
                 "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
@@ -166,10 +222,10 @@ impl Text {
             (self.header, self.has_header, self.comments) = (names, false, true);
         } else if !numeric {
             self.header.pop_if(|name| name.is_empty());
-        } else if format == Format::Trajnet {
-            self.header = TRAJNET.map(str::to_owned).into();
+        } else if format == Format::TRAJNET {
+            self.header = TRAJNET_COLUMNS.map(str::to_owned).into();
             self.first.clear();
-        } else if format == Format::Text {
+        } else if format == Format::TEXT {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
             self.named = false;
         } else {
@@ -186,7 +242,7 @@ impl Text {
 
     /// Takes a row of units below the header for what it says: each into the name of its column.
     fn take_units(&mut self) -> Result<(), ReadError> {
-        let found = time_columns::find(&self.header, &ReadOptions::default()).ok().flatten();
+        let found = columns::find(&self.header, &ReadOptions::default()).ok().flatten();
         let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
         if !next_line(&mut self.lines, self.comments)? {
             return Ok(());
@@ -329,7 +385,7 @@ fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError>
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
     let mut likeness = Likeness::Possible;
     while next_line(&mut lines, true)? {
-        if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET.len() {
+        if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET_COLUMNS.len() {
             return Ok(Likeness::None);
         }
         let whole = |index| {
@@ -360,12 +416,14 @@ fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
 fn separator(line: &[u8], format: Format) -> Separator {
     let count = |byte| memchr::memchr_iter(byte, line).count();
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
-    match format {
-        Format::Text if line.contains(&b'(') => TUPLES,
-        Format::Text | Format::Trajnet if comma == 0 && semicolon == 0 => BLANKS,
-        _ if semicolon > 0 && semicolon >= comma => Separator::Byte(b';'),
-        _ if tab > comma => Separator::Byte(b'\t'),
-        _ => Separator::Byte(b','),
+    if format == Format::TEXT && line.contains(&b'(') {
+        TUPLES
+    } else if (format == Format::TEXT || format == Format::TRAJNET) && comma == 0 && semicolon == 0 {
+        BLANKS
+    } else if semicolon > 0 && semicolon >= comma {
+        Separator::Byte(b';')
+    } else {
+        Separator::Byte(if tab > comma { b'\t' } else { b',' })
     }
 }
 
@@ -457,4 +515,89 @@ impl Fields {
         self.unquoted = Some(unquoted);
         Ok(())
     }
+}
+
+/// How far the norm of a quaternion may be from 1.
+const NORM: f64 = 0.01;
+
+/// The columns of a vehicle whose x is in this one.
+fn body(x: usize, dimensions: Dimensions) -> Body {
+    let (axes, count) = dimensions.counts();
+    let from = |first: usize| [0, 1, 2].map(|axis| (axis < axes).then_some(first + axis));
+    Body { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
+}
+
+/// The columns of a table whose first row holds these numbers: time and then the numbers of each vehicle, or a table of
+/// the vehicle `alone`, as TUM and KITTI write them.
+pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
+    let count = first.len();
+    let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
+    let table = |time, names, bodies: Vec<Body>, words: &str| {
+        let note = format!("there is no header: the numbers are taken as {words}");
+        Layout {
+            time,
+            rest: None,
+            unit: None,
+            id: None,
+            is_id_given: false,
+            rivals: Vec::new(),
+            suspects: Vec::new(),
+            names,
+            metres: vec![1.0; count],
+            on_earth: false,
+            convention: Convention::default(),
+            is_planar: bodies.iter().any(|body| body.position[2].is_none()),
+            bodies,
+            slots: Slots::default(),
+            notes: vec![note],
+        }
+    };
+    let one = |time, position: [usize; 3], words| {
+        let body = Body { position: position.map(Some), velocity: None, radius: None };
+        table(time, vec![alone.to_owned()], vec![body], words)
+    };
+    if let &[_, _, _, _, x, y, z, w] = first
+        && ((x * x + y * y + z * z + w * w).sqrt() - 1.0).abs() < NORM
+    {
+        return Ok(one(Some(0), [1, 2, 3], "time, position and attitude of one vehicle, as TUM writes them"));
+    }
+    let known: Vec<_> = Dimensions::ALL.into_iter().filter(fits).collect();
+    let dimensions = match (options.dimensions, &known[..]) {
+        (Some(given), _) if fits(&given) => given,
+        (None, &[only]) if count == 1 + only.counts().1 => only,
+        (None, [_, ..]) => {
+            let problem = format!("it has {count} numbers, and nothing says how many of them are one vehicle's");
+            let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
+            let remedy = format!(
+                "say it with --dimensions {}: x and y, x, y and z, and +2 or +3 with their velocities",
+                ways.join(" or ")
+            );
+            return Err(Fault::coded("recording/ambiguous-layout", problem, remedy));
+        }
+        (None, []) if count == 12 => {
+            if options.times_per_second.is_none() {
+                return Err(Fault::frames("it has twelve numbers, as KITTI writes poses, and no time"));
+            }
+            return Ok(one(None, [3, 7, 11], "a pose of one vehicle in each line, as KITTI writes them"));
+        }
+        (given, _) => {
+            let each = given.map_or(3, |given| given.counts().1);
+            let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
+            return Err(Fault::coded(
+                "recording/field-count",
+                problem,
+                "write t x y z x y z ..., a line for each time, or give other --dimensions",
+            ));
+        }
+    };
+    let (axes, each) = dimensions.counts();
+    let bodies: Vec<_> = (1..count).step_by(each).map(|x| body(x, dimensions)).collect();
+    let names: Vec<_> = (1..=bodies.len()).map(|number| number.to_string()).collect();
+    let words = format!(
+        "time and {}{} of each of {} vehicles",
+        if axes == 2 { "x, y (there is no height)" } else { "x, y, z" },
+        if each > axes { " and velocity" } else { "" },
+        names.len()
+    );
+    Ok(table(Some(0), names, bodies, &words))
 }

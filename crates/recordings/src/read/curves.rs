@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::error::ReadError;
-use super::order::Recording;
-use super::rows::BATCH;
+use super::order::{BATCH, Recording};
 use tautline_core::track::{Clock, Item, Piece, Tracks};
 
 /// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.

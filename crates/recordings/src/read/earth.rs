@@ -3,10 +3,18 @@
 //! The way is exact and not that of a flat map: to coordinates around the centre of the Earth, and from there into the
 //! frame of the origin. A double resolves 1 nm at that distance, and so do the places.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{Matrix3, Vector3};
 
-use super::error::{Fault, quoted};
+use super::axes;
+use super::conventions::GLOBAL;
+use super::error::{Fault, ReadError, quoted};
+use super::heading::{DEPTH, HEIGHT, Heading, POSITION, Role};
+use super::layout::Layout;
 use super::options::ReadOptions;
+use super::order::Row;
+use super::table::{Cells, number, vector};
 use tautline_core::track::EarthOrigin;
 
 /// Half the equator's diameter \[m\].
@@ -137,6 +145,163 @@ fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
     let curvature_m = EQUATOR_M / (cosine * cosine + squash * sine * sine).sqrt();
     let from_axis_m = (curvature_m + place.z) * cosine;
     Ok(Vector3::new(from_axis_m * east_cosine, from_axis_m * east_sine, (squash * curvature_m + place.z) * sine))
+}
+
+/// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.
+pub(super) fn origin<C: Cells>(
+    cells: &mut C,
+    layout: &Layout,
+    options: &ReadOptions,
+) -> Result<Option<Local>, ReadError> {
+    let reference = layout.convention.reference;
+    if !layout.on_earth && reference.is_none() {
+        let needless = Fault::coded(
+            "recording/unused-option",
+            "it has no columns of latitude and longitude",
+            "leave --origin away",
+        );
+        return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
+    }
+    axes::refuse_known(options, "a table of latitudes and longitudes")?;
+    cells.restart(&layout.columns(), true)?;
+    let mut unfixed = false;
+    while cells.advance()? {
+        let place = match reference {
+            Some(columns) => measured_from(cells, columns),
+            None => fix(cells, layout, &mut unfixed),
+        };
+        let at_row = |fault: Fault| fault.at(C::place(cells.row()));
+        if let Some(place) = place.map_err(at_row)? {
+            return Ok(Some(Local::first(place, options).map_err(at_row)?));
+        }
+    }
+    if reference.is_some() {
+        let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
+        return Err(Fault::coded("recording/no-fix", problem, GLOBAL).into());
+    }
+    if unfixed {
+        let problem = "no row has a fix: every latitude and longitude is exactly 0";
+        return Err(Fault::coded(
+            "recording/no-fix",
+            problem,
+            "record again once the receiver has a fix, or give another file",
+        )
+        .into());
+    }
+    Ok(None)
+}
+
+/// The place that the positions of a row are measured from; none where it is not known: empty, NaN, or where latitude and
+/// longitude are 0.
+fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geodetic>, Fault> {
+    let mut place = Vector3::zeros();
+    for (slot, column) in place.iter_mut().zip(columns) {
+        match cells.number(column) {
+            Some(number) if number.is_nan() => return Ok(None),
+            _ => match number(cells, column)? {
+                Some(number) => *slot = number,
+                None => return Ok(None),
+            },
+        }
+    }
+    Ok(Some(place).filter(|place| !is_no_fix(place)))
+}
+
+/// The first place on the Earth of a row; none where it has none. Sets `unfixed` where it has no fix.
+fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
+    for body in &layout.bodies {
+        match vector(cells, &body.position, &layout.metres)? {
+            Some(place) if is_no_fix(&place) => *unfixed = true,
+            None => {}
+            place => return Ok(place),
+        }
+    }
+    Ok(None)
+}
+
+/// Brings a position that is measured from a place in some columns into the frame `local`; `false` where it is not known, as
+/// other columns may say by a 0. The frame of the place is kept in `there`.
+pub(super) fn bring(
+    cells: &impl Cells,
+    row: &mut Row,
+    (columns, valid): ([usize; 3], &[usize]),
+    local: Option<Local>,
+    there: &mut Option<Local>,
+) -> Result<bool, Fault> {
+    for &column in valid {
+        if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
+            return Ok(false);
+        }
+    }
+    let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
+    let there = match there.filter(|there| there.is_at(place)) {
+        Some(there) => there,
+        None => *there.insert(Local::at(place)?),
+    };
+    row.position = local.place_from(&there, row.position);
+    row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
+    Ok(true)
+}
+
+/// Columns of a table that are read because their names are those of heights or depths.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Heights {
+    named: BTreeSet<usize>,
+    /// Those that count downwards.
+    downward: BTreeSet<usize>,
+}
+
+impl Heights {
+    /// Gives headings of heights and depths the role of the third axis of positions, whose first axis is `place`, where their
+    /// vehicle has the other two axes and no third of its own. All others are dropped. `found` are the columns that the user
+    /// names.
+    pub(super) fn place(
+        place: Role,
+        header: &[String],
+        found: &mut BTreeMap<(String, Role), usize>,
+        headings: &mut Vec<(usize, Heading<'_>)>,
+    ) -> Self {
+        let (third, mut heights) = (place + 2, Self::default());
+        // The user may call the third axis by either name; `z` means the numbers as they are.
+        let [z, alt] = [POSITION + 2, HEIGHT].map(|role| found.remove(&(String::new(), role)));
+        let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
+        found.extend(given.map(|column| ((String::new(), third), column)));
+        if let Some(column) = alt.filter(|column| given == Some(*column)) {
+            let is_depth = Heading::of(&header[column]).is_some_and(|heading| heading.role == DEPTH);
+            heights.add(column, is_depth);
+        }
+        let all = headings.clone();
+        let has = |vehicle: &str, role: Role| {
+            all.iter().any(|(_, heading)| (heading.vehicle, heading.role) == (vehicle, role))
+                || found.contains_key(&(vehicle.to_owned(), role))
+        };
+        let is_height = |role: Role| matches!(role, HEIGHT | DEPTH);
+        headings.retain(|(_, Heading { vehicle, role, .. })| {
+            let has = |axis: Role| has(vehicle, place + axis);
+            !is_height(*role) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
+        });
+        for (column, heading) in headings.iter_mut().filter(|(_, heading)| is_height(heading.role)) {
+            heights.add(*column, heading.role == DEPTH);
+            heading.role = third;
+        }
+        heights
+    }
+
+    fn add(&mut self, column: usize, is_depth: bool) {
+        self.named.insert(column);
+        self.downward.extend(is_depth.then_some(column));
+    }
+
+    /// Columns that count downwards.
+    pub(super) fn downward(&self) -> impl Iterator<Item = usize> {
+        self.downward.iter().copied()
+    }
+
+    /// Which of these columns are read as heights because of their names, and whether the sign is turned.
+    pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> Vec<(usize, bool)> {
+        let columns: BTreeSet<_> = columns.filter(|column| self.named.contains(column)).collect();
+        columns.into_iter().map(|column| (column, self.downward.contains(&column))).collect()
+    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,9 @@
 //! Why a recording cannot be read: the file, the place in it, the fault and the remedy.
 
-use std::fmt;
-use std::io;
 use std::path::Path;
+use std::{fmt, io};
 
-use super::format::Format;
+use super::readers::Format;
 
 /// Longest value that a message repeats \[characters\].
 const LONGEST_QUOTE: usize = 60;
@@ -51,7 +50,10 @@ impl ReadError {
     /// What helps, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {
-        self.fault.help().to_owned()
+        match self.fault {
+            Fault::UnknownFormat => format!("formats that can be read are {}; --format names one", Format::names()),
+            ref fault => fault.help().to_owned(),
+        }
     }
 
     /// The stable name of the problem, such as `recording/unknown-format`.
@@ -120,7 +122,7 @@ pub enum Fault {
     #[error("its content is of no format that is known")]
     UnknownFormat,
     /// The content is not of the format that was asked for.
-    #[error("it is not {}: it does not begin as one does", .0.title())]
+    #[error("it is not {}: it does not begin as one does", .0.title)]
     WrongFormat(Format),
     /// A line is longer than any recording needs.
     #[error("the line is longer than {0} bytes")]
@@ -242,7 +244,7 @@ impl Fault {
             Self::System(error) if error.kind() == io::ErrorKind::NotFound => "look at the spelling of the path",
             Self::System(_) => "look at the permissions of the file and at the disk",
             Self::Empty => NOTHING_RECORDED,
-            Self::UnknownFormat => "name the format with --format, such as csv or mcap; --help lists all",
+            Self::UnknownFormat => "name the format with --format",
             Self::WrongFormat(_) => "leave --format away to have the content recognised, or name another format",
             Self::LineTooLong(_) => "look whether the lines end as they should; a recording has a line for each time",
             Self::NotUtf8 => "save it as UTF-8",

@@ -1,8 +1,7 @@
-//! What the name of a column says: a quantity, perhaps of a vehicle, perhaps in a unit.
+//! Names of columns: a quantity, perhaps of one vehicle, perhaps with a unit; and the units.
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
-use super::units;
 
 /// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
 /// other.
@@ -156,7 +155,7 @@ pub(super) struct Heading<'a> {
 impl<'a> Heading<'a> {
     /// What a name says, where it is that of a quantity.
     pub(super) fn of(name: &'a str) -> Option<Self> {
-        let (stem, unit) = units::bracketed(name);
+        let (stem, unit) = bracketed(name);
         match unit {
             // Some number vehicles as arrays do: x[0].
             Some(number) if is_number(number) => {
@@ -165,14 +164,14 @@ impl<'a> Heading<'a> {
             Some(_) => Self::without_unit(stem).map(|heading| Self { unit, ..heading }),
             None => Self::without_unit(stem)
                 .or_else(|| {
-                    units::endings(stem).find_map(|(stem, unit, velocity)| {
+                    endings(stem).find_map(|(stem, unit, velocity)| {
                         let heading =
                             Self::without_unit(stem).filter(|heading| is_velocity(heading.role) == velocity)?;
                         Some(Self { unit: Some(unit), ..heading }).filter(|heading| !is_angle(heading.role))
                     })
                 })
                 .or_else(|| {
-                    let (stem, unit) = stem.rsplit_once('_').filter(|(_, unit)| units::degrees(unit).is_some())?;
+                    let (stem, unit) = stem.rsplit_once('_').filter(|(_, unit)| degrees(unit).is_some())?;
                     let heading = Self::without_unit(stem).filter(|heading| is_angle(heading.role))?;
                     Some(Self { unit: Some(unit), ..heading })
                 }),
@@ -253,7 +252,7 @@ pub(super) fn says_a_quantity(name: &str) -> bool {
 
 /// Whether a column that is not read cannot be what tells the vehicles of the rows apart: attitudes, rates, sensors.
 pub(super) fn tells_no_vehicle(name: &str) -> bool {
-    let stem = units::bracketed(name).0.to_lowercase();
+    let stem = bracketed(name).0.to_lowercase();
     let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
     let known = ["", "roll", "pitch", "yaw", "heading", "speed", "battery", "voltage", "thrust", "frame"];
     known.contains(&stem.as_str())
@@ -281,7 +280,7 @@ pub fn is_read(name: &str) -> bool {
 /// The name of a column of time in lower case without its unit, and the unit.
 pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();
-    let (stem, unit) = units::bracketed(&name);
+    let (stem, unit) = bracketed(&name);
     let longer = ["min", "mins", "minute", "minutes", "h", "hr", "hrs", "hour", "hours", "day", "days"];
     let ending = stem.rsplit_once('_').filter(|(_, end)| TimeUnit::from_name(end).is_some() || longer.contains(end));
     let (stem, unit) = match (unit, ending) {
@@ -396,7 +395,7 @@ pub(super) fn rank_of_name(name: &str) -> Option<u8> {
 
 /// A name in lower case without its unit, as one word.
 fn joined(name: &str) -> String {
-    units::bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
+    bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
 }
 
 /// Names of columns with the units that a row below them says. A name that says the same keeps it, and so does one that is
@@ -412,13 +411,12 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         let said = if is_time {
             said_unit(name)
         } else {
-            let ending = || units::endings(name).next().map(|(_, unit, _)| unit);
-            units::bracketed(name).1.or_else(ending).map(str::to_owned)
+            let ending = || endings(name).next().map(|(_, unit, _)| unit);
+            bracketed(name).1.or_else(ending).map(str::to_owned)
         };
         let Some(said) = said else { return Ok(format!("{name} [{unit}]")) };
-        let is_same = |velocity: bool| {
-            units::size_of(&said, velocity).is_some_and(|size| units::size_of(unit, velocity) == Some(size))
-        };
+        let is_same =
+            |velocity: bool| size_of(&said, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
         let time = |unit: &str| TimeUnit::from_name(&unit.to_lowercase());
         if said.eq_ignore_ascii_case(unit) || is_same(false) || is_same(true) || (is_time && time(&said) == time(unit))
         {
@@ -431,4 +429,75 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());
     Ok(named)
+}
+
+/// Names of units of length, and their size \[m\].
+const LENGTHS_M: [(&[&str], f64); 10] = [
+    (&["m", "meter", "meters", "metre", "metres"], 1.0),
+    (&["dm"], 0.1),
+    (&["cm", "centimeter", "centimeters", "centimetre", "centimetres"], 0.01),
+    (&["mm", "millimeter", "millimeters", "millimetre", "millimetres"], 0.001),
+    (&["um", "µm", "μm"], 1e-6),
+    (&["km", "kilometer", "kilometers", "kilometre", "kilometres"], 1000.0),
+    (&["in", "inch", "inches"], 0.0254),
+    (&["ft", "foot", "feet"], 0.3048),
+    (&["yd", "yard", "yards"], 0.9144),
+    (&["nmi"], 1852.0),
+];
+
+/// Names of times by which a length is divided, and their size \[s\].
+const TIMES_S: [(&[&str], f64); 4] =
+    [(&["s", "sec", "second"], 1.0), (&["ms"], 0.001), (&["min", "minute"], 60.0), (&["h", "hr", "hour"], 3600.0)];
+
+/// Units that an unbracketed end may say, as in `vx_m_s` and `x_mm`.
+const VELOCITY_ENDS: [&str; 6] = ["m_s", "cm_s", "mm_s", "km_s", "km_h", "ft_s"];
+const LENGTH_ENDS: [&str; 6] = ["m", "dm", "cm", "mm", "km", "ft"];
+
+fn size(names: &[(&[&str], f64)], name: &str) -> Option<f64> {
+    names.iter().find(|(known, _)| known.contains(&name)).map(|(_, size)| *size)
+}
+
+/// The size of a unit of length \[m\], or of velocity \[m/s\]; none where it is neither.
+pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
+    let unit = unit.trim().to_lowercase();
+    if !velocity {
+        return size(&LENGTHS_M, &unit);
+    }
+    match unit.as_str() {
+        "mps" => return Some(1.0),
+        "kmh" | "kph" => return Some(1.0 / 3.6),
+        _ => {}
+    }
+    let per = |separator| unit.split_once(separator);
+    let (length, time) = per("/").or_else(|| per("_")).or_else(|| per(" per "))?;
+    Some(size(&LENGTHS_M, length.trim())? / size(&TIMES_S, time.trim())?)
+}
+
+/// The size of a unit of latitude and longitude \[degrees\]; none where it is none.
+pub(super) fn degrees(unit: &str) -> Option<f64> {
+    match unit.trim().to_lowercase().as_str() {
+        "deg" | "degree" | "degrees" | "°" => Some(1.0),
+        "rad" | "radian" | "radians" => Some(1.0_f64.to_degrees()),
+        "dege7" | "1e-7 deg" | "1e7" => Some(1e-7),
+        _ => None,
+    }
+}
+
+/// The name of a column without the unit at its end, and the unit: `x [mm]`, `x (ft)`.
+pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    let within = |open, close| name.strip_suffix(close)?.rsplit_once(open);
+    match within('[', ']').or_else(|| within('(', ')')) {
+        Some((stem, unit)) if !stem.trim().is_empty() => (stem.trim(), Some(unit.trim())),
+        _ => (name, None),
+    }
+}
+
+/// The ways to take a unit off the end of a name without brackets, and whether it is one of velocity.
+pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
+    let units = VELOCITY_ENDS.map(|unit| (unit, true)).into_iter().chain(LENGTH_ENDS.map(|unit| (unit, false)));
+    units.filter_map(|(unit, velocity)| {
+        let (stem, end) = name.split_at_checked(name.len().checked_sub(unit.len())?)?;
+        Some((stem.strip_suffix('_')?, end, velocity)).filter(|_| end.eq_ignore_ascii_case(unit))
+    })
 }

@@ -6,16 +6,15 @@
 use std::collections::BTreeSet;
 
 use super::clock::TimeUnit;
-use super::columns::{Body, Columns, missing};
+use super::columns::{Body, Columns, Rest, missing};
 use super::conventions::Convention;
+use super::earth::Heights;
 use super::error::{Fault, list, quoted};
-use super::heading::{self, EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
-use super::heights::Heights;
-use super::leftovers::{self, Slots};
+use super::heading::{EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
+use super::identity::Slots;
 use super::options::ReadOptions;
 use super::order::PLANAR;
-use super::time_columns::{self, Rest};
-use super::turned;
+use super::{axes, columns, heading, identity};
 
 /// Names of places that are no vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
@@ -60,12 +59,12 @@ impl Layout {
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions() {
-            turned::refuse_known(options, "its header")?;
+            axes::refuse_known(options, "its header")?;
         }
         let mut columns = Columns::given(header, options)?;
         let found = match columns.get("", TIME) {
             Some(given) => Some((given, None)),
-            None => time_columns::find(header, options)?,
+            None => columns::find(header, options)?,
         };
         let (time, rest) = found.ok_or_else(|| missing(header, TIME, ""))?;
         let unit = match rest {
@@ -142,7 +141,7 @@ impl Layout {
         let used = layout.columns();
         if !one && id.is_none() {
             let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
-            layout.slots = leftovers::examine(header, &unused, &layout.names)?;
+            layout.slots = identity::examine(header, &unused, &layout.names)?;
         }
         layout.metres = columns.metres(&used, options.metres())?;
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
@@ -212,8 +211,7 @@ impl Layout {
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
         // A user who says which column names the vehicles, or that all rows are of one vehicle, knows.
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
-            let may_name =
-                |column: &usize| heading::may_name(&header[*column]) && !time_columns::is_part(&header[*column]);
+            let may_name = |column: &usize| heading::may_name(&header[*column]) && !columns::is_part(&header[*column]);
             let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
             self.suspects = suspects.collect();
         }

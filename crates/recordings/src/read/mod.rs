@@ -12,49 +12,35 @@
 //! no parts of one, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
-mod archive;
 mod axes;
 mod bag;
 mod capture;
-mod cells;
 mod clock;
 mod columns;
 mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
-mod dates;
 mod earth;
 mod error;
 mod folder;
-mod format;
-mod headerless;
 mod heading;
-mod heights;
 mod identity;
-mod join;
 mod layout;
-mod leftovers;
 pub(crate) mod mcap;
 mod motive;
-mod names;
 mod npy;
 mod npz;
 mod objects;
 mod options;
 mod order;
 pub(crate) mod parquet;
-mod places;
+mod readers;
 mod recognise;
-mod rows;
 mod skybrush;
 mod source;
-mod stranger;
 mod table;
-mod time_columns;
-mod turned;
 mod ulog;
-mod units;
 mod vicon;
 mod vviz;
 
@@ -62,15 +48,16 @@ pub use self::parquet::is_guarded;
 pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use error::{Fault, Place, ReadError};
-pub use format::Format;
 pub use heading::is_read;
 pub use mcap::Channels;
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions, Scale};
 pub use order::Recording;
+pub use readers::{Format, READERS, Reader};
 
 use std::fs;
 use std::path::Path;
 
+use crate::mcap::McapRecording;
 use folder::{ARCHIVE, Folder};
 use recognise::recognise;
 use source::Source;
@@ -86,7 +73,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(path))
+    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
@@ -106,7 +93,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.and_then(|recording| turned::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
+    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
 /// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
@@ -115,8 +102,14 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
 /// # Errors
 /// [`ReadError`] when it is damaged before its first instant.
 pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
-    let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::Mcap);
+    let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::MCAP);
     if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
+}
+
+/// Opens a recording of `tautline run` for what it holds beside positions; `None` for any other file.
+#[must_use]
+pub fn open_run(path: &Path) -> Option<McapRecording> {
+    if path.is_file() { mcap::open_run(path) } else { None }
 }
 
 /// What several files that are one recording are called.
@@ -132,7 +125,7 @@ pub fn called(paths: &[&Path]) -> String {
 #[must_use]
 pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
     let mut source = Source::file(path);
-    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::Skybrush;
+    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::SKYBRUSH;
     let limit = if is_show { skybrush::least_distance(&source).ok()?? } else { return None };
     Some(limit * options.metres()).filter(|limit| limit.is_finite() && *limit > 0.0)
 }
@@ -176,8 +169,8 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     };
     let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
     let left_out = folder.note();
-    if format.transpose()? == Some(Format::Crazyflie) {
-        options.refuse_needless(Format::Crazyflie)?;
+    if format.transpose()? == Some(Format::CRAZYFLIE) {
+        options.refuse_needless(Format::CRAZYFLIE)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
     }
@@ -189,15 +182,15 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
         let shown = file.shown();
         Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
     };
-    join::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
+    folder::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }
 
 fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
-    if let Some(format) = options.format.filter(|format| *format != Format::Mcap) {
+    if let Some(format) = options.format.filter(|format| *format != Format::MCAP) {
         return Err(Fault::WrongFormat(format).into());
     }
-    options.refuse_needless(Format::Mcap)?;
+    options.refuse_needless(Format::MCAP)?;
     bag::open(path, options)
 }
 
@@ -205,21 +198,5 @@ fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, Read
     options.check()?;
     let format = recognise(&mut source, options.format)?;
     options.refuse_needless(format)?;
-    if matches!(format, Format::Npz | Format::Parquet) {
-        source = source.seekable()?;
-    }
-    let source = &source;
-    match format {
-        Format::Csv | Format::Text | Format::Trajnet => csv::open(source, format, options),
-        Format::Crazyflie => crazyflie::open(vec![(source.stem(), vec![source.clone()])], None, options),
-        Format::Jsonl => objects::open(source, options),
-        Format::Mcap => mcap::open(source, options),
-        Format::Ulog => ulog::open(source, options),
-        Format::Npz => npz::open(source, options),
-        Format::Parquet => parquet::open(source, options),
-        Format::Skybrush => skybrush::open(source, options),
-        Format::Vviz => vviz::open(source, options),
-        Format::Motive => motive::open(source, options),
-        Format::Vicon => vicon::open(source, options),
-    }
+    (format.open)(&source, options)
 }

@@ -5,15 +5,25 @@
 
 use std::collections::BTreeSet;
 
-use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
+use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::units;
+use super::{capture, heading};
 
-/// How a take begins.
-pub(super) const BEGIN: &[u8] = b"Format Version,";
+pub(super) const READER: Reader = Reader {
+    name: "motive",
+    title: "a take of OptiTrack Motive",
+    extensions: &["csv"],
+    docs: "Take of OptiTrack Motive as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
+    open,
+    takes: &[Takes::Rows],
+    packing: Packing::Any,
+};
 
 /// Lines among which those that name the columns are.
 const HEAD_LINES: u64 = 20;
@@ -68,7 +78,7 @@ impl Head {
 
     fn capture(&self) -> Result<Capture, Fault> {
         let unit = self.said("Length Units").unwrap_or_default();
-        let metres = units::size_of(unit, false).ok_or_else(|| {
+        let metres = heading::size_of(unit, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
                 format!("its unit of length is not known: {}", quoted(unit)),

@@ -3,7 +3,8 @@
 //! The header is read here because a file may lie about its lengths: memory grows only with bytes that are there, where
 //! `npyz` reserves up to 4 GiB that a header claims for itself, and costs a cold build 22 core-seconds and 17 crates.
 
-use std::io::{self, Read};
+use std::io;
+use std::io::Read;
 
 use super::clock::{Stamp, TimeUnit};
 use super::error::Fault;

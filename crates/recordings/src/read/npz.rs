@@ -18,15 +18,25 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::archive::Archive;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
-use super::names::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, Ordered, PLANAR, Recording};
-use super::rows::{BATCH, Row, Rows};
-use super::source::Source;
+use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
+use super::readers::{Packing, Reader, Takes};
+use super::source::{Archive, Source};
+
+pub(super) const READER: Reader = Reader {
+    name: "npz",
+    title: "an NPZ archive",
+    extensions: &["npz"],
+    docs: "NumPy arrays `t` and `positions`, as `numpy.savez` writes them",
+    magic: &[b"PK\x03\x04", b"PK\x05\x06"],
+    sniff: |head| head.begins_with_any(READER.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
+    open: |source, options| open(&source.clone().seekable()?, options),
+    takes: &[Takes::TimeUnit, Takes::Rows, Takes::Columns, Takes::Layout, Takes::Axes, Takes::OneVehicle],
+    packing: Packing::Any,
+};
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
 const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];

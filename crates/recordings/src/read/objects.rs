@@ -7,14 +7,27 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::cells::Cells;
 use super::clock::Stamp;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table;
+use super::table::Cells;
+
+pub(super) const READER: Reader = Reader {
+    name: "jsonl",
+    title: "a table of JSON objects",
+    extensions: &["jsonl", "ndjson"],
+    docs: "Table with an object of JSON in each line",
+    magic: &[],
+    sniff: |head| head.is_text(are_in),
+    open,
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
 
 /// Most columns: more are lists of changing length.
 const MOST_COLUMNS: usize = 100_000;

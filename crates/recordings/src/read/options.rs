@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted};
-use super::format::Format;
+use super::readers::{Format, Takes};
 
 /// What an axis of an array of positions counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -308,39 +308,33 @@ impl ReadOptions {
 
     /// Refuses an option that means nothing for a format.
     pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
-        let is_text = matches!(format, Format::Csv | Format::Text | Format::Trajnet | Format::Jsonl);
-        let is_table = is_text || matches!(format, Format::Parquet | Format::Npz);
-        let (is_npz, is_mcap, is_ulog) = (format == Format::Npz, format == Format::Mcap, format == Format::Ulog);
-        let has_curves = matches!(format, Format::Crazyflie | Format::Skybrush);
-        let has_axes = matches!(format, Format::Motive | Format::Vviz);
+        let (is_turned, has_columns) = (!self.turn().is_identity(), self.columns != ColumnNames::default());
+        let is_one_vehicle = self.one_vehicle && !self.is_joined;
         let given = [
-            (self.time_unit.is_some() && !is_table, "--time-unit", "has a unit of time of its own"),
-            (self.times_per_second.is_some() && !is_table, "--fps and --time-scale", "has a unit of time of its own"),
-            (self.sort && has_curves, "--sort", "holds curves in order of time"),
-            (self.duplicates.is_some() && has_curves, "--duplicates", "holds curves, and no rows"),
-            (self.dimensions.is_some() && format != Format::Text, "--dimensions", "says which numbers are a vehicle's"),
+            (self.time_unit.is_some(), Takes::TimeUnit, "--time-unit", "has a unit of time of its own"),
             (
-                !self.starts.is_empty() && format != Format::Crazyflie,
-                "--start",
-                "does not hold curves that are relative",
+                self.times_per_second.is_some(),
+                Takes::TimeUnit,
+                "--fps and --time-scale",
+                "has a unit of time of its own",
             ),
-            (self.columns != ColumnNames::default() && !is_table, "--column", "has no columns that could be named"),
-            (self.layout.is_some() && !is_npz, "--layout", "has no arrays"),
-            (
-                self.origin.is_some() && !is_mcap && !is_ulog && (!is_table || is_npz),
-                "--origin",
-                "has no latitudes and longitudes",
-            ),
-            (self.frame.is_some() && !is_mcap, "--frame", "names no frames"),
-            (!self.topics.is_empty() && !is_mcap && !is_ulog, "--topic", "has no topics"),
-            (!self.turn().is_identity() && has_axes, "--axes", "gives the directions of its axes"),
-            (self.one_vehicle && !self.is_joined && !is_table, "--one-vehicle", "names its vehicles"),
-            (self.allow_unfinished && !is_mcap && !is_ulog, "--allow-unfinished", "cannot be read before it is closed"),
+            (self.sort, Takes::Rows, "--sort", "holds curves in order of time"),
+            (self.duplicates.is_some(), Takes::Rows, "--duplicates", "holds curves, and no rows"),
+            (self.dimensions.is_some(), Takes::Dimensions, "--dimensions", "says which numbers are a vehicle's"),
+            (!self.starts.is_empty(), Takes::Starts, "--start", "does not hold curves that are relative"),
+            (has_columns, Takes::Columns, "--column", "has no columns that could be named"),
+            (self.layout.is_some(), Takes::Layout, "--layout", "has no arrays"),
+            (self.origin.is_some(), Takes::Origin, "--origin", "has no latitudes and longitudes"),
+            (self.frame.is_some(), Takes::Frame, "--frame", "names no frames"),
+            (!self.topics.is_empty(), Takes::Topics, "--topic", "has no topics"),
+            (is_turned, Takes::Axes, "--axes", "gives the directions of its axes"),
+            (is_one_vehicle, Takes::OneVehicle, "--one-vehicle", "names its vehicles"),
+            (self.allow_unfinished, Takes::Unfinished, "--allow-unfinished", "cannot be read before it is closed"),
         ];
-        match given.into_iter().find(|(needless, ..)| *needless) {
-            Some((_, option, why)) => Err(Fault::coded(
+        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.takes.contains(of)) {
+            Some((.., option, why)) => Err(Fault::coded(
                 "recording/unused-option",
-                format!("{} {why}", format.title()),
+                format!("{} {why}", format.title),
                 format!("leave {option} away"),
             )),
             None => Ok(()),

@@ -1,13 +1,15 @@
-//! Rows of a recording in the order of its file, given out in the order of time.
+//! Rows of a recording, names of its vehicles, and their order: rows in the order of the file are given out in the order of
+//! time.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
-use super::clock::{Stamp, TimeUnit, Timing};
-use super::error::{Fault, ReadError, quoted};
+use super::clock::{Probe, Stamp, TimeUnit, Timing};
+use super::error::{Fault, Place, ReadError, quoted};
+use super::identity::{alike, spelling};
 use super::options::{Duplicates, ReadOptions};
-use super::rows::{BATCH, Row, Rows, probe, refuse_steps_back};
 use super::source::Source;
 use tautline_core::track::{Clock, EarthOrigin, Item, Sample, Tracks};
 
@@ -362,5 +364,193 @@ impl<R: Rows> Tracks for Ordered<R> {
 
     fn earth_origin(&self) -> Option<&EarthOrigin> {
         self.frame.earth_origin.as_ref()
+    }
+}
+
+/// Number of rows that are read at a time.
+pub(super) const BATCH: usize = 10_000;
+
+/// State of a vehicle at an instant, as read from the file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// Time in the unit of the file.
+    pub(super) stamp: Stamp,
+    /// Number of the place in the file; see [`Rows::place`].
+    pub(super) place: u64,
+    pub(super) vehicle: usize,
+    pub(super) position: Vector3<f64>,
+    pub(super) velocity: Option<Vector3<f64>>,
+    pub(super) radius: Option<f64>,
+}
+
+/// Reader of a recording that yields samples row by row.
+pub(super) trait Rows {
+    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
+
+    /// Restarts at the first row. A reader whose time only runs forwards is read once and need not implement this.
+    fn rewind(&mut self) -> Result<(), ReadError> {
+        Ok(())
+    }
+
+    /// Names of the vehicles read so far.
+    fn vehicles(&self) -> &[String];
+
+    /// Puts the names in their final order after all of them have been read.
+    fn settle_names(&mut self) {}
+
+    /// Notes for the user that are known while rows are read.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Notes for the user that are known after all rows have been read.
+    fn late_notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Assumption that the positions and their times rest on, if there is one.
+    fn assumed(&self) -> Option<String> {
+        None
+    }
+
+    /// Returns the place in the file for the number in [`Row::place`].
+    fn place(&self, number: u64) -> Place;
+
+    /// Returns the index of the file that contains a row. Within one file the times of a vehicle must not decrease.
+    fn file(&self, _number: u64) -> usize {
+        0
+    }
+
+    /// Whether the file has one row for each time, so that time can only run forwards.
+    fn is_wide(&self) -> bool {
+        true
+    }
+
+    /// Reads all times and names. Returns `None` if there are no rows.
+    fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
+        survey(self)
+    }
+}
+
+/// Reads the times of all rows. Returns `None` if there are no rows.
+fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
+    let mut probe: Option<Probe> = None;
+    let mut batch = Vec::new();
+    while rows.next(&mut batch)? {
+        for row in batch.drain(..) {
+            probe.get_or_insert_with(|| Probe::new(row.stamp)).see(row.stamp);
+        }
+    }
+    Ok(probe)
+}
+
+/// Returns the properties of the times of these rows, or `None` if there are no rows.
+pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
+    let mut probe = Probe::new(rows.first()?.stamp);
+    for row in rows {
+        probe.see(row.stamp);
+    }
+    Some(probe)
+}
+
+/// Refuses rows of one vehicle whose time decreases in the order of the file.
+pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
+    let mut last: Vec<Option<&Row>> = Vec::new();
+    for row in rows {
+        if row.vehicle >= last.len() {
+            last.resize(row.vehicle + 1, None);
+        }
+        let Some(before) = last[row.vehicle].replace(row) else { continue };
+        if row.stamp.compare(before.stamp).is_lt() && of.file(row.place) == of.file(before.place) {
+            let name = quoted(of.vehicles().get(row.vehicle).map_or("", String::as_str));
+            let (time_s, before_s) = (timing.seconds(row.stamp), timing.seconds(before.stamp));
+            let problem = format!(
+                "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
+                of.place(before.place)
+            );
+            let remedy = "look whether its clock was set; where the rows are of several vehicles, name the column that \
+                          tells them apart with --column id=NAME; where they are only out of order, have them sorted \
+                          with --sort";
+            return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
+        }
+    }
+    Ok(())
+}
+
+/// Names in the order of their indices, and the way back.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    in_order: Vec<String>,
+    indices: HashMap<Box<str>, usize>,
+    /// Indices by what names are but for their spelling.
+    spellings: HashMap<String, usize>,
+}
+
+impl Names {
+    /// Names in this order.
+    ///
+    /// # Errors
+    /// Where two differ only in how they are spelled.
+    pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
+        let mut all = Self::default();
+        for name in names {
+            all.add(name)?;
+        }
+        Ok(all)
+    }
+
+    /// `1`, `2`, ... up to `count`.
+    pub(super) fn numbered(count: usize) -> Self {
+        Self::ordered((1..=count).map(|number| number.to_string()).collect())
+    }
+
+    /// Names that are known to differ.
+    fn ordered(names: Vec<String>) -> Self {
+        let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
+        let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
+        Self { in_order: names, indices, spellings }
+    }
+
+    /// Adds a name and gives its index.
+    fn add(&mut self, name: String) -> Result<usize, Fault> {
+        let index = self.in_order.len();
+        if let Some(&first) = self.spellings.get(&spelling(&name)) {
+            return Err(alike(&self.in_order[first], &name));
+        }
+        self.spellings.insert(spelling(&name), index);
+        self.indices.insert(name.as_str().into(), index);
+        self.in_order.push(name);
+        Ok(index)
+    }
+
+    pub(super) fn all(&self) -> &[String] {
+        &self.in_order
+    }
+
+    /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
+    /// after the last: most files go round.
+    ///
+    /// # Errors
+    /// Where a new name differs from another only in how it is spelled.
+    #[inline]
+    pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
+        let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
+        if self.in_order.get(next).is_some_and(|known| known == name) {
+            return Ok(next);
+        }
+        if let Some(&index) = self.indices.get(name) {
+            return Ok(index);
+        }
+        self.add(name.to_owned())
+    }
+
+    /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
+    pub(super) fn settle(&mut self) {
+        let numbers: Option<Vec<u64>> = self.in_order.iter().map(|name| name.parse().ok()).collect();
+        let Some(numbers) = numbers else { return };
+        let mut order: Vec<usize> = (0..self.in_order.len()).collect();
+        order.sort_by_key(|&index| numbers[index]);
+        *self = Self::ordered(order.iter().map(|&index| self.in_order[index].clone()).collect());
     }
 }

@@ -15,15 +15,27 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::cells::Cells;
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError};
 use super::layout::Layout;
 use super::options::ReadOptions;
-use super::order::Recording;
-use super::rows::BATCH;
+use super::order::{BATCH, Recording};
+use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
 use super::table;
+use super::table::Cells;
+
+pub(super) const READER: Reader = Reader {
+    name: "parquet",
+    title: "a Parquet file",
+    extensions: &["parquet"],
+    docs: "Table in Parquet, long or wide",
+    magic: &[b"PAR1"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open: |source, options| open(&source.clone().seekable()?, options),
+    takes: Takes::TABLE,
+    packing: Packing::Any,
+};
 
 /// Key of the metadata that says what time counts from \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";

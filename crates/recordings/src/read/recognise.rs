@@ -1,35 +1,17 @@
-//! Which format a file is in, going by its content.
+//! Recognises the format of a file by its content, and formats that are known and not read.
 
 use std::io::Read;
 use std::path::Path;
 use std::str;
 
-use super::archive::Archive;
 use super::error::{Fault, ReadError};
-use super::format::Format;
 use super::heading;
-use super::motive;
-use super::objects;
+use super::readers::{Format, Head, Packing};
 use super::skybrush::SHOW;
-use super::source::{GZIP_MAGIC, Source};
-use super::stranger;
-use super::ulog;
-use super::vicon;
+use super::source::{Archive, GZIP_MAGIC, Source};
 
 /// Bytes that are looked at.
 const HEAD_BYTES: u64 = 64 * 1024;
-
-/// How files of a format begin, where all of them do. Other archives begin as NPZ does.
-const MAGICS: [(Format, &[u8]); 5] = [
-    (Format::Ulog, ulog::MAGIC),
-    (Format::Parquet, b"PAR1"),
-    (Format::Mcap, b"\x89MCAP0\r\n"),
-    (Format::Npz, b"PK\x03\x04"),
-    (Format::Npz, b"PK\x05\x06"),
-];
-
-/// Keys that a VVIZ show has in front of what may be long.
-const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
 
 /// Recognises a file, and finds out whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
@@ -40,17 +22,21 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
         head = head_of(source)?;
     }
     let format = match forced {
-        Some(format) if MAGICS.iter().any(|(known, _)| *known == format) && by_magic(&head) != Some(format) => {
+        Some(format) if !format.magic.is_empty() && !Head::new(&head).begins_with_any(format.magic) => {
             return Err(Fault::WrongFormat(format).into());
         }
         Some(format) => format,
         None => format_of(&head)?,
     };
     let packed = source.entry.is_some();
-    let unpacks = !matches!(format, Format::Mcap | Format::Crazyflie | Format::Skybrush);
-    if (source.gzip || packed) && !unpacks && !(packed && format == Format::Crazyflie) {
+    let unpacks = match format.packing {
+        Packing::Any => true,
+        Packing::Archive => packed,
+        Packing::None => false,
+    };
+    if (source.gzip || packed) && !unpacks {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
-        let problem = format!("it is {} inside {within}", format.title());
+        let problem = format!("it is {} inside {within}", format.title);
         return Err(Fault::coded(
             "recording/unsupported-compression",
             problem,
@@ -64,7 +50,8 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
 /// Whether a file is a zip archive that holds neither `NumPy` arrays nor a show.
 pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
     let head = head_of(&Source::file(path))?;
-    Ok(by_magic(&head) == Some(Format::Npz) && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
+    Ok(Head::new(&head).begins_with_any(Format::NPZ.magic)
+        && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
 }
 
 /// Whether a file is text with neither a row of numbers nor the name of a column of time: a note beside tables.
@@ -96,66 +83,85 @@ fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
     if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
 }
 
-fn by_magic(head: &[u8]) -> Option<Format> {
-    MAGICS.iter().find(|(_, magic)| head.starts_with(magic)).map(|(format, _)| *format)
+fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
+    if let Some(fault) = unsupported_bytes(bytes) {
+        return Err(fault);
+    }
+    let head = Head::new(bytes);
+    if let Some(fault) = head.text.and_then(unsupported_text) {
+        return Err(fault);
+    }
+    Format::all().find(|format| (format.sniff)(&head)).ok_or(Fault::UnknownFormat)
 }
 
-fn format_of(head: &[u8]) -> Result<Format, Fault> {
-    match by_magic(head) {
-        // Entries of NPZ archives end in .npy; a show holds show.json.
-        Some(Format::Npz) if memchr::memmem::find(head, b".npy").is_none() => return Ok(Format::Skybrush),
-        Some(format) => return Ok(format),
-        None => {}
-    }
+/// Beginnings of files, what they are, and what helps.
+const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
+    (b"#ROSBAG V", "a ROS 1 bag", BAG),
+    (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
+    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
+    (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT ", "a DataFlash log of ArduPilot", DATAFLASH),
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file",
+        "save its arrays with numpy.savez(\"flight.npz\", t=t, positions=positions)",
+    ),
+    (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
+    (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
+    (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
+    (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
+];
+
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip install \
+                              rosbags`), and give the folder `flight`";
+const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table t,id,lat,lon,alt \
+                         in degrees and metres";
+const UNPACK: &str = "unpack it, and give the folder";
+pub(super) const TABLE: &str =
+    "give positions over time, such as a table t,id,x,y,z, or an object of JSON in each line";
+const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
+
+/// Returns what a file is and the remedy, where the format is known and not read.
+fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
-        return Err(Fault::coded(
-            "recording/no-time-column",
-            "it is a single NumPy array, which tells no times",
+        let problem = "it is a single NumPy array, which tells no times";
+        return Some(Fault::coded("recording/no-time-column", problem, remedy));
+    }
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Some(Fault::NotUtf8);
+    }
+    // Each message of telemetry has the microseconds since 1970 in front.
+    if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
+        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
+                      t,id,lat,lon,alt in degrees and metres";
+        return Some(Fault::coded(
+            "recording/unsupported-format",
+            "it is a MAVLink telemetry log, which is not read",
             remedy,
         ));
     }
-    if let Some(stranger) = stranger::of_bytes(head) {
-        return Err(stranger);
+    if head.get(257..262) == Some(b"ustar") {
+        return Some(Fault::coded("recording/unsupported-format", "it is a tar archive, which is not read", UNPACK));
     }
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Err(Fault::NotUtf8);
-    }
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
-    if memchr::memchr(0, text).is_some() {
-        return Err(Fault::UnknownFormat);
-    }
-    if objects::are_in(text) {
-        return Ok(Format::Jsonl);
-    }
-    if text.starts_with(b"{") {
-        let is_vviz = VVIZ_KEYS.iter().any(|key| memchr::memmem::find(text, key).is_some());
-        return Ok(if is_vviz { Format::Vviz } else { Format::Skybrush });
-    }
-    if text.starts_with(motive::BEGIN) {
-        return Ok(Format::Motive);
-    }
-    if vicon::is_export(text) {
-        return Ok(Format::Vicon);
-    }
-    if let Some(stranger) = stranger::of_text(text) {
-        return Err(stranger);
-    }
-    let lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
-    let Some(line) = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#")) else {
-        return Ok(Format::Csv);
-    };
-    let polynomials = b"duration,";
-    if line.get(..polynomials.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(polynomials)) {
-        return Ok(Format::Crazyflie);
-    }
-    let has = |byte| memchr::memchr(byte, line).is_some();
-    let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
-    let tuples = begins_with_a_number && has(b'(');
-    let csv = (has(b',') && !tuples) || has(b';') || (has(b'\t') && !begins_with_a_number);
-    Ok(if csv { Format::Csv } else { Format::Text })
+    let known = UNSUPPORTED.iter().find(|(begin, ..)| head.starts_with(begin));
+    known.map(|(_, what, remedy)| {
+        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), *remedy)
+    })
 }
 
-fn is_number(bytes: &[u8]) -> bool {
-    std::str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok())
+/// The same of text, which has no blanks in front.
+fn unsupported_text(text: &[u8]) -> Option<Fault> {
+    let holds = |word: &str| memchr::memmem::find(text, word.as_bytes()).is_some();
+    let (what, remedy) = match text.first()? {
+        b'<' if holds("<gpx") => ("a GPX track", EARTH),
+        b'<' if holds("<kml") => ("a KML file", EARTH),
+        b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
+        b'<' => ("an XML file", TABLE),
+        b'[' => ("JSON, but no Skybrush show", TABLE),
+        _ => return None,
+    };
+    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), remedy))
 }

@@ -10,14 +10,26 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::archive::Archive;
 use super::curves::{Curves, distinct, piece};
 use super::error::{Fault, Place, ReadError};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::source::Source;
-use super::stranger;
+use super::readers::{Packing, Reader, Takes};
+use super::source::{Archive, Source};
+use super::{npz, recognise};
 use tautline_core::track::{Item, Piece, Sample};
+
+pub(super) const READER: Reader = Reader {
+    name: "skybrush",
+    title: "a Skybrush show",
+    extensions: &["skyc", "json"],
+    docs: "Skybrush show, or its JSON",
+    magic: &[],
+    sniff: |head| head.begins_with_any(npz::READER.magic) || head.is_text(|text| text.starts_with(b"{")),
+    open,
+    takes: &[Takes::Axes],
+    packing: Packing::None,
+};
 
 /// Highest degree of a Bezier segment that is read.
 const HIGHEST_DEGREE: usize = 15;
@@ -115,7 +127,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         return Err(Fault::coded(
             "recording/unsupported-format",
             "it is JSON, but no Skybrush show: it has no `swarm`",
-            stranger::TABLE,
+            recognise::TABLE,
         )
         .into());
     };

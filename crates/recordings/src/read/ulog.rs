@@ -16,17 +16,26 @@ use std::str;
 
 use nalgebra::Vector3;
 
+use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{Local, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
-use super::order::{About, Ordered, Recording};
-use super::rows::{BATCH, Row, Rows};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
-use super::turned;
 
-/// How a log begins.
-pub(super) const MAGIC: &[u8] = b"ULog\x01\x12\x35";
+pub(super) const READER: Reader = Reader {
+    name: "ulog",
+    title: "a ULog of PX4",
+    extensions: &["ulg"],
+    docs: "Log of PX4",
+    magic: &[b"ULog\x01\x12\x35"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open,
+    takes: &[Takes::Rows, Takes::Origin, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    packing: Packing::Any,
+};
 
 const GLOBAL: &str = "vehicle_global_position";
 const LOCAL: &str = "vehicle_local_position";
@@ -43,7 +52,7 @@ const EARLIEST_UTC_US: u64 = 1_000_000_000_000_000;
 
 /// Opens a log.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    turned::refuse_known(options, "a log of PX4")?;
+    axes::refuse_known(options, "a log of PX4")?;
     let asked = match &options.topics[..] {
         [] => None,
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),

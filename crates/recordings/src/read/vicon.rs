@@ -12,12 +12,25 @@
 //! Objects have translations (`TX`, `TY`, `TZ`) beside their rotations; where some section has these, it is read, else the
 //! trajectories of markers.
 
-use super::capture::{self, Capture, When, by_subject, note_of_markers, note_of_others};
+use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
-use super::units;
+use super::{capture, heading};
+
+pub(super) const READER: Reader = Reader {
+    name: "vicon",
+    title: "an export of Vicon",
+    extensions: &["csv"],
+    docs: "Export of Vicon Nexus or Tracker as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(is_export),
+    open,
+    takes: &[Takes::Rows, Takes::Axes],
+    packing: Packing::Any,
+};
 
 /// Names that a first section has.
 const SECTIONS: [&str; 9] =
@@ -27,7 +40,7 @@ const SECTIONS: [&str; 9] =
 const MARKERS: &str = "Trajectories";
 
 /// Whether a text begins as an export does: a section, and its rate.
-pub(super) fn is_export(text: &[u8]) -> bool {
+fn is_export(text: &[u8]) -> bool {
     let mut lines = text.split(|&byte| byte == b'\n').map(cells);
     let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
     let rate = second.first().and_then(|rate| rate.parse::<f64>().ok());
@@ -166,7 +179,7 @@ impl Head {
                 format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
             return Err(Fault::coded("recording/unit-conflict", problem, "export all in millimetres"));
         }
-        units::size_of(first, false).ok_or_else(|| {
+        heading::size_of(first, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
                 format!("its unit of length is not known: {}", quoted(first)),

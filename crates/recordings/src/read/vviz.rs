@@ -14,8 +14,27 @@ use super::curves::Curves;
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Packing, Reader, Takes};
 use super::source::Source;
 use tautline_core::track::{Item, Sample};
+
+/// Keys in front of the long arrays of a show.
+const KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
+
+pub(super) const READER: Reader = Reader {
+    name: "vviz",
+    title: "a VVIZ show",
+    extensions: &["vviz"],
+    docs: "VVIZ show of Verge Aero or Finale 3D",
+    magic: &[],
+    sniff: |head| {
+        let holds = |text: &[u8]| KEYS.iter().any(|key| memchr::memmem::find(text, key).is_some());
+        head.is_text(|text| text.starts_with(b"{") && holds(text))
+    },
+    open,
+    takes: &[Takes::Rows],
+    packing: Packing::Any,
+};
 
 /// The only axes that are known, and what is said where none are.
 const GRAPHICS: &str = "ogl";

@@ -67,7 +67,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     let source = folder.path().join("source.csv");
     fs::write(&source, CSV).expect("written");
     let exported = |format: export::Format| {
-        let path = folder.path().join(format.name());
+        let path = folder.path().join(format.name);
         let mut file = File::create(&path).expect("a file");
         let open = || read::open(&source, &ReadOptions::default());
         export::export(&open, format, &ExportOptions::default(), &mut file).expect("exported");
@@ -96,9 +96,9 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("skyc", zipped(&[("show.json", SHOW), ("a.json", r#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}"#)])),
         ("tables", zipped(&[("f/a.csv", ONE), ("f/b.txt", "0 1 2 3\n.5 1 2 4\n"), ("f/readme.txt", "1 2 3\n")])),
         ("pieces", zipped(&[("a/1.csv", POLYNOMIAL), ("a/2.csv", POLYNOMIAL), ("b/1.csv", POLYNOMIAL)])),
-        ("parquet", exported(export::Format::Parquet)),
-        ("npz", exported(export::Format::Npz)),
-        ("mcap", exported(export::Format::Mcap)),
+        ("parquet", exported(export::Format::PARQUET)),
+        ("npz", exported(export::Format::NPZ)),
+        ("mcap", exported(export::Format::MCAP)),
         ("jsonl", JSONL.into()),
         ("px4", PX4.into()),
         ("split", SPLIT.into()),
@@ -351,9 +351,9 @@ fn changed_bags_are_survived() {
 
 #[test]
 fn random_bytes_are_survived_by_every_reader() {
-    for format in Format::ALL {
+    for format in Format::all() {
         let options = ReadOptions { format: Some(format), ..ReadOptions::default() };
-        each(format.name(), prop::collection::vec(any::<u8>(), 0..2000), &options);
+        each(format.name, prop::collection::vec(any::<u8>(), 0..2000), &options);
     }
     let magics: Vec<&[u8]> =
         vec![b"PAR1", b"PK\x03\x04", b"\x89MCAP0\r\n", b"\x1f\x8b\x08\0\0\0\0\0\0\0", b"{", b"t,id,x,y,z\n"];

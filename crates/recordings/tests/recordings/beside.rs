@@ -47,7 +47,7 @@ fn run() -> (TempDir, PathBuf) {
 }
 
 fn exported(from: &Path, format: Format) -> PathBuf {
-    let to = from.with_file_name(format!("{}-{}", from.file_name().expect("a name").display(), format.name()));
+    let to = from.with_file_name(format!("{}-{}", from.file_name().expect("a name").display(), format.name));
     let open = || read::open(from, &ReadOptions::default());
     let channels = || read::open_channels(from);
     let mut file = File::create(&to).expect("a file");
@@ -92,7 +92,7 @@ fn motion_is_read_back_from_every_format_as_if_there_were_no_channels() {
 #[test]
 fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is_known() {
     let (_folder, run) = run();
-    let text = fs::read_to_string(exported(&run, Format::Csv)).expect("a table");
+    let text = fs::read_to_string(exported(&run, Format::CSV)).expect("a table");
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     assert_eq!(lines.next().expect("a header"), HEADER);
     let mut empty = 0;
@@ -106,7 +106,7 @@ fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is
     }
     assert_eq!(empty, 2);
     // The same columns in Parquet.
-    let file = File::open(exported(&run, Format::Parquet)).expect("a file");
+    let file = File::open(exported(&run, Format::PARQUET)).expect("a file");
     let rows = SerializedFileReader::new(file).expect("Parquet").into_iter();
     for (n, row) in rows.map(|row| row.expect("a row")).enumerate() {
         assert!(row.get_column_iter().map(|(name, _)| name).eq(&HEADER), "{row}");
@@ -120,7 +120,7 @@ fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is
 #[test]
 fn an_archive_has_an_array_for_each_channel_and_the_names_of_its_columns() {
     let (_folder, run) = run();
-    let file = File::open(exported(&run, Format::Npz)).expect("a file");
+    let file = File::open(exported(&run, Format::NPZ)).expect("a file");
     let mut archive = zip::ZipArchive::new(file).expect("an archive");
     let mut content = |name: &str| {
         let mut bytes = Vec::new();
@@ -143,12 +143,12 @@ fn an_archive_has_an_array_for_each_channel_and_the_names_of_its_columns() {
 #[test]
 fn what_was_exported_in_mcap_is_exported_again_with_its_channels() {
     let (_folder, run) = run();
-    let once = fs::read(exported(&run, Format::Csv)).expect("a table");
-    let mcap = exported(&run, Format::Mcap);
-    assert!(fs::read(exported(&mcap, Format::Csv)).expect("a table") == once);
+    let once = fs::read(exported(&run, Format::CSV)).expect("a table");
+    let mcap = exported(&run, Format::MCAP);
+    assert!(fs::read(exported(&mcap, Format::CSV)).expect("a table") == once);
     let open = || read::open(&run, &ReadOptions::default());
     let bare = run.with_file_name("bare.csv");
-    export::export(&open, Format::Csv, &ExportOptions::default(), &mut File::create(&bare).expect("a file"))
+    export::export(&open, Format::CSV, &ExportOptions::default(), &mut File::create(&bare).expect("a file"))
         .expect("exported");
     let bare_text = fs::read_to_string(&bare).expect("a table");
     assert_eq!(bare_text.lines().next(), Some("t_s,id,x,y,z,vx,vy,vz"), "nobody asked for channels");

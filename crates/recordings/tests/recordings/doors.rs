@@ -47,7 +47,7 @@ fn a_table_of_one_vehicle_needs_no_folder() {
         let error = read_bytes("f.csv", several.as_bytes(), &one).expect_err("named");
         assert_refused(&error, "recording/contradicts-option", "line 1");
     }
-    let mcap = ReadOptions { one_vehicle: true, format: Some(Format::Skybrush), ..ReadOptions::default() };
+    let mcap = ReadOptions { one_vehicle: true, format: Some(Format::SKYBRUSH), ..ReadOptions::default() };
     assert_refused(&read_bytes("a.json", b"{}", &mcap).expect_err("a show"), "recording/unused-option", "");
 }
 
@@ -67,7 +67,7 @@ fn tables_of_trajnet_are_read_where_they_can_be_nothing_else() {
     let space = ReadOptions { dimensions: Some(Dimensions::Space), ..ReadOptions::default() };
     assert_eq!(read_bytes("t.txt", single.as_bytes(), &space).expect("read").samples()[1].2, [1.0, 2.0, 4.0]);
     assert_eq!(whole("t.txt", "0 1 2 3\n10 1.5 2 4\n").samples()[1].2, [1.5, 2.0, 4.0], "no number of a vehicle");
-    let said = ReadOptions { format: Some(Format::Trajnet), ..fps.clone() };
+    let said = ReadOptions { format: Some(Format::TRAJNET), ..fps.clone() };
     assert_eq!(read_bytes("t.txt", single.as_bytes(), &said).expect("read").samples()[1], (0.4, "1", [2.0, 4.0, 0.0]));
     let named = read_bytes("t.csv", b"t,id,x,y\n0,1,2,3\n", &said).expect_err("a header");
     assert_refused(&named, "recording/wrong-format", "line 1");

@@ -66,7 +66,7 @@ fn every_format_gives_back_the_same_bits() {
         let truth = whole(&source);
         assert_eq!(truth.items.len(), 4);
         for &format in export::WRITTEN {
-            let target = folder.path().join(format!("target.{}", format.name()));
+            let target = folder.path().join(format!("target.{}", format.name));
             export(&source, &target, format, &ExportOptions::default()).unwrap_or_else(|e| panic!("{format:?}: {e}"));
             let found = whole(&target);
             assert_eq!(bits(&found), bits(&truth), "{format:?} from {first}");
@@ -86,8 +86,8 @@ fn a_chain_through_all_formats_loses_nothing() {
     let (folder, source) = folder_with("source.csv", &format!("t_s,id,x,y,z\n{}", rows.concat()));
     let truth = bits(&whole(&source));
     let mut from = source;
-    for format in [Format::Npz, Format::Mcap, Format::Parquet, Format::Csv, Format::Mcap, Format::Npz] {
-        let to = folder.path().join(format!("{}.{}", truth.len(), format.name()));
+    for format in [Format::NPZ, Format::MCAP, Format::PARQUET, Format::CSV, Format::MCAP, Format::NPZ] {
+        let to = folder.path().join(format!("{}.{}", truth.len(), format.name));
         export(&from, &to, format, &ExportOptions::default()).unwrap_or_else(|error| panic!("{format:?}: {error}"));
         assert!(bits(&whole(&to)) == truth, "{format:?}");
         from = to;
@@ -98,7 +98,7 @@ fn a_chain_through_all_formats_loses_nothing() {
 fn as_many_times_as_vehicles_come_back_in_their_places() {
     let (folder, source) = folder_with("source.csv", "t_s,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n1,1,7,8,9\n1,2,10,11,12\n");
     let target = folder.path().join("target.npz");
-    export(&source, &target, Format::Npz, &ExportOptions::default()).expect("exported");
+    export(&source, &target, Format::NPZ, &ExportOptions::default()).expect("exported");
     assert_eq!(bits(&whole(&target)), bits(&whole(&source)));
 }
 
@@ -118,10 +118,10 @@ const PARABOLA: &str = "duration,x^0,x^1,x^2,y^0,y^1,y^2,z^0,z^1,z^2\n2,1,2,3,0,
 fn curves_are_sampled_only_where_it_is_asked_for() {
     let (folder, source) = folder_with("cf1.csv", PARABOLA);
     let target = folder.path().join("target.csv");
-    let refused = export(&source, &target, Format::Csv, &ExportOptions::default()).expect_err("refused");
+    let refused = export(&source, &target, Format::CSV, &ExportOptions::default()).expect_err("refused");
     assert!(matches!(refused, ExportError::Curves) && refused.help().contains("--sample-hz"), "{refused}");
 
-    export(&source, &target, Format::Csv, &ExportOptions { sample_hz: Some(2.0) }).expect("exported");
+    export(&source, &target, Format::CSV, &ExportOptions { sample_hz: Some(2.0) }).expect("exported");
     let positions: Vec<_> = whole(&target).samples().iter().map(|&(t, _, p)| (t, p[0])).collect();
     let expected = [0.0, 0.5, 1.0, 1.5, 2.0].map(|t| (t, 1.0 + 2.0 * t + 3.0 * t * t));
     assert_eq!(positions, expected);
@@ -137,7 +137,7 @@ fn the_end_of_every_curve_is_sampled() {
     fs::write(curves.join("cf1.csv"), PARABOLA).expect("written");
     fs::write(curves.join("cf2.csv"), PARABOLA.replace("\n2,", "\n1.75,")).expect("written");
     let target = folder.path().join("target.csv");
-    export(&curves, &target, Format::Csv, &ExportOptions { sample_hz: Some(0.8) }).expect("exported");
+    export(&curves, &target, Format::CSV, &ExportOptions { sample_hz: Some(0.8) }).expect("exported");
     let whole = whole(&target);
     let times = |name: &str| whole.samples().iter().filter(|s| s.1 == name).map(|s| s.0).collect::<Vec<_>>();
     assert_eq!(times("cf1"), [0.0, 1.25, 1.75, 2.0]);
@@ -149,9 +149,9 @@ fn samples_are_not_sampled_again_and_odd_rates_are_refused() {
     let (folder, samples) = folder_with("source.csv", &awkward("0", "1"));
     let target = folder.path().join("target.csv");
     let at = |hz| ExportOptions { sample_hz: Some(hz) };
-    assert!(matches!(export(&samples, &target, Format::Csv, &at(2.0)), Err(ExportError::NoCurves)));
+    assert!(matches!(export(&samples, &target, Format::CSV, &at(2.0)), Err(ExportError::NoCurves)));
     let (_other, curves) = folder_with("cf1.csv", PARABOLA);
     for hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
-        assert!(matches!(export(&curves, &target, Format::Csv, &at(hz)), Err(ExportError::SampleRate(_))), "{hz}");
+        assert!(matches!(export(&curves, &target, Format::CSV, &at(hz)), Err(ExportError::SampleRate(_))), "{hz}");
     }
 }

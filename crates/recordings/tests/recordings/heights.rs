@@ -120,14 +120,14 @@ fn where_a_height_is_missing_none_is_known_in_any_format() {
     // What is exported has no height either, and is the same.
     let truth = Whole::read(&path("flat.csv"), &ReadOptions::default()).expect("read");
     for &format in export::WRITTEN {
-        let to = path(&format!("exported.{}", format.name()));
+        let to = path(&format!("exported.{}", format.name));
         let open = || read::open(&path("flat.csv"), &ReadOptions::default());
         let mut file = fs::File::create(&to).expect("a file");
         export::export(&open, format, &ExportOptions::default(), &mut file).expect("exported");
         assert!(is_planar(&to), "{format:?}");
         let found = Whole::read(&to, &ReadOptions::default()).expect("read");
         assert_eq!((found.vehicles, found.items), (truth.vehicles.clone(), truth.items.clone()), "{format:?}");
-        if format == Format::Csv {
+        if format == Format::CSV {
             let text = fs::read_to_string(&to).expect("read");
             assert_eq!(text.lines().next(), Some("t_s,id,x,y,vx,vy"));
         }

@@ -1,5 +1,6 @@
 //! Recordings of any origin read, written and exported.
 
+mod readers;
 mod recording;
 
 mod any_bytes;
@@ -21,6 +22,7 @@ mod own_channels;
 mod parquet;
 mod refusals;
 mod ros;
+mod stored_audit;
 mod told_apart;
 mod ulog;
 mod vehicles;

@@ -14,7 +14,7 @@ const RECORD_HZ: f64 = 60.0;
 
 /// A made-up run with every kind of event, numbers that use all bits, and samples with and without a summary.
 pub(crate) struct Run {
-    header: Header,
+    pub(crate) header: Header,
     pub(crate) samples: Vec<OwnedSample>,
     pub(crate) events: Vec<Event>,
 }
@@ -72,7 +72,7 @@ fn sample(vehicles: usize, k: usize) -> OwnedSample {
     }
 }
 
-fn folder() -> (TempDir, PathBuf) {
+pub(crate) fn folder() -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("run.mcap");
     (folder, path)

@@ -141,7 +141,7 @@ fn in_every_format() -> Vec<(&'static str, Vec<u8>)> {
     let csv = format!("t_s,id,x,y,z\n{}", rows.concat());
     let (folder, source) = written("source.csv", csv.as_bytes());
     let exported = |format: export::Format| {
-        let path = folder.path().join(format.name());
+        let path = folder.path().join(format.name);
         let open = || read::open(&source, &ReadOptions::default());
         let mut file = File::create(&path).expect("a file");
         export::export(&open, format, &ExportOptions::default(), &mut file).expect("exported");
@@ -149,9 +149,9 @@ fn in_every_format() -> Vec<(&'static str, Vec<u8>)> {
     };
     vec![
         ("flight.csv.gz", gzip(csv.as_bytes())),
-        ("flight.parquet", exported(export::Format::Parquet)),
-        ("flight.npz", exported(export::Format::Npz)),
-        ("flight.mcap", exported(export::Format::Mcap)),
+        ("flight.parquet", exported(export::Format::PARQUET)),
+        ("flight.npz", exported(export::Format::NPZ)),
+        ("flight.mcap", exported(export::Format::MCAP)),
     ]
 }
 
@@ -287,9 +287,9 @@ fn polynomials_are_refused_where_they_are_wrong() {
 #[test]
 fn a_format_that_is_forced_on_other_content_is_refused() {
     let forced = |format| ReadOptions { format: Some(format), ..ReadOptions::default() };
-    for format in [Format::Parquet, Format::Npz, Format::Mcap, Format::Crazyflie, Format::Skybrush] {
+    for format in [Format::PARQUET, Format::NPZ, Format::MCAP, Format::CRAZYFLIE, Format::SKYBRUSH] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &forced(format));
-        let has_magic = matches!(format, Format::Parquet | Format::Npz | Format::Mcap);
+        let has_magic = [Format::PARQUET, Format::NPZ, Format::MCAP].contains(&format);
         assert_eq!(has_magic, matches!(error.fault, Fault::WrongFormat { .. }), "{format:?}: {error}");
     }
     let unit = ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..ReadOptions::default() };

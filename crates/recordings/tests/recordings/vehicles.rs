@@ -78,7 +78,7 @@ fn tables_whose_bytes_are_read_in_any_order_may_be_packed() {
     let expected = whole(&source).expect("read");
     let expected = expected.samples();
     let open = || read::open(&source, &ReadOptions::default());
-    for (name, format) in [("b.parquet", read::Format::Parquet), ("b.npz", read::Format::Npz)] {
+    for (name, format) in [("b.parquet", read::Format::PARQUET), ("b.npz", read::Format::NPZ)] {
         let exported = folder.path().join(name);
         let mut file = fs::File::create(&exported).expect("a file");
         tautline_recordings::export::export(
@@ -120,7 +120,7 @@ fn tables_of_any_format_are_joined_by_one_clock() {
     let open = || read::open(&source, &ReadOptions::default());
     let mut file = fs::File::create(folder.path().join("d.parquet")).expect("a file");
     let options = tautline_recordings::export::ExportOptions::default();
-    tautline_recordings::export::export(&open, read::Format::Parquet, &options, &mut file).expect("exported");
+    tautline_recordings::export::export(&open, read::Format::PARQUET, &options, &mut file).expect("exported");
     fs::remove_file(&source).expect("removed");
     let found = whole(folder.path()).expect("read");
     let samples: Vec<_> = found.samples().iter().map(|&(t, name, [x, ..])| (t, name.to_owned(), x)).collect();

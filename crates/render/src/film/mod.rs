@@ -1,6 +1,5 @@
-//! Films: pictures one after another, as MP4, GIF or animated PNG.
+//! Films: pictures one after another, as MP4 or GIF.
 
-mod apng;
 mod encoder;
 #[cfg(not(feature = "mp4"))]
 mod ffmpeg;
@@ -25,8 +24,6 @@ pub enum FilmFormat {
     Mp4,
     /// GIF: 256 colours a picture, at most 50 pictures a second.
     Gif,
-    /// Animated PNG: every picture without loss.
-    Png,
 }
 
 impl FilmFormat {
@@ -39,7 +36,6 @@ impl FilmFormat {
         match extension.as_deref() {
             Some("mp4") => Ok(Self::Mp4),
             Some("gif") => Ok(Self::Gif),
-            Some("png") => Ok(Self::Png),
             _ => Err(RenderError::UnknownFilm(path.display().to_string())),
         }
     }
@@ -64,7 +60,6 @@ impl FilmFormat {
         let (name, most) = match self {
             Self::Mp4 => ("MP4", MOST_FPS),
             Self::Gif => ("GIF", gif::MOST_FPS),
-            Self::Png => ("PNG", MOST_FPS),
         };
         if !(1..=most).contains(&fps) {
             let what = format!("{name} films have from 1 to {most} pictures a second, not {fps}");
@@ -116,7 +111,6 @@ impl<'a> Film<'a> {
             #[cfg(not(feature = "mp4"))]
             FilmFormat::Mp4 => Box::new(ffmpeg::Ffmpeg::new(out, size_px, fps)?),
             FilmFormat::Gif => Box::new(gif::Gif::new(out, size_px, fps)?),
-            FilmFormat::Png => Box::new(apng::Apng::new(out, size_px, fps, pictures)?),
         };
         Ok(Self { size_px, wanted: pictures, given: 0, encoder })
     }

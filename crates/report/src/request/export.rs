@@ -78,7 +78,7 @@ impl ExportRequest {
         let path = &self.output;
         let by_extension = || {
             let extension = path.extension()?.to_str()?;
-            WRITTEN.iter().copied().find(|format| format.name().eq_ignore_ascii_case(extension))
+            WRITTEN.iter().copied().find(|format| format.name.eq_ignore_ascii_case(extension))
         };
         let format = self.format.or_else(by_extension).ok_or_else(|| {
             let message = format!("the name `{}` does not tell a format", path.display());
@@ -110,7 +110,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
         Ok(Box::new(Interruptible { tracks: open(paths, options)?, path, interrupted: Arc::clone(interrupted) }))
     };
     let channels = || match &paths[..] {
-        [path] if options.format.is_none_or(|format| format == Format::Mcap) => read::open_channels(path),
+        [path] if options.format.is_none_or(|format| format == Format::MCAP) => read::open_channels(path),
         _ => Ok(None),
     };
     let exported = write_atomically_with(output, |file| {
@@ -130,16 +130,11 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     Ok(())
 }
 
-/// What a run saw between its samples is not in the exported file: a note on that.
+/// Returns a note where the run's audit, which is not exported, holds more than the samples.
 fn lost(request: &ExportRequest, monitor: &dyn Monitor) -> Option<String> {
-    let file = request.output.display();
+    let lost = format!("the run's audit of every step is not in {}", request.output.display());
     match own_recording(&request.paths, &request.options, monitor) {
-        Ok(own) => own.filter(|own| !own.has_every_step).map(|own| {
-            let steps = own.most_steps;
-            format!(
-                "up to {steps} steps were flown between two samples: what the run saw between them is not in {file}"
-            )
-        }),
-        Err(unread) => Some(format!("{}; what the run saw between two samples is not in {file}", unread.message())),
+        Ok(own) => own.filter(|own| !own.holds_every_step()).map(|_| lost),
+        Err(unread) => Some(format!("{}; {lost}", unread.message())),
     }
 }

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 
 use rayon::ThreadPool;
 
+use super::audit::run_audit;
 use super::{Failure, Monitor, NamedPicture, OutFolder, Pictures};
 use crate::figures::{self, Criteria, Figure, RunHistory};
 use crate::replay::{Film, NoReplay, PAGE_BYTES, Replay, Stage};
-use crate::report::{INTERRUPTED, Report, RunPage, Status, write_atomically};
+use crate::report::{INTERRUPTED, Report, RunPage, write_atomically};
 use crate::run::{run_while, verify};
 use tautline_core::record::Sink;
-use tautline_recordings::mcap::{Header, McapRecorder, RunVerdict};
+use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim;
@@ -155,33 +156,12 @@ fn fly(
     let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
     monitor.finish();
     let closed = match &flown {
-        Ok(report) => recording.close(run_verdict(report)),
+        Ok(report) => recording.close(run_audit(scenario, report)),
         Err(_) => recording.finish(),
     };
     let report = flown?;
     closed?;
     Ok(report)
-}
-
-/// The verdict that a run writes into its recording when it closes it.
-#[must_use]
-pub fn run_verdict(report: &Report) -> RunVerdict {
-    let status = match report.audit.status {
-        Status::Clear => "clear",
-        Status::Violation => "violation",
-        Status::Undecided => "undecided",
-    };
-    RunVerdict {
-        status: status.to_owned(),
-        ended_early: report.run.ended_early.clone().unwrap_or_default(),
-        separation_m: report.separation.min_m.unwrap_or(f64::NAN),
-        separation_time_s: report.separation.min_at_s.unwrap_or(f64::NAN),
-        pair: report.separation.min_pair.unwrap_or_default().map(|number| number as u64),
-        steps: report.audit.steps,
-        duration_s: report.run.duration_s,
-        state_sha256: report.run.state_hash.clone(),
-        told_sha256: String::new(),
-    }
 }
 
 /// Starts a pool of `number` threads, or of one per core for 0.

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Limit, Quantity};
-use tautline_audit::recorded::{Motion, Settings};
+use tautline_audit::recorded::{Interpolation, Settings};
 use tautline_core::track::{Clock, Item, Sample, Tracks};
 use tautline_recordings::read::{ReadError, ReadOptions};
 use tautline_report::request::audit::Open;
@@ -117,7 +117,7 @@ fn a_wrong_question_has_a_code() {
     assert_eq!(code(twice, same), "audit/limit-twice");
     let unused = Settings { max_accel_m_s2: Some(2.0), ..delta.clone() };
     assert_eq!(code(unused, same), "audit/unused-acceleration");
-    let unbound = Settings { motion: Some(Motion::Bounded), ..delta.clone() };
+    let unbound = Settings { motion: Some(Interpolation::Bounded), ..delta.clone() };
     assert_eq!(code(unbound, same), "audit/no-acceleration-bound");
     let empty = Settings { from_s: Some(1.0), to_s: Some(0.5), ..delta.clone() };
     assert_eq!(code(empty, same), "audit/empty-window");

@@ -1,16 +1,18 @@
-//! Recordings of others.
+//! MCAP recordings of other programs: files that follow each other, and poses brought into one frame.
 
-use super::super::clock::TimeUnit;
-use super::super::error::{Place, ReadError};
+use nalgebra::{Point3, Vector3};
+
+use super::super::clock::{Stamp, TimeUnit};
+use super::super::earth::{is_no_fix, no_fixes};
+use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted};
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, Ordered, Recording};
-use super::super::rows::{BATCH, Row, Rows};
+use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
-use super::plan::Plan;
-use super::poses::Poses;
-use super::schemas::{is_list, reader_of_topic};
-use super::splits::Splits;
-use crate::mcap::topic::Part;
+use super::messages::{EARTH, Seen, What, Who, is_list, reader_of_topic};
+use super::outline::{is_static, place, space};
+use super::plan::{Plan, Way};
+use super::tree::{Known, Placed};
+use crate::mcap::topic::{Message, Part, TopicReader};
 
 /// Opens a recording in some files that follow each other; `whole` is what is called so.
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
@@ -105,5 +107,277 @@ impl Rows for Foreign {
 
     fn is_wide(&self) -> bool {
         false
+    }
+}
+
+/// The parts of some files, in their order. One that is packed is unpacked while it is read.
+pub(super) struct Splits {
+    files: Vec<Source>,
+    /// Number of the next file.
+    next: usize,
+    /// The current file, and what it is read from.
+    open: Option<(TopicReader, Source)>,
+    options: ReadOptions,
+    /// Fewest messages that they have by what is said of them.
+    least_messages: u64,
+    /// What is to be said of files that were not closed, which the user accepts.
+    pub(super) notes: Vec<String>,
+}
+
+impl Splits {
+    pub(super) fn new(files: Vec<Source>, least_messages: u64, options: &ReadOptions) -> Self {
+        Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
+    }
+
+    /// How many files have been opened since the start.
+    pub(super) fn opened_files(&self) -> usize {
+        self.next
+    }
+
+    /// Starts again with the first file.
+    pub(super) fn rewind(&mut self) {
+        (self.next, self.open) = (0, None);
+    }
+
+    /// Takes the next part; `false` behind the last one.
+    pub(super) fn visit(&mut self, take: impl FnOnce(Part<'_>) -> Result<(), ReadError>) -> Result<bool, ReadError> {
+        loop {
+            if let Some((topics, source)) = &mut self.open {
+                let part = topics.next().map_err(|error| ReadError::from(error).of(&source.shown()))?;
+                if let Some(part) = part {
+                    return take(part).map(|()| true).map_err(|error| error.of(&source.shown()));
+                }
+            }
+            let Some(file) = self.files.get(self.next).cloned() else { return Ok(false) };
+            let shown = file.shown();
+            self.open = Some(self.opened(file).map_err(|error| error.of(&shown))?);
+            self.next += 1;
+        }
+    }
+
+    fn opened(&mut self, file: Source) -> Result<(TopicReader, Source), ReadError> {
+        let source = file.seekable()?;
+        let topics = TopicReader::open(&source.path)?;
+        for note in self.options.accept_unfinished(topics.is_complete())? {
+            self.note(note);
+        }
+        Ok((topics, source))
+    }
+
+    fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error, unless a
+    /// file was not closed and the user accepts what it holds.
+    pub(super) fn visit_all(
+        &mut self,
+        mut take: impl FnMut(Part<'_>) -> Result<(), ReadError>,
+    ) -> Result<(), ReadError> {
+        self.rewind();
+        let mut messages = 0;
+        let mut counted = |part: Part<'_>| {
+            messages += u64::from(matches!(part, Part::Message(_)));
+            take(part)
+        };
+        while self.visit(&mut counted)? {}
+        self.rewind();
+        if messages < self.least_messages {
+            let problem =
+                format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
+            if self.notes.is_empty() {
+                return Err(Fault::coded("recording/bag-index", problem, "copy the whole folder again").into());
+            }
+            self.note(problem);
+        }
+        Ok(())
+    }
+}
+
+/// Positions out of messages.
+pub(super) struct Poses {
+    plan: Plan,
+    /// The frame of all positions so far, and the topic that it was met on.
+    frame: Option<(String, String)>,
+    /// Topic and place, or frame, of each vehicle.
+    pub(super) names: Names,
+    /// Vehicle of the last row.
+    vehicle: usize,
+    pub(super) messages: u64,
+    /// Fixes that are none.
+    no_fixes: u64,
+    brought: Brought,
+}
+
+/// How many positions were brought into the frame that is asked for, and how.
+#[derive(Clone, Copy, Default)]
+struct Brought {
+    /// By transforms of their very time.
+    exactly: u64,
+    /// By a transform between two of its samples.
+    guessed: u64,
+    /// Not at all, because a transform is not known then.
+    unknown: u64,
+}
+
+impl Poses {
+    pub(super) fn new(plan: Plan) -> Self {
+        let brought = Brought::default();
+        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, brought }
+    }
+
+    /// Starts again with the first message.
+    pub(super) fn rewind(&mut self) {
+        (self.messages, self.no_fixes, self.brought) = (0, 0, Brought::default());
+    }
+
+    /// Appends the rows of a message.
+    pub(super) fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
+        for seen in self.plan.outline.seen_in(message, &mut self.messages)? {
+            self.append(seen, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
+        }
+        Ok(())
+    }
+
+    fn append(&mut self, seen: Seen, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+        let topic = &message.of.topic;
+        let time_ns = self.plan.time_of(topic, seen.stamp_ns, message.log_ns);
+        if let What::Transform(turn) = seen.what {
+            return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
+        }
+        check_finite(&seen.position)?;
+        if seen.frame == EARTH && is_no_fix(&seen.position) {
+            self.no_fixes += 1;
+            return Ok(());
+        }
+        let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };
+        let name = match seen.who {
+            Who::Topic => topic.clone(),
+            Who::Listed(number) => format!("{topic}/{number}"),
+            Who::Named(name) => name,
+        };
+        self.push(&name, time_ns, position, rows)
+    }
+
+    /// A pose in the frame that all is brought into; none where it cannot be brought there.
+    fn position(&mut self, seen: &Seen, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
+        let Some(wanted) = &self.plan.wanted else {
+            self.check_frame(&seen.frame, topic)?;
+            let local = self.plan.earth.filter(|_| seen.frame == EARTH);
+            return local.map_or(Ok(seen.position), |local| local.place(seen.position)).map(Some);
+        };
+        if wanted == EARTH {
+            let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
+            return Err(Fault::coded(
+                "recording/unusable-frame",
+                problem,
+                "leave --frame out, or name a frame of poses; --topic says which topics are read",
+            ));
+        }
+        if *wanted == seen.frame {
+            return Ok(Some(seen.position));
+        }
+        let way = self.plan.bring(topic, &seen.frame, time_ns)?;
+        let known = self.brought.count(&way);
+        Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
+    }
+
+    /// Appends the vehicles that are seen with a transform.
+    fn append_bodies(
+        &mut self,
+        seen: &Seen,
+        turn: [f64; 4],
+        topic: &str,
+        time_ns: i64,
+        rows: &mut Vec<Row>,
+    ) -> Result<(), Fault> {
+        let space = space(topic);
+        let Who::Named(driver) = &seen.who else { return Ok(()) };
+        let Some(bodies) = self.plan.bodies_of(space, driver).cloned() else { return Ok(()) };
+        check_finite(&seen.position)?;
+        if self.plan.wanted.is_none() {
+            self.check_frame(&seen.frame, topic)?;
+        }
+        for body in bodies {
+            let is_there =
+                body.frame == *driver && self.plan.wanted.as_ref().is_none_or(|wanted| *wanted == seen.frame);
+            let position = if is_there {
+                Some(seen.position)
+            } else {
+                let placed = Placed { position: seen.position, turn }.rigid()?;
+                let way = self.plan.bring_body(space, &body, placed, time_ns)?;
+                self.brought.count(&way).map(|known| known.transform.translation.vector)
+            };
+            let Some(position) = position else { continue };
+            let several = self.plan.outline.trees.len() > 1;
+            let name = if several && !space.is_empty() { format!("{space}/{}", body.frame) } else { body.frame };
+            self.push(&name, time_ns, position, rows)?;
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, name: &str, time_ns: i64, position: Vector3<f64>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+        self.vehicle = self.names.index(name, self.vehicle)?;
+        let (stamp, vehicle) = (Stamp::Whole(time_ns), self.vehicle);
+        rows.push(Row { stamp, place: self.messages, vehicle, position, velocity: None, radius: None });
+        Ok(())
+    }
+
+    /// Refuses a position in another frame than those before.
+    fn check_frame(&mut self, frame: &str, topic: &str) -> Result<(), Fault> {
+        match &self.frame {
+            None => self.frame = Some((frame.to_owned(), topic.to_owned())),
+            Some((known, _)) if known == frame => {}
+            Some((known, first)) => {
+                let (known, first, frame) = (quoted(known), quoted(first), quoted(frame));
+                let problem =
+                    format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
+                let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
+                return Err(Fault::coded("recording/several-frames", problem, remedy));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was assumed to know positions, if anything was.
+    pub(super) fn assumed(&self) -> Option<String> {
+        (self.brought.guessed > 0).then(|| "transforms even between their samples".to_owned())
+    }
+
+    /// What a person should know.
+    pub(super) fn notes(&self) -> Vec<String> {
+        let mut notes = self.plan.notes();
+        notes.extend(no_fixes(self.no_fixes, ""));
+        let Brought { exactly, guessed, unknown } = self.brought;
+        if exactly + guessed + unknown > 0 {
+            let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
+            notes.push(format!(
+                "positions brought{into} by transforms: {exactly} by those of their very time, {guessed} by some between \
+                 two samples at most 1 s apart; {unknown} left out where a transform is not known"
+            ));
+        }
+        notes
+    }
+}
+
+impl Brought {
+    /// Counts a position, and gives what brings it.
+    fn count(&mut self, way: &Way) -> Option<Known> {
+        match way {
+            Way::None => return None,
+            Way::NotThen => self.unknown += 1,
+            Way::By(Known { guessed: true, .. }) => self.guessed += 1,
+            Way::By(_) => self.exactly += 1,
+        }
+        if let Way::By(known) = way { Some(*known) } else { None }
+    }
+}
+
+fn check_finite(position: &Vector3<f64>) -> Result<(), Fault> {
+    match position.iter().find(|x| !x.is_finite()) {
+        Some(odd) => Err(Fault::not_finite("position", &odd.to_string(), UNSEEN)),
+        None => Ok(()),
     }
 }

@@ -13,31 +13,27 @@
 //! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
 //! what it holds.
 
-mod channels;
-pub(crate) mod exported;
 mod foreign;
 mod foxglove_poses;
 mod messages;
 mod outline;
+pub(crate) mod own;
 mod plan;
-mod poses;
-mod rigid;
 mod ros;
-mod run;
-mod schemas;
-mod splits;
-mod topic_name;
 mod tree;
 
-pub use channels::Channels;
+pub use own::Channels;
+
+use std::path::Path;
 
 use super::error::{Fault, Place, ReadError};
-use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
+use super::readers::{Format, Packing, Reader, Takes};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
-use splits::Splits;
+use crate::mcap::{McapRecording, SWARM_SCHEMA};
+use foreign::Splits;
 use tautline_core::record::{ReadFault, RecordError};
 
 /// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
@@ -50,18 +46,59 @@ pub(super) fn open_bag(
     foreign::open(folder, Splits::new(files, messages, options), options)
 }
 
+pub(in crate::read) const READER: Reader = Reader {
+    name: "mcap",
+    title: "an MCAP file",
+    extensions: &["mcap"],
+    docs: "MCAP: recordings of tautline, messages of Foxglove or ROS 2",
+    magic: &[b"\x89MCAP0\r\n"],
+    sniff: |head| head.begins_with_any(READER.magic),
+    open,
+    takes: &[Takes::Rows, Takes::Origin, Takes::Frame, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    packing: Packing::None,
+};
+
+/// What wrote the positions of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Origin {
+    Run,
+    Export,
+    Foreign,
+}
+
+/// Returns the origin of a file by the first schema that is known.
+fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
+    while let Some(part) = topics.next()? {
+        let Part::Schema(name) = part else { continue };
+        let is_export = name == own::TRACKS.schema_name;
+        let origin = match name {
+            SWARM_SCHEMA => Some(Origin::Run),
+            _ if is_export => Some(Origin::Export),
+            _ => messages::reader_of(name).map(|_| Origin::Foreign),
+        };
+        if origin.is_some() {
+            return Ok(origin);
+        }
+    }
+    Ok(None)
+}
+
+/// Opens a recording of `tautline run` where [`open`] reads the file as one; `None` for any other file.
+pub(super) fn open_run(path: &Path) -> Option<McapRecording> {
+    let origin = origin(&mut TopicReader::open(path).ok()?).ok()?;
+    McapRecording::open(path).ok().filter(|_| origin == Some(Origin::Run))
+}
+
 /// Opens a recording, going by the first schema that is known.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
-    while let Some(part) = topics.next()? {
-        match part {
-            Part::Schema("tautline_msgs/msg/Swarm") => return run::open(source, options),
-            Part::Schema(name) if name == exported::TRACKS.schema_name => return exported::open(source, options),
-            Part::Schema(name) if schemas::reader_of(name).is_some() => {
-                return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
-            }
-            _ => {}
+    match origin(&mut topics)? {
+        Some(Origin::Run) => return own::open_samples(source, options),
+        Some(Origin::Export) => return own::open_export(source, options),
+        Some(Origin::Foreign) => {
+            return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
         }
+        None => {}
     }
     options.accept_unfinished(topics.is_complete())?;
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
@@ -80,7 +117,7 @@ impl From<RecordError> for ReadError {
         };
         match fault {
             ReadFault::Empty => Fault::Empty.into(),
-            ReadFault::NotMcap => Fault::WrongFormat(Format::Mcap).into(),
+            ReadFault::NotMcap => Fault::WrongFormat(Format::MCAP).into(),
             ReadFault::TooLong { offset, bytes, limit } => {
                 let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
                 Fault::Damaged(reason).at(Place::Byte(offset))

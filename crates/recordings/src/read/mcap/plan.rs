@@ -4,16 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::super::axes;
 use super::super::earth::Local;
 use super::super::error::{Fault, ReadError, quoted};
 use super::super::options::ReadOptions;
-use super::super::turned;
+use super::foreign::Splits;
 use super::messages::{EARTH, What, Who};
-use super::outline::{Outline, place, refuse_own_frames};
-use super::rigid::{Known, Placed};
-use super::splits::Splits;
-use super::topic_name::{is_static, space};
-use super::tree::{Body, Chain, Tree};
+use super::outline::{Outline, is_static, place, refuse_own_frames, space};
+use super::tree::{Body, Chain, Known, Placed, Tree};
 use crate::mcap::topic::Part;
 
 /// What is read, and how.
@@ -61,7 +59,7 @@ impl Plan {
             outline,
         };
         if first_fix.is_some() {
-            turned::refuse_known(options, "a recording with places on the Earth")?;
+            axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
             return Err(

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::named::OfVehicle;
+use super::report::OfVehicle;
 use tautline_audit::envelope::{Corner, Exceeding, Limit, LimitOutcome};
 use tautline_audit::recorded::Outcome;
 use tautline_audit::{Status, Tally};

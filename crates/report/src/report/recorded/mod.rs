@@ -4,11 +4,10 @@
 
 mod envelope;
 mod moments;
-mod named;
 mod report;
 mod words;
 
 pub use envelope::{OfCorners, OfLimit};
-pub use named::{OfPair, OfVehicle};
 pub use report::{Basis, Between, Clock, EarlyEnd, Obstacles, RecordedAudit, RecordedReport, Seen, SeenWhen, Source};
+pub use report::{OfPair, OfVehicle};
 pub use words::interval;

@@ -1,7 +1,7 @@
 //! What a replay of a recording jumps to, and what it says over time.
 
-use super::named::{OfPair, OfVehicle};
 use super::report::RecordedReport;
+use super::report::{OfPair, OfVehicle};
 use super::words::interval;
 use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::envelope::Exceeding;

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::envelope::OfLimit;
-use super::named::{OfPair, OfVehicle};
 use crate::report::findings::finite;
-use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
+use crate::report::flight;
+use crate::report::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
 };
@@ -61,7 +61,7 @@ pub struct EarlyEnd {
 pub enum Basis {
     /// The recording says it: curves, or every step of an engine that moves vehicles straight.
     Recorded,
-    /// The run that was recorded judged every step, and its verdict answers the question.
+    /// The run's audit of every step answers the question.
     Run,
     /// A bound on every motion there can be.
     Bounded,
@@ -77,7 +77,7 @@ pub struct RecordedAudit {
     pub flight: Audit,
     /// Clear, and nothing was taken for granted of the time between samples.
     pub proved: bool,
-    /// Clear by the word of the run that was recorded, whose judge swept every step.
+    /// Clear by the run's audit of every step, which the recording holds.
     pub judged_by_run: bool,
     /// What was assumed of the motion between samples; none where the recording says it itself.
     pub assumes: Option<String>,
@@ -132,6 +132,9 @@ pub struct RecordedReport {
     /// Verdict and finding up to there, where nothing was wrong.
     #[serde(skip)]
     pub(super) until_then: Option<String>,
+    /// Whether the run of the recording answers the same question by undecided.
+    #[serde(skip)]
+    pub is_run_undecided: bool,
     /// Whether it was asked how close two came, and not single vehicles alone.
     #[serde(skip)]
     pub(super) separation_asked: bool,
@@ -256,7 +259,7 @@ impl RecordedReport {
                     },
                     rapier: Rapier { contact_pairs: None },
                 },
-                proved: outcome.status == Status::Clear && !is_assumed && between.basis != Basis::Run,
+                proved: outcome.status == Status::Clear && !is_assumed,
                 judged_by_run: outcome.status == Status::Clear && between.basis == Basis::Run,
                 assumes: (!assumes.is_empty()).then(|| assumes.join(" and ")),
             },
@@ -269,6 +272,7 @@ impl RecordedReport {
             limits,
             ended_early: None,
             until_then: None,
+            is_run_undecided: false,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
             gaps: outcome
@@ -315,4 +319,24 @@ impl RecordedReport {
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
+}
+
+/// A finding on a pair, with their names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfPair<T> {
+    /// Their names.
+    pub who: [String; 2],
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
+}
+
+/// A finding on a vehicle, with its name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OfVehicle<T> {
+    /// Its name.
+    pub vehicle: String,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: T,
 }

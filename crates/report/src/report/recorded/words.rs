@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::envelope::OfLimit;
-use super::named::{OfPair, OfVehicle};
 use super::report::{EarlyEnd, RecordedReport, Seen};
+use super::report::{OfPair, OfVehicle};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
@@ -53,8 +53,8 @@ impl RecordedReport {
     #[must_use]
     pub fn verdict(&self) -> String {
         match self.status {
+            Status::Clear if self.audit.judged_by_run => format!("PROVED CLEAR {}", self.motion),
             Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
-            Status::Clear if self.audit.judged_by_run => format!("CLEAR {}", self.motion),
             Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
@@ -94,7 +94,8 @@ impl RecordedReport {
                     let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
                     format!("never closer than {least}{unit}, {first} and {second} at {at} ")
                 });
-                let motion = if self.audit.proved { format!(", {}", self.motion) } else { String::new() };
+                let is_in_verdict = self.audit.judged_by_run || !self.audit.proved;
+                let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion) };
                 format!("{closest}({delta}{motion}){}", self.of_those_alone())
             }
             Status::Violation => {
@@ -131,6 +132,9 @@ impl RecordedReport {
         let unit = self.unit();
         if self.audit.flight.parry.disagreements > 0 {
             return "the two detectors disagree".to_owned();
+        }
+        if self.is_run_undecided {
+            return "the run's own audit of every step is undecided (see its report.json)".to_owned();
         }
         if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
             return format!(

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::super::{Failure, text_file};
 use super::{AuditRequest, ConfigFile, ConfiguredAudit, Subject};
 use tautline_audit::envelope::{Limit, Quantity};
-use tautline_audit::recorded::Motion;
+use tautline_audit::recorded::Interpolation;
 use tautline_recordings::read::{ArrayAxis, Axes, Scale};
 
 /// What the file is called.
@@ -30,7 +30,7 @@ struct AuditTable {
     delta_m: Option<f64>,
     radius_m: Option<f64>,
     ellipsoid_m: Option<[f64; 3]>,
-    motion: Option<Motion>,
+    motion: Option<Interpolation>,
     max_accel_m_s2: Option<f64>,
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
@@ -118,7 +118,7 @@ impl AuditTable {
             |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), HELP);
         let folder = path.parent().unwrap_or(Path::new(""));
         let is_silent = request.is_silent();
-        let is_bounded = self.motion.is_some_and(|motion| motion == Motion::Bounded);
+        let is_bounded = self.motion.is_some_and(|motion| motion == Interpolation::Bounded);
         if self.ellipsoid_m.is_some() && self.radius_m.is_some() {
             return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
         }
@@ -147,7 +147,7 @@ impl AuditTable {
             settings.ellipsoid_m = self.ellipsoid_m.map(Vector3::from);
         }
         settings.motion = settings.motion.or(self.motion);
-        if settings.motion == Some(Motion::Bounded) && !has_max_accel {
+        if settings.motion == Some(Interpolation::Bounded) && !has_max_accel {
             settings.max_accel_m_s2 = self.max_accel_m_s2;
         }
         settings.above_m = settings.above_m.or(self.above_m);

@@ -1,29 +1,26 @@
 //! `audit_files`: judges a recording of any origin.
 
 mod config;
-mod encounters;
-mod fence_file;
-mod obstacle_file;
 mod own;
-mod own_obstacles;
-mod own_told;
 mod places;
 mod proof;
 mod replays;
+mod venue_file;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-pub use own::{OwnRecording, Witness};
+pub use own::{OwnRecording, run_audit};
 
-use self::own_obstacles::OwnObstacles;
+use self::own::RunAnswer;
 use super::{Failure, Monitor, RECORDING, outputs};
 use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
-use tautline_audit::recorded::{Motion, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
+use tautline_audit::Obstacle;
+use tautline_audit::recorded::{Interpolation, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
@@ -51,8 +48,7 @@ pub enum Subject<'a> {
     Held {
         /// The name of the motion in messages.
         name: &'a str,
-        /// What a flight of `tautline run` says of itself: its approaches between the instants count, and its limits and
-        /// obstacles are those of the audit where the request names none.
+        /// Limits, obstacles and audit of a flight of `tautline run`.
         own: Option<&'a OwnRecording>,
         /// Opens the motion.
         open: &'a Open<'a>,
@@ -98,7 +94,7 @@ impl Subject<'_> {
         }
     }
 
-    /// What a recording of `tautline run` says of itself, and the limit that a show states \[m\].
+    /// What a recording of `tautline run` holds beside positions, and the limit that a show states \[m\].
     fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
         match self {
             Self::Held { own, .. } => Ok((own.cloned(), None)),
@@ -128,7 +124,7 @@ pub fn recording_in(path: &Path) -> PathBuf {
     if recorded.is_file() { recorded } else { path.to_owned() }
 }
 
-/// What a recording of `tautline run` says of itself; `None` for any other recording.
+/// Returns what a recording of `tautline run` holds beside positions; `None` for any other recording.
 ///
 /// # Errors
 /// [`Failure`] where its scenario cannot be read.
@@ -138,8 +134,8 @@ pub fn own_recording(
     monitor: &dyn Monitor,
 ) -> Result<Option<OwnRecording>, Failure> {
     match paths {
-        [path] if options.format.is_none_or(|format| format == Format::Mcap) => {
-            OwnRecording::read(path, options.metres(), monitor)
+        [path] if options.format.is_none_or(|format| format == Format::MCAP) => {
+            OwnRecording::read(path, options, monitor)
         }
         _ => Ok(None),
     }
@@ -170,7 +166,7 @@ pub struct AuditRequest<'a> {
     pub fence: Option<PathBuf>,
     /// The number of vehicles that must be there to judge.
     pub expect_vehicles: Option<usize>,
-    /// Whether the samples of a recording of `tautline run` are judged alone, without what its run saw between them.
+    /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
     pub independent: bool,
     /// Whether an undecided verdict is good.
     pub allow_undecided: bool,
@@ -311,7 +307,7 @@ impl<'a> AuditRequest<'a> {
 
     /// The settings with the obstacles and the fence of files.
     fn complete_settings(&self) -> Result<Settings, Failure> {
-        if self.has_max_accel() && self.settings.motion != Some(Motion::Bounded) {
+        if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
             return Err(Failure::input(
                 "audit/unused-acceleration",
                 "--max-accel says nothing of a motion that is known exactly",
@@ -337,9 +333,9 @@ impl<'a> AuditRequest<'a> {
             }
         }
         let mut settings = self.settings.clone();
-        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), obstacle_file::read)?);
+        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
         if let Some(fence) = self.fence.as_deref() {
-            settings.envelope.fence = Some(fence_file::read(fence)?);
+            settings.envelope.fence = Some(venue_file::read_fence(fence)?);
         }
         Ok(settings)
     }
@@ -385,7 +381,7 @@ impl<'a> AuditRequest<'a> {
         const FASTEST_M_S: f64 = 340.0;
         let settings = &self.settings;
         let asked = [
-            (settings.motion == Some(Motion::Bounded), "--motion bounded"),
+            (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
             (settings.from_s.is_some(), "--from"),
             (settings.to_s.is_some(), "--to"),
             (settings.max_gap_s.is_some(), "--max-gap"),
@@ -413,9 +409,9 @@ impl<'a> AuditRequest<'a> {
         Err(Failure::input("audit/guessed-time-unit", message, "say --time-unit s, or --time-unit ms"))
     }
 
-    /// What is taken to happen between samples of a recording of curves alone, or that may be ours, whose run may have answered
-    /// the question itself; nothing is proved where the samples themselves are assumed.
-    fn between(&self, curves: bool, own: Option<&OwnRecording>, is_judged: bool, assumed: Option<&str>) -> Between {
+    /// Returns what is taken to happen between samples, for a recording of curves alone or one of `tautline run`. Nothing is
+    /// proved where the samples themselves are assumed.
+    fn between(&self, curves: bool, holds_every_step: bool, answer: RunAnswer, assumed: Option<&str>) -> Between {
         let most = || {
             let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
             let by_name =
@@ -423,11 +419,11 @@ impl<'a> AuditRequest<'a> {
             all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
         };
         let (motion, basis) = match self.settings.motion {
-            Some(Motion::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
-            Some(Motion::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
+            Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
             _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
-            _ if own.is_some_and(|own| own.has_every_step) => ("on every step of the run".to_owned(), Basis::Recorded),
-            None if is_judged => ("as the run judged every step".to_owned(), Basis::Run),
+            _ if answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
+            _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
         match assumed {
@@ -469,9 +465,6 @@ impl ConfiguredAudit<'_> {
             auditor = auditor.with_smallest();
         }
         auditor = auditor.with_interruption(monitor.interruption().clone());
-        own.as_ref().map_or(Ok(()), |own| own.check_told_in(settings.ellipsoid_m))?;
-        own.iter().flat_map(|own| &own.told).for_each(|told| auditor.tell(*told));
-        own.iter().flat_map(|own| &own.violations).for_each(|told| auditor.tell_violation(*told));
         let mut instants = request.html.as_ref().map(|_| Instants::default());
         let Judged { mut outcome, clock, mut notes, assumed, curves, is_planar } =
             self.judged(auditor, &settings, open, monitor, &mut |items, names| {
@@ -479,14 +472,12 @@ impl ConfiguredAudit<'_> {
                     instants.note(items, names, &settings);
                 }
             })?;
-        if let Some(own) = taken.obstacles {
-            own.bind(&mut outcome, &settings);
-        }
         request.check_count(&outcome, &settings)?;
-        let own_now = own.as_ref().filter(|_| request.settings.motion.is_none());
-        let is_judged = own_now.is_some_and(|own| own.settle(&mut outcome, &settings, &mut notes));
-        let between = request.between(curves, own.as_ref(), is_judged, assumed.as_deref());
-        notes.extend(taken.notes(request, &settings, own.as_ref(), &outcome));
+        let answer = own.as_ref().map(|own| own.answer(&mut outcome, &settings, request, &mut notes));
+        let answer = answer.unwrap_or(RunAnswer::Samples);
+        let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
+        let between = request.between(curves, holds_every_step, answer, assumed.as_deref());
+        notes.extend(taken.notes(request, own.as_ref()));
         notes.extend(notes_on_alone(&outcome));
         notes.extend(self.asked_by.clone());
         for note in &notes {
@@ -497,7 +488,8 @@ impl ConfiguredAudit<'_> {
         // A window that ends before the recording was flown whole.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
-        let report = RecordedReport::new(&outcome, &settings, source, between);
+        let mut report = RecordedReport::new(&outcome, &settings, source, between);
+        report.is_run_undecided = answer == RunAnswer::Undecided;
         let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
         let shortened = report.shortened();
         for note in &shortened {
@@ -568,7 +560,7 @@ impl ConfiguredAudit<'_> {
 struct Taken<'a> {
     delta_m: Option<f64>,
     ellipsoid_m: Option<Vector3<f64>>,
-    obstacles: Option<&'a OwnObstacles>,
+    obstacles: Option<&'a [Obstacle]>,
 }
 
 impl<'a> Taken<'a> {
@@ -581,37 +573,27 @@ impl<'a> Taken<'a> {
     ) -> Self {
         let is_silent = request.is_silent();
         let ellipsoid_m = own.and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
-        let delta_m = own.map(|own| own.delta_m).or(own_limit_m).filter(|_| is_silent && ellipsoid_m.is_none());
+        let delta_m = own.map(|own| own.limit_m).or(own_limit_m).filter(|_| is_silent && ellipsoid_m.is_none());
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
         settings.is_own_limit = is_silent && request.obstacles.is_none();
         // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
-        settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.has_no_gaps()).map(|_| f64::INFINITY));
-        settings.is_told_scaled = own.is_some_and(|own| own.ellipsoid_m.is_some());
+        settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));
         let is_asked = request.obstacles.is_none() && settings.ellipsoid_m.is_none();
-        let obstacles = own.map(|own| &own.obstacles).filter(|own| is_asked && !own.obstacles.is_empty());
-        settings.obstacles.extend(obstacles.iter().flat_map(|own| own.obstacles.iter().cloned()));
+        let obstacles = own.map(|own| &own.obstacles[..]).filter(|own| is_asked && !own.is_empty());
+        settings.obstacles.extend_from_slice(obstacles.unwrap_or_default());
         Self { delta_m, ellipsoid_m, obstacles }
     }
 
     /// Notes on how a recording of `tautline run` was flown, and on what it states itself.
-    fn notes(
-        &self,
-        request: &AuditRequest<'_>,
-        settings: &Settings,
-        own: Option<&OwnRecording>,
-        outcome: &Outcome,
-    ) -> Vec<String> {
-        let offset_s = |name: &String| settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
-        let clocks_agree = outcome.vehicles.windows(2).all(|pair| offset_s(&pair[0]) == offset_s(&pair[1]));
-        let mut notes: Vec<String> = own.into_iter().flat_map(|own| own.notes(clocks_agree)).collect();
-        notes.extend(own.and_then(|own| own.doubt(outcome.status)));
+    fn notes(&self, request: &AuditRequest<'_>, own: Option<&OwnRecording>) -> Vec<String> {
+        let mut notes: Vec<String> = own.and_then(OwnRecording::note_on_law).into_iter().collect();
         notes.extend(self.delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
         notes.extend(self.ellipsoid_m.map(|axes| {
             let (x, y, z) = (axes.x, axes.y, axes.z);
             format!("the ellipsoid is the recording's own, with half axes of {x:?}, {y:?} and {z:?} m")
         }));
-        if self.obstacles.is_none() && own.is_some_and(|own| !own.obstacles.obstacles.is_empty()) {
+        if self.obstacles.is_none() && own.is_some_and(|own| !own.obstacles.is_empty()) {
             let why = if request.obstacles.is_some() {
                 "--obstacles names others"
             } else {
@@ -619,8 +601,8 @@ impl<'a> Taken<'a> {
             };
             notes.push(format!("the obstacles that were flown past are not judged: {why}"));
         }
-        notes.extend(self.obstacles.map(|own| {
-            let names: Vec<_> = own.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+        notes.extend(self.obstacles.map(|obstacles| {
+            let names: Vec<_> = obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
             format!("the obstacles are the recording's own: {}", names.join(", "))
         }));
         notes

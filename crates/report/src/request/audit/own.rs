@@ -1,100 +1,141 @@
-//! What a recording of `tautline run` says of itself beside positions.
+//! What a recording of `tautline run` holds beside positions: its limit, its obstacles and the run's own audit.
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
 use super::super::{Failure, Monitor};
-use super::own_obstacles::OwnObstacles;
-use super::own_told::{Near, told};
+use super::AuditRequest;
 use crate::report::recorded::EarlyEnd;
-use tautline_audit::Status;
-use tautline_audit::recorded::{Outcome, Settings, Told, ToldViolation};
-use tautline_core::record::{Event, OwnedSample, RecordError, Sample, Sink, StateHash};
-use tautline_core::swarm::{ClosestApproach, Pair};
-use tautline_recordings::mcap::{Entry, McapRecording, RunVerdict};
-use tautline_sim::scenario::{self, Scenario};
+use crate::report::{ObstacleApproach, Report};
+use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
+use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
+use tautline_core::record::Event;
+use tautline_core::swarm::Pair;
+use tautline_core::text::exact;
+use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
+use tautline_recordings::read;
+use tautline_recordings::read::ReadOptions;
+use tautline_sim::scenario::Scenario;
+use tautline_sim::{scenario, sim};
 
-/// Scaled distance at which two equal ellipsoids touch.
-const TOUCHING_ELLIPSOIDS: f64 = 2.0;
+/// Relative difference of two distances of the same instant that were computed in two ways.
+const SAME: f64 = 1e-9;
 
-/// What a flight of ours says of itself beside positions.
+/// What a flight of `tautline run` holds beside positions.
 #[derive(Clone, Debug)]
 pub struct OwnRecording {
-    /// Its safety distance \[m\]; the scaled distance at which two of its ellipsoids touch where it has these.
-    pub(super) delta_m: f64,
-    /// Half axes of what had to stay empty around a vehicle \[m\], where that was no ball. Distances are lengths over them then, in
-    /// what it says of itself too.
+    /// Safety distance \[m\]; 2, as a scaled distance, where the scenario has ellipsoids.
+    pub(super) limit_m: f64,
+    /// Half axes of the ellipsoid around each vehicle \[m\].
     pub(super) ellipsoid_m: Option<Vector3<f64>>,
-    /// What it says of the time between its samples, in order of time; nothing where it holds every step that was flown.
-    pub(super) told: Vec<Told>,
-    /// The times that it says a pair was too close in.
-    pub(super) violations: Vec<ToldViolation>,
-    /// Whether it holds every step that was flown, and every step was straight.
-    pub has_every_step: bool,
-    /// Most steps between two of its samples.
-    pub most_steps: u64,
-    /// Times of the samples \[s\].
-    samples_s: Vec<f64>,
-    /// What it was flown past.
-    pub(super) obstacles: OwnObstacles,
-    verdict: OwnVerdict,
-    /// The law that was flown, where it is not the scenario's.
-    other_law: Option<String>,
+    /// Obstacles of the scenario.
+    pub(super) obstacles: Vec<Obstacle>,
     /// Where the flight ended before its time.
     pub(super) early_end: Option<EarlyEnd>,
+    audit: StoredAudit,
+    /// Whether the run's audit is not to be used.
+    is_independent: bool,
+    /// Whether positions and times are read as the run wrote them.
+    is_read_as_written: bool,
+    /// Times of the samples \[s\].
+    samples_s: Vec<f64>,
+    /// The law that was flown, where it is not the scenario's.
+    other_law: Option<String>,
 }
 
-/// What a recording says of the verdict of its run.
-#[derive(Clone, Copy, Debug)]
-enum OwnVerdict {
-    /// There is none, or it is not asked for.
-    None,
-    /// The hashes of the verdict do not agree: the recording was changed.
-    Altered,
-    Clear(JudgedClear),
+/// How the run's audit takes part in the audit of its recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum RunAnswer {
+    /// The samples were judged.
+    Samples,
+    /// The samples were judged, and the run, which answers the same question, is undecided.
     Undecided,
-    /// Another verdict of the recording as the run wrote it.
-    Other,
+    /// The answer of the run's audit.
+    Repeated,
 }
 
-/// The verdict of a finished run whose judge found it clear at every step.
-#[derive(Clone, Copy, Debug)]
-struct JudgedClear {
-    /// The closest that any two came; none where that is not known.
-    closest: Option<ClosestApproach>,
-}
-
-impl JudgedClear {
-    /// Whether the verdict of the run answers what was asked: nothing but distances, none larger than the smallest that the run
-    /// saw, in its lengths and by its clock, and no obstacles but its own.
-    fn answers(&self, outcome: &Outcome, settings: &Settings, own: &OwnRecording) -> bool {
-        let Some(closest) = self.closest else { return false };
-        let radii_m = settings.radius_m.into_iter().chain(settings.vehicles.values().filter_map(|of| of.radius_m));
-        let by_radii_m = 2.0 * radii_m.fold(0.0, f64::max);
-        let touching = settings.ellipsoid_m.map_or(0.0, |_| TOUCHING_ELLIPSOIDS);
-        let limit_m = settings.delta_m.unwrap_or(touching).max(by_radii_m);
-        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
-        let is_past_its_own = settings.obstacles == own.obstacles.obstacles;
-        outcome.status == Status::Clear
-            && settings.envelope.is_empty()
-            && settings.ellipsoid_m == own.ellipsoid_m
-            && is_by_its_clock
-            && is_past_its_own
-            && limit_m <= closest.separation_m
+/// Returns the audit that a run writes into its recording when it closes it.
+#[must_use]
+pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
+    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
+    let limit_m = scenario.delta_m * scale;
+    let of_pair = |[first, second]: [usize; 2], [from_s, to_s]: [f64; 2], min_m: f64, min_at_s: f64| {
+        let (vehicle, other_vehicle, min_m) = (first as u64, second as u64, min_m * scale);
+        RunFinding { vehicle, other_vehicle, obstacle: 0, limit_m, from_s, to_s, min_m, min_at_s }
+    };
+    let of_obstacle = |found: &ObstacleApproach, [from_s, to_s]: [f64; 2]| {
+        let &ObstacleApproach { vehicle, ref obstacle, clearance_m, min_m, min_at_s } = found;
+        let (vehicle, limit_m) = (vehicle as u64, clearance_m);
+        let obstacle = 1 + scenario.obstacles.iter().take_while(|of| of.name != *obstacle).count() as u64;
+        RunFinding { vehicle, other_vehicle: 0, obstacle, limit_m, from_s, to_s, min_m, min_at_s }
+    };
+    let separation = &report.separation;
+    let closest = separation.min_pair.zip(separation.min_m).zip(separation.min_at_s);
+    let closest = closest.map(|((pair, min_m), at_s)| of_pair(pair, [at_s; 2], min_m, at_s));
+    let obstacles = report.obstacles.as_ref();
+    let approaches = obstacles.into_iter().flat_map(|of| &of.closest).map(|of| of_obstacle(of, [of.min_at_s; 2]));
+    let of_pairs = report.audit.violations.iter();
+    let of_pairs = of_pairs.map(|of| of_pair(of.pair.numbers(), [of.from_s, of.to_s], of.min_m, of.min_at_s));
+    let of_obstacles = obstacles.into_iter().flat_map(|of| &of.violations);
+    let of_obstacles = of_obstacles.map(|of| of_obstacle(&of.approach, [of.from_s, of.to_s]));
+    let mut violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
+    let violations_count = violations.len() as u64;
+    violations.sort_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
+    violations.truncate(LISTED);
+    violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+    let time = &scenario.time;
+    RunAudit {
+        status: report.audit.status.name().to_owned(),
+        ended_early: report.run.ended_early.clone().unwrap_or_default(),
+        holds_every_step: scenario.has_engine() && report.run.refined_steps == 0 && time.samples() > time.steps(),
+        limit_m,
+        duration_s: report.run.duration_s,
+        steps: report.audit.steps,
+        pairs_checked: report.audit.pairs_checked,
+        violations_count,
+        closest: closest.into_iter().chain(approaches).collect(),
+        violations,
+        sha256: String::new(),
     }
 }
 
 impl OwnRecording {
-    /// Reads it; `None` where the file is none of ours. Where it is damaged, what it says up to there; reading its positions
-    /// tells better what is wrong with it. `scale` is what its lengths are multiplied by.
+    /// Returns what the recording of a flight that is in memory holds.
+    #[must_use]
+    pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>) -> Self {
+        let early_end = report.run.ended_early.clone().map(|reason| EarlyEnd {
+            at_s: report.run.duration_s,
+            duration_s: scenario.time.duration_s,
+            reason: Some(reason),
+        });
+        let audit = StoredAudit::AsWritten(Box::new(run_audit(scenario, report)));
+        Self { early_end, audit, other_law, ..Self::of(scenario, scenario.delta_m, 1.0) }
+    }
+
+    /// Returns the limits of a scenario, with lengths that are multiplied by `scale`.
+    fn of(scenario: &Scenario, delta_m: f64, scale: f64) -> Self {
+        let ellipsoid_m = scenario.half_axes_m().map(|axes| Vector3::from(axes) * scale);
+        Self {
+            limit_m: if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS } else { delta_m * scale },
+            ellipsoid_m,
+            obstacles: scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect(),
+            early_end: None,
+            audit: StoredAudit::None,
+            is_independent: false,
+            is_read_as_written: true,
+            samples_s: Vec::new(),
+            other_law: None,
+        }
+    }
+
+    /// Reads what the recording holds beside positions; `None` where the file is no recording of `tautline run`. A damaged
+    /// recording is read up to the damage.
     ///
     /// # Errors
-    /// [`Failure`] where its scenario cannot be read: nobody knows then what was flown past, or in which lengths it tells.
-    pub fn read(path: &Path, scale: f64, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
-        let Some(mut recording) = path.is_file().then(|| McapRecording::open(path).ok()).flatten() else {
-            return Ok(None);
-        };
+    /// [`Failure`] where the scenario of the recording cannot be read: then its obstacles are not known.
+    pub fn read(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
+        let Some(mut recording) = read::open_run(path) else { return Ok(None) };
         let header = recording.header();
         let text = header.scenario_toml.clone();
         let source = scenario::Source::Text { name: header.scenario_name.clone(), text };
@@ -107,242 +148,206 @@ impl OwnRecording {
                 "audit it with the tautline that flew it, or export it as CSV and say how close vehicles may come";
             Failure::input("recording/foreign-scenario", message, help)
         })?;
-        let mut witness = Witness::new(&scenario, header.delta_m, scale);
-        let mut states = StateHash::new();
+        let mut own = Self::of(&scenario, header.delta_m, options.metres());
+        let usual =
+            ReadOptions { format: options.format, usual_layout: options.usual_layout, ..ReadOptions::default() };
+        own.is_read_as_written = ReadOptions { allow_unfinished: false, ..options.clone() } == usual;
+        let (mut last_step, mut reason) = (0, None);
         for entry in recording.by_ref().map_while(Result::ok) {
             if monitor.is_interrupted() {
                 return Err(Failure::interrupted());
             }
             match entry {
                 Entry::Sample(sample) => {
-                    states.observe(&sample.as_sample());
-                    witness.note_sample(sample);
+                    own.samples_s.push(sample.time_s);
+                    last_step = sample.step;
                 }
-                Entry::Event(event) => witness.note_event(event),
+                Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
+                Entry::Event(Event::EndedEarly { reason: why, .. }) => reason = Some(why),
+                Entry::Event(_) => {}
             }
         }
-        let verdict = recording.verdict().filter(|_| recording.is_complete());
-        let is_as_written = |verdict: &RunVerdict| {
-            verdict.state_sha256 == states.clone().finish() && verdict.told_sha256 == recording.told_sha256()
+        if reason.is_some() || last_step < scenario.time.steps() {
+            let (at_s, duration_s) = (own.samples_s.last().copied().unwrap_or(0.0), scenario.time.duration_s);
+            own.early_end = Some(EarlyEnd { at_s, duration_s, reason });
+        }
+        own.audit = recording.stored_audit();
+        Ok(Some(own))
+    }
+
+    /// Drops the run's audit.
+    pub(super) fn independent(self) -> Self {
+        Self { is_independent: true, ..self }
+    }
+
+    fn run_audit(&self) -> Option<&RunAudit> {
+        match &self.audit {
+            StoredAudit::AsWritten(audit) if !self.is_independent => Some(audit),
+            _ => None,
+        }
+    }
+
+    /// Whether the recording is as the run wrote it, so that every sample contains every vehicle.
+    pub(super) fn is_unaltered(&self) -> bool {
+        self.run_audit().is_some()
+    }
+
+    /// Whether the samples are known to be all steps of the run, each of them straight.
+    pub(crate) fn holds_every_step(&self) -> bool {
+        self.run_audit().is_some_and(|audit| audit.holds_every_step)
+    }
+
+    /// Replaces the findings of the samples by those of the run's audit where the question is the one that the run answered.
+    /// Adds a note where the samples are judged although the recording is one of a run.
+    pub(super) fn answer(
+        &self,
+        outcome: &mut Outcome,
+        settings: &Settings,
+        request: &AuditRequest<'_>,
+        notes: &mut Vec<String>,
+    ) -> RunAnswer {
+        let mut note = |why: &str| notes.push(format!("the samples are judged: {why}"));
+        let audit = match &self.audit {
+            _ if self.is_independent => return RunAnswer::Samples,
+            StoredAudit::None => {
+                note("the recording holds no audit of its run, which an ended run writes last");
+                return RunAnswer::Samples;
+            }
+            StoredAudit::Altered => {
+                note("the recording is not as the run wrote it, so that the run's audit is not of these samples");
+                return RunAnswer::Samples;
+            }
+            StoredAudit::AsWritten(audit) => audit,
         };
-        Ok(Some(match verdict {
-            None => witness.end(),
-            Some(verdict) if is_as_written(verdict) => witness.finish(verdict),
-            Some(_) => witness.end().altered(),
-        }))
-    }
-
-    /// Without what it says of the time between its samples, but for what was too close.
-    fn altered(self) -> Self {
-        Self { told: Vec::new(), verdict: OwnVerdict::Altered, has_every_step: false, ..self }
-    }
-
-    /// Whether every sample contains every vehicle. This holds for a recording that is not known to be altered.
-    pub(super) fn has_no_gaps(&self) -> bool {
-        matches!(self.verdict, OwnVerdict::Clear(_) | OwnVerdict::Undecided | OwnVerdict::Other)
-    }
-
-    /// Reconciles the outcome of the samples with the verdict of the run, which judged every step. Returns whether the verdict
-    /// of the run answers the question of this audit.
-    pub(super) fn settle(&self, outcome: &mut Outcome, settings: &Settings, notes: &mut Vec<String>) -> bool {
-        let OwnVerdict::Clear(judged) = self.verdict else { return false };
-        let Some(closest) = judged.closest else { return false };
-        if outcome.contradicts(closest) {
-            notes.push(format!(
-                "the verdict of the run is not used: its smallest separation ({:?} m) is larger than that of the samples",
-                closest.separation_m
+        let status =
+            [Status::Clear, Status::Violation, Status::Undecided].into_iter().find(|of| of.name() == audit.status);
+        let status = status.unwrap_or_default();
+        if audit.holds_every_step {
+            // The samples are all that the run judged: their own verdict is a proof.
+            if status == Status::Undecided && outcome.status == Status::Violation {
+                notes.push(UNDECIDED_RUN.to_owned());
+            }
+            return RunAnswer::Samples;
+        }
+        if !self.is_same_question(settings, request) || !outcome.absences.is_empty() {
+            let limit = exact(self.limit_m);
+            let verdict = audit.status.to_uppercase();
+            note(&format!(
+                "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return false;
+            return RunAnswer::Samples;
         }
-        let is_by_its_clock = settings.vehicles.values().all(|of| of.offset_s == 0.0);
-        if !self.has_every_step && is_by_its_clock && settings.obstacles == self.obstacles.obstacles {
-            self.obstacles.refute(outcome, settings, &self.samples_s);
+        if self.is_contradicted(outcome, audit, status) {
+            note("they show vehicles closer than the run's audit says");
+            return RunAnswer::Samples;
         }
-        let is_answered = judged.answers(outcome, settings, self);
-        if is_answered {
-            outcome.raise_to(closest);
-        }
-        is_answered
-    }
-
-    /// Takes no word of the run for what happened between its samples.
-    pub(super) fn independent(mut self) -> Self {
-        self.told.clear();
-        self.violations.clear();
-        self.obstacles.forget_what_was_seen();
-        Self { verdict: OwnVerdict::None, has_every_step: false, ..self }
-    }
-
-    /// Refuses other lengths than those in which it says what happened between its samples: that would be lost.
-    pub(super) fn check_told_in(&self, ellipsoid_m: Option<Vector3<f64>>) -> Result<(), Failure> {
-        let Some(axes) = self.ellipsoid_m.filter(|_| !self.told.is_empty() && self.ellipsoid_m != ellipsoid_m) else {
-            return Ok(());
-        };
-        let (x, y, z) = (axes.x, axes.y, axes.z);
-        Err(Failure::input(
-            "audit/other-ellipsoid",
-            format!(
-                "the run says what happened between its samples in lengths over its ellipsoids, of half axes {x:?}, {y:?} and {z:?} m"
-            ),
-            format!(
-                "leave out --delta and --ellipsoid, ask with --ellipsoid {x:?},{y:?},{z:?}, or record every step of the run"
-            ),
-        ))
-    }
-
-    /// Returns a note if the audit finds a violation in the recording of an undecided run. A run is undecided, for example,
-    /// after steps that were too long for the law.
-    pub(super) fn doubt(&self, status: Status) -> Option<String> {
-        let is_doubtful = matches!(self.verdict, OwnVerdict::Undecided) && status == Status::Violation;
-        is_doubtful.then(|| {
-            "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)"
-                .to_owned()
-        })
-    }
-
-    /// What a person should know about how it was flown and is judged, by clocks that were all set right alike or not.
-    pub(super) fn notes(&self, clocks_agree: bool) -> impl Iterator<Item = String> {
-        let (steps, is_altered) = (self.most_steps, matches!(self.verdict, OwnVerdict::Altered));
-        let between = (!self.has_every_step).then(|| {
-            let of = if clocks_agree { "" } else { ", for pairs whose clocks were set right alike" };
-            format!(
-                "up to {steps} steps were flown between two samples: the closest approach that the run saw there \
-                 counts{of}"
-            )
-        });
-        let altered = is_altered.then(|| {
-            "the recording is not as the run wrote it: what the run says of the time between samples is not believed".to_owned()
-        });
-        let law = self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"));
-        law.into_iter().chain(between.filter(move |_| !is_altered)).chain(altered)
-    }
-}
-
-/// Watches a flight of ours, sample by sample, for what a judge of its samples alone cannot know.
-#[derive(Debug)]
-pub struct Witness {
-    own: OwnRecording,
-    /// What lengths are multiplied by, and those that the flight tells.
-    scale: f64,
-    told_scale: f64,
-    before: Option<OwnedSample>,
-    near: Near,
-    /// Steps and duration \[s\] that the scenario asks for.
-    planned: (u64, f64),
-    /// Why the flight ended early, as its recording says.
-    reason: Option<String>,
-}
-
-impl Witness {
-    /// For a flight of this scenario.
-    #[must_use]
-    pub fn of(scenario: &Scenario) -> Self {
-        Self::new(scenario, scenario.delta_m, 1.0)
-    }
-
-    fn new(scenario: &Scenario, delta_m: f64, scale: f64) -> Self {
-        let ellipsoid_m = scenario.half_axes_m().map(|axes| Vector3::from(axes) * scale);
-        // What the run told is of lengths in which its delta is the width of an ellipsoid.
-        let told_scale = if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS / delta_m } else { scale };
-        let own = OwnRecording {
-            delta_m: delta_m * told_scale,
-            ellipsoid_m,
-            told: Vec::new(),
-            violations: Vec::new(),
-            has_every_step: scenario.has_engine(),
-            most_steps: 0,
-            samples_s: Vec::new(),
-            other_law: None,
-            early_end: None,
-            obstacles: OwnObstacles::of(scenario, scale),
-            verdict: OwnVerdict::None,
-        };
-        let planned = (scenario.time.steps(), scenario.time.duration_s);
-        Self { own, scale, told_scale, before: None, near: Near::default(), planned, reason: None }
-    }
-
-    fn note_sample(&mut self, mut sample: OwnedSample) {
-        let own = &mut self.own;
-        sample.swarm.positions_m *= self.scale;
-        let last = self.before.as_ref().unwrap_or(&sample);
-        own.samples_s.push(sample.time_s);
-        own.most_steps = own.most_steps.max(sample.step.saturating_sub(last.step));
-        let lengths = (self.told_scale, own.ellipsoid_m);
-        let told = sample.separation.and_then(|closest| told(last, &sample, closest, lengths));
-        own.told.extend(told.map(|told| Told { others_m: own.delta_m, ..told }));
-        own.violations.extend(self.near.pass(&sample));
-        self.before = Some(sample);
-    }
-
-    fn note_event(&mut self, event: Event) {
-        let (own, before) = (&mut self.own, self.before.as_ref());
-        match event {
-            Event::StepRefined { .. } => own.has_every_step = false,
-            Event::ViolationBegan { pair, time_s } => self.near.begin(pair, time_s, before),
-            Event::ViolationEnded { pair, time_s, min_m } => {
-                self.near.end(pair, time_s, min_m * self.told_scale, own.delta_m, before);
+        match status {
+            Status::Clear | Status::Undecided if !audit.ended_early.is_empty() => RunAnswer::Samples,
+            Status::Clear if !settings.envelope.is_empty() => {
+                note("the run's audit of every step says nothing of limits of single vehicles");
+                RunAnswer::Samples
             }
-            Event::Approach { pair, time_s, separation_m } => {
-                self.near.approach(pair, (separation_m * self.told_scale, time_s));
+            Status::Clear | Status::Violation => {
+                repeat(audit, status, outcome);
+                RunAnswer::Repeated
             }
-            Event::OtherLaw { name, .. } => own.other_law = Some(name),
-            Event::EndedEarly { reason, .. } => self.reason = Some(reason),
-            event => own.obstacles.note(&event, self.scale),
+            Status::Undecided if outcome.status == Status::Violation => {
+                notes.push(UNDECIDED_RUN.to_owned());
+                RunAnswer::Samples
+            }
+            Status::Undecided => {
+                outcome.status = outcome.status.and(Status::Undecided);
+                outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));
+                RunAnswer::Undecided
+            }
         }
     }
 
-    /// What the flight says of itself, once it is over, with the verdict of its run.
-    #[must_use]
-    pub fn finish(self, verdict: &RunVerdict) -> OwnRecording {
-        let scale = self.told_scale;
-        let own = self.end();
-        let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
-        let pair = index(verdict.pair[0]).zip(index(verdict.pair[1])).filter(|(first, second)| first != second);
-        let closest = pair.filter(|_| verdict.separation_m.is_finite()).map(|(first, second)| ClosestApproach {
-            pair: Pair::new(first, second),
-            separation_m: verdict.separation_m * scale,
-            time_s: verdict.separation_time_s,
-        });
-        let verdict = match verdict.status.as_str() {
-            "clear" if verdict.ended_early.is_empty() => OwnVerdict::Clear(JudgedClear { closest }),
-            "undecided" => OwnVerdict::Undecided,
-            _ => OwnVerdict::Other,
+    /// Whether a question is the one that the run's audit answers: its limit and obstacles, all vehicles, the whole flight,
+    /// its own clock, and no assumption on the motion. Limits of single vehicles are a question of their own.
+    fn is_same_question(&self, settings: &Settings, request: &AuditRequest<'_>) -> bool {
+        let limit_m = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS));
+        self.is_read_as_written
+            && (limit_m, settings.ellipsoid_m) == (Some(self.limit_m), self.ellipsoid_m)
+            && settings.radius_m.is_none()
+            && settings.vehicles.values().all(|of| *of == VehicleSettings::default())
+            && settings.only.is_none()
+            && (settings.from_s, settings.to_s, settings.above_m) == (None, None, None)
+            && settings.obstacles == self.obstacles
+            && (request.settings.motion, request.settings.max_gap_s) == (None, None)
+    }
+
+    /// Whether the samples themselves show two closer than the run's audit says. Straight lines between samples show nothing of
+    /// the run.
+    fn is_contradicted(&self, outcome: &Outcome, audit: &RunAudit, status: Status) -> bool {
+        let has_sample = |from_s: f64, to_s: f64| {
+            let rounding_s = SAME * (1.0 + to_s.abs());
+            let first = self.samples_s.partition_point(|&at_s| at_s < from_s - rounding_s);
+            self.samples_s.get(first).is_some_and(|&at_s| at_s <= to_s + rounding_s)
         };
-        OwnRecording { verdict, ..own }
+        let smallest_m = audit.closest.iter().filter(|of| of.obstacle == 0).map(|of| of.min_m).reduce(f64::min);
+        let of_obstacle =
+            |pair: ObjectPair| audit.closest.iter().find(|of| object_pair(of) == Some(pair)).map(|of| of.min_m);
+        let is_closer = |of: &Approach, least_m: Option<f64>| {
+            least_m.is_some_and(|least_m| of.upper_m < least_m - SAME * (1.0 + least_m.abs()))
+                && has_sample(of.time_s, of.time_s)
+        };
+        outcome.closest.iter().any(|of| is_closer(of, smallest_m))
+            || outcome.obstacles.iter().any(|of| is_closer(of, of_obstacle(of.pair)))
+            || (status == Status::Clear && outcome.violations.iter().any(|of| has_sample(of.from_s, of.to_s)))
     }
 
-    /// What the flight says of itself, without a verdict.
-    fn end(self) -> OwnRecording {
-        let Self { mut own, before, mut near, planned: (steps, duration_s), reason, .. } = self;
-        let at_s = before.as_ref().map_or(0.0, |last| last.time_s);
-        let is_whole = reason.is_none() && before.as_ref().is_some_and(|last| last.step >= steps);
-        own.early_end = (!is_whole).then_some(EarlyEnd { at_s, duration_s, reason });
-        own.violations.append(&mut near.ended);
-        if let Some(last) = &before {
-            own.violations.extend(near.lasting(last, (own.delta_m, own.ellipsoid_m), &own.told));
-        }
-        own.has_every_step &= own.most_steps <= 1;
-        if own.has_every_step {
-            own.told.clear();
-            own.violations.clear();
-            own.obstacles.forget_what_was_seen();
-        }
-        own
+    /// Returns a note where another law was flown than the scenario's.
+    pub(super) fn note_on_law(&self) -> Option<String> {
+        self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"))
     }
 }
 
-impl Sink for Witness {
-    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.note_sample(sample.into());
-        Ok(())
-    }
+const UNDECIDED_RUN: &str =
+    "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)";
 
-    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.note_event(event.clone());
-        Ok(())
+/// The pair of a finding; `None` where its numbers name none.
+fn object_pair(found: &RunFinding) -> Option<ObjectPair> {
+    let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
+    let vehicle = index(found.vehicle)?;
+    match (index(found.other_vehicle), index(found.obstacle)) {
+        (Some(other), None) if other != vehicle => Some(ObjectPair::Vehicles(Pair::new(vehicle, other))),
+        (None, Some(obstacle)) => Some(ObjectPair::Obstacle { vehicle, obstacle }),
+        _ => None,
     }
+}
 
-    fn looks_at_steps(&self) -> bool {
-        false
+/// Replaces the findings of the samples by those of the run's audit.
+fn repeat(audit: &RunAudit, status: Status, outcome: &mut Outcome) {
+    let closest = audit.closest.iter().filter_map(|found| {
+        let &RunFinding { limit_m, min_m, min_at_s, .. } = found;
+        Some(Approach { pair: object_pair(found)?, lower_m: min_m, upper_m: min_m, time_s: min_at_s, limit_m })
+    });
+    let (of_pairs, of_obstacles): (Vec<_>, Vec<_>) = closest.partition(|of| of.pair.vehicles().is_some());
+    let violations = audit.violations.iter().filter_map(|found| {
+        let &RunFinding { limit_m, from_s, to_s, min_m, min_at_s, .. } = found;
+        Some(Violation { pair: object_pair(found)?, from_s, to_s, min_m, min_at_s, limit_m })
+    });
+    outcome.violations = violations.collect();
+    let listed = outcome.violations.len();
+    outcome.tallies.violations = Tally { count: audit.violations_count, listed, is_exact: true };
+    outcome.undecided.clear();
+    outcome.tallies.undecided = Tally::all(0);
+    outcome.deciding_rate_hz = None;
+    // The figure of the smallest distance over time shows samples; between them no pair is closer than the run's closest.
+    if let Some(nearest) = of_pairs.first() {
+        for slice in &mut outcome.smallest {
+            let drawn = &mut slice.closest;
+            (drawn.lower_m, drawn.upper_m) = (drawn.lower_m.max(nearest.lower_m), drawn.upper_m.max(nearest.lower_m));
+            if (slice.from_s..=slice.to_s).contains(&nearest.time_s) {
+                slice.closest = *nearest;
+            }
+        }
     }
+    (outcome.closest, outcome.obstacles) = (of_pairs, of_obstacles);
+    outcome.separation = Some(status);
+    outcome.status = status;
+    outcome.is_else_known = !outcome.tallies.are_shortened();
+    (outcome.segments, outcome.swept) = (audit.steps, audit.pairs_checked);
+    outcome.parry = ParryEvidence::default();
 }

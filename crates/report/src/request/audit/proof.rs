@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs::{self, File};
+use std::fs;
+use std::fs::File;
 use std::path::Path;
 
 use serde::Serialize;
@@ -13,8 +14,9 @@ use super::{AuditRequest, Open};
 use crate::report::recorded::Clock;
 use crate::report::write_atomically;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Motion, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
-use tautline_recordings::read::{self, ColumnNames, ReadOptions};
+use tautline_audit::recorded::{Interpolation, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
+use tautline_recordings::read;
+use tautline_recordings::read::{ColumnNames, ReadOptions};
 
 /// Names of the column of time that the checker knows.
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
@@ -65,7 +67,7 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
     };
     let is_other = [
         (settings.delta_m.is_none(), "a limit that is not --delta"),
-        (settings.motion.is_some_and(|motion| motion != Motion::Linear), "a motion that is not linear"),
+        (settings.motion.is_some_and(|motion| motion != Interpolation::Linear), "a motion that is not linear"),
         (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), "--radius"),
         (settings.ellipsoid_m.is_some(), "--ellipsoid"),
         (!settings.obstacles.is_empty(), "obstacles"),

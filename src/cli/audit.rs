@@ -1,4 +1,4 @@
-//! What `tautline audit` is asked.
+//! `tautline audit` of one recording or of several: arguments, and answers for programs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -6,13 +6,123 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 use nalgebra::Vector3;
+use serde::Serialize;
 
-use super::reading::{self, ReadArguments, one_of};
+use super::console::{Console, Terminal};
+use super::reading::{ReadArguments, one_of};
+use super::{Exit, console, events, reading, summary};
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
-use tautline_audit::recorded::{Motion, Settings, VehicleSettings};
+use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
 use tautline_recordings::read::Format;
+use tautline_report::report::recorded::RecordedReport;
+use tautline_report::report::write_atomically;
 use tautline_report::request::outputs::Called;
-use tautline_report::request::{AuditRequest, ConfigFile, Failure, Subject};
+use tautline_report::request::{AuditRequest, Audited, ConfigFile, Failure, Monitor as _, Subject};
+
+/// Recordings that could not be judged, and why.
+type Failures = [(String, Failure)];
+
+/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it. `command` is
+/// the whole command line.
+pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, Failure> {
+    let recordings = arguments.reading.recordings();
+    let is_one = recordings.len() == 1;
+    let refuse = |message: &str, help: &str| Err(Failure::input("usage/several-recordings", message, help));
+    if !is_one && arguments.html.is_some() {
+        let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
+        return refuse("--html is a page on one recording, and several are given", help);
+    }
+    if !is_one && arguments.proof.is_some() {
+        return refuse("--proof is about one recording, and several are given", "audit one at a time");
+    }
+    let mut asked = Vec::new();
+    for paths in recordings {
+        let (request, settings) = arguments.request(paths, command);
+        // No output replaces an input of any recording, whether its settings can be read or not.
+        request.check_outputs(&arguments.outputs())?;
+        let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
+        asked.push((request.subject.called(), configured));
+    }
+    let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
+    complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
+    // A log in which a system looks for its own lines has none of ours, which hold foreign names.
+    let quiet = arguments.quiet || arguments.annotations.is_some();
+    let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });
+    let (mut judged, mut failures) = (Vec::new(), Vec::new());
+    for (name, asked) in asked {
+        if !is_one {
+            monitor.say(&format!("{name}:"));
+        }
+        match asked.and_then(|asked| asked.judge(&monitor)) {
+            Ok(audited) => judged.push(audited),
+            Err(failure) => {
+                if !is_one {
+                    monitor.say(&format!("not judged: {}", failure.message()));
+                }
+                failures.push((name, failure));
+            }
+        }
+    }
+    if !is_one {
+        monitor.say(&summary::counts(&judged, failures.len()));
+    }
+    answer(arguments, &judged, &failures, is_one)?;
+    let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
+    match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| Exit::of(failure) as u8) {
+        // It was said in a line that means nothing else to the system.
+        Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
+        Some(failure) => Err(failure),
+        None => Ok(worst.unwrap_or(Exit::Good)),
+    }
+}
+
+/// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
+fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, is_one: bool) -> Result<(), Failure> {
+    if arguments.json {
+        match judged {
+            [] if is_one => {}
+            [of] if is_one => console::json(&of.report)?,
+            judged => console::json(&Answers::of(judged, failures))?,
+        }
+    }
+    if let Some(Annotations::Github) = arguments.annotations {
+        let lines = summary::github(judged, failures);
+        if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
+    }
+    if let Some(file) = &arguments.events {
+        write_atomically(file, &events::csv(judged, !is_one)?)?;
+    }
+    if let Some(file) = &arguments.junit {
+        write_atomically(file, events::junit(judged, failures)?.as_bytes())?;
+    }
+    if let Some(file) = &arguments.summary {
+        // Pages of jobs are written by one step after another.
+        let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
+        write_atomically(file, &[before, summary::markdown(judged, failures).into_bytes()].concat())?;
+    }
+    Ok(())
+}
+
+/// An answer for each of several recordings.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Answers<'a>(Vec<Answer<'a>>);
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Answer<'a> {
+    Judged(&'a RecordedReport),
+    NotJudged { recording: &'a str, error: String },
+}
+
+impl<'a> Answers<'a> {
+    fn of(judged: &'a [Audited], failures: &'a Failures) -> Self {
+        let not_judged = failures
+            .iter()
+            .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.message().to_owned() });
+        Self(judged.iter().map(|of| Answer::Judged(&of.report)).chain(not_judged).collect())
+    }
+}
 
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
@@ -34,7 +144,7 @@ pub(super) struct AuditArguments {
     pub(super) delta: Option<f64>,
     /// What happens between samples [default: linear for samples, polynomial for curves].
     #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
-    pub(super) motion: Option<Motion>,
+    pub(super) motion: Option<Interpolation>,
     /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
     #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     pub(super) max_accel: Vec<Named>,
@@ -75,7 +185,7 @@ pub(super) struct AuditArguments {
     /// How many vehicles there must be to judge: another number is wrong input.
     #[arg(long, value_name = "N", help_heading = "Question")]
     pub(super) expect_vehicles: Option<usize>,
-    /// Judge the samples of a recording of tautline alone: take no word of its run for what happened between them.
+    /// Judge a recording of tautline from its samples, without the run's audit of every step.
     #[arg(long, help_heading = "Question")]
     pub(super) independent: bool,
     /// Leave it undecided where a vehicle is not seen over the whole window.
@@ -123,14 +233,14 @@ pub(super) struct AuditArguments {
     pub(super) allow_undecided: bool,
 }
 
-fn motion() -> impl TypedValueParser<Value = Motion> {
+fn motion() -> impl TypedValueParser<Value = Interpolation> {
     let help = |motion| match motion {
-        Motion::Linear => "Straight lines",
-        Motion::Hold => "Nothing, with a jump at each sample",
-        Motion::Polynomial => "The recording's own curves",
-        Motion::Bounded => "Anything within the largest acceleration",
+        Interpolation::Linear => "Straight lines",
+        Interpolation::Hold => "Nothing, with a jump at each sample",
+        Interpolation::Polynomial => "The recording's own curves",
+        Interpolation::Bounded => "Anything within the largest acceleration",
     };
-    one_of(Motion::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
+    one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
 
 /// Whose lines mark what was found.

@@ -1,4 +1,4 @@
-//! The file of obstacles. Its tables are those of a scenario, and may move.
+//! Files of obstacles and of a fence.
 
 use std::ops::Range;
 use std::path::Path;
@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::super::{Failure, text_file};
 use tautline_audit::Obstacle;
+use tautline_audit::envelope::Fence;
 use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
 use tautline_sim::sim;
 
@@ -14,7 +15,7 @@ use tautline_sim::sim;
 const MOST_BYTES: u64 = 64 << 20;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Document {
+struct ObstacleDocument {
     /// Of the same place, read by itself.
     #[serde(default)]
     #[expect(dead_code, reason = "it may stand there")]
@@ -24,16 +25,17 @@ struct Document {
 }
 
 /// Reads a file of obstacles.
-pub(super) fn read(path: &Path) -> Result<Vec<Obstacle>, Failure> {
-    parse(&text_file::read(path, MOST_BYTES, "give a TOML file of obstacles")?, path)
+pub(super) fn read_obstacles(path: &Path) -> Result<Vec<Obstacle>, Failure> {
+    parse_obstacles(&text_file::read(path, MOST_BYTES, "give a TOML file of obstacles")?, path)
 }
 
-fn parse(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
+fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     let wrong = |message: String, place: Option<Range<usize>>| {
         let line = place.map_or(1, |place| 1 + text[..place.start.min(text.len())].matches('\n').count());
         Failure::input("audit/obstacle-file", format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
     };
-    let document: Document = toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
+    let document: ObstacleDocument =
+        toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
     if document.obstacle.is_empty() {
         return Err(wrong("there is no [[obstacle]]".to_owned(), None));
     }
@@ -55,6 +57,46 @@ fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
     obstacle.check().map(|()| obstacle).map_err(|error| error.to_string())
 }
 
+const FENCE_HELP: &str =
+    "write [fence] with polygon_m = [[x, y], ...] in metres, and where needed height_m = [from, to] and margin_m";
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FenceDocument {
+    /// In the same place, read by themselves.
+    #[serde(default)]
+    #[expect(dead_code, reason = "they may stand there")]
+    obstacle: Vec<toml::Table>,
+    fence: toml::Spanned<FenceTable>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
+struct FenceTable {
+    polygon_m: Vec<[f64; 2]>,
+    height_m: Option<[f64; 2]>,
+    #[serde(default)]
+    margin_m: f64,
+}
+
+/// Reads the fence of a file.
+pub(super) fn read_fence(path: &Path) -> Result<Fence, Failure> {
+    parse_fence(&text_file::read(path, MOST_BYTES, FENCE_HELP)?, path)
+}
+
+fn parse_fence(text: &str, path: &Path) -> Result<Fence, Failure> {
+    let wrong = |message: &str, start: Option<usize>| {
+        let line = start.map_or(1, |start| 1 + text[..start.min(text.len())].matches('\n').count());
+        Failure::input("audit/fence-file", format!("{}, line {line}: {message}", path.display()), FENCE_HELP)
+    };
+    let document: FenceDocument =
+        toml::from_str(text).map_err(|error| wrong(error.message(), error.span().map(|span| span.start)))?;
+    let start = document.fence.span().start;
+    let FenceTable { polygon_m, height_m, margin_m } = document.fence.into_inner();
+    Fence::new(&polygon_m, height_m, margin_m).map_err(|error| wrong(&error.to_string(), Some(start)))
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
@@ -63,7 +105,7 @@ mod tests {
     use tautline_audit::Shape;
 
     fn read(text: &str) -> Result<Vec<Obstacle>, String> {
-        parse(text, Path::new("obstacles.toml")).map_err(|failure| failure.message().to_owned())
+        parse_obstacles(text, Path::new("obstacles.toml")).map_err(|failure| failure.message().to_owned())
     }
 
     #[test]
@@ -100,6 +142,31 @@ mod tests {
             ("\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }", "line 2: obstacle `a` has no place"),
             ("[[obstacle]]\nname = \"a\"\nball = { radius_m = -1.0 }\nat_m = [0, 0, 0]", "must be above 0 m, not -1"),
             ("[[obstacle]]\nname = \"a\"\nball = 3", "line 3: "),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod fence_file_tests {
+    use super::*;
+
+    #[test]
+    fn a_fence_is_read_and_what_is_wrong_is_said_with_its_line() {
+        let read =
+            |text: &str| parse_fence(text, Path::new("fence.toml")).map_err(|failure| failure.message().to_owned());
+        let fence = read("[fence]\npolygon_m = [[0, 0], [9, 0], [9, 9]]\nheight_m = [0, 50]\nmargin_m = 1.5").unwrap();
+        assert_eq!((fence.corners_m().len(), fence.margin_m()), (3, 1.5));
+        for (text, expected) in [
+            ("", "line 1: missing field `fence`"),
+            ("\n[fence]\npolygon = []", "line 3: unknown field `polygon`"),
+            ("\n[fence]\npolygon_m = [[0, 0], [1, 1]]", "line 2: a fence has 3 to 4096 corners, not 2"),
+            (
+                "[fence]\npolygon_m = [[0, 0], [1, 1], [1, 0], [0, 1]]",
+                "line 1: the edges of the fence from corner 1 and from corner 3 meet",
+            ),
         ] {
             let message = read(text).unwrap_err();
             assert!(message.contains(expected), "{message}");

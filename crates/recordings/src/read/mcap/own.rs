@@ -1,4 +1,4 @@
-//! Recordings that were exported, and the messages that they consist of.
+//! Recordings of tautline: `run.mcap`, what was exported as MCAP with its messages, and channels beside positions.
 //!
 //! ```text
 #![doc = include_str!("vehicles.msg")]
@@ -8,19 +8,20 @@
 #![doc = include_str!("tracks.msg")]
 //! ```
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
-use super::super::names::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, Ordered, Recording};
-use super::super::rows::{BATCH, Row, Rows};
+use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
+use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
+use tautline_core::record::{Channel, ReadFault};
 
 /// Where the vehicles are named.
 pub(crate) const VEHICLES: Topic<'_> =
@@ -46,7 +47,7 @@ pub(crate) struct Instant {
     pub(crate) radii_m: Vec<f64>,
 }
 
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
     let instants = Instants { names: Names::default(), axes: None, epoch_ns: 0, count: 0 };
@@ -155,5 +156,114 @@ impl Rows for Exported {
 
     fn place(&self, number: u64) -> Place {
         Place::Part(format!("message {number} of topic `{}`", TRACKS.name))
+    }
+}
+
+/// A message as it is read.
+type Read = ChannelMessage<String, Vec<String>, Vec<f64>>;
+
+/// The channels of a recording of ours, instant by instant, in the order of its tracks.
+pub struct Channels {
+    path: PathBuf,
+    topics: TopicReader,
+    /// Those of the next instant, where it has been looked at.
+    next: Option<Vec<Read>>,
+}
+
+impl Channels {
+    /// Those of a file in MCAP, where its first instant has some.
+    pub(in crate::read) fn open(path: &Path) -> Result<Option<Self>, ReadError> {
+        let mut channels = Self { path: path.to_owned(), topics: TopicReader::open(path)?, next: None };
+        let first = channels.look()?;
+        let has_some = !first.is_empty();
+        channels.next = Some(first);
+        Ok(has_some.then_some(channels))
+    }
+
+    /// The channels of the next instant, which is of so many vehicles, a row for each in the order of the instant; none
+    /// behind the last one.
+    ///
+    /// # Errors
+    /// [`ReadError`] when the recording is damaged.
+    pub fn next(&mut self, vehicles: usize) -> Result<Vec<Channel>, ReadError> {
+        let found = match self.next.take() {
+            Some(found) => Ok(found),
+            None => self.look(),
+        };
+        let channels = found.and_then(|found| {
+            let channels: Result<_, ReadFault> = found.into_iter().map(|found| found.into_channel(vehicles)).collect();
+            Ok(channels.map_err(|fault| self.topics.fault(fault))?)
+        });
+        channels.map_err(|error| error.of(&self.path))
+    }
+
+    /// The messages of channels before the next instant.
+    fn look(&mut self) -> Result<Vec<Read>, ReadError> {
+        let mut found: Vec<Read> = Vec::new();
+        while let Some(part) = self.topics.next()? {
+            let Part::Message(Message { of, bytes, .. }) = part else { continue };
+            match &*of.schema {
+                CHANNEL_SCHEMA => {
+                    let fault = |reason| ReadFault::Message { topic: of.topic.clone(), reason };
+                    let read = decode::<Read>(bytes).map_err(fault);
+                    let message = read.map_err(|fault| self.topics.fault(fault))?;
+                    found.retain(|before| before.name != message.name);
+                    found.push(message);
+                }
+                schema if schema == SWARM_SCHEMA || schema == TRACKS.schema_name => break,
+                _ => {}
+            }
+        }
+        Ok(found)
+    }
+}
+
+pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let recording = McapRecording::open(&source.path)?;
+    axes::refuse_known(options, "a recording of tautline")?;
+    let notes = options.accept_unfinished(recording.is_complete())?;
+    let vehicles = recording.header().vehicles;
+    let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
+    let none = Fault::coded("recording/empty", "it holds no sample", "record again");
+    let about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    Ok(Box::new(Ordered::open(run, about)?))
+}
+
+/// The samples of a run.
+struct Run {
+    recording: McapRecording,
+    /// Number of vehicles, as the header claims.
+    vehicles: usize,
+    names: Names,
+    samples: u64,
+}
+
+impl Rows for Run {
+    fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+        let before = rows.len();
+        while rows.len() < before + BATCH {
+            let Some(entry) = self.recording.next() else { break };
+            let Entry::Sample(sample) = entry? else { continue };
+            if self.names.all().is_empty() {
+                // The sample really holds as many: the number is no longer a claim.
+                self.names = Names::numbered(self.vehicles);
+            }
+            self.samples += 1;
+            for vehicle in 0..self.vehicles {
+                let position = sample.swarm.positions_m.row(vehicle).transpose();
+                let velocity = Some(sample.swarm.velocities_m_s.row(vehicle).transpose());
+                let stamp = Stamp::Real(sample.time_s);
+                rows.push(Row { stamp, place: self.samples, vehicle, position, velocity, radius: None });
+            }
+        }
+        Ok(rows.len() > before)
+    }
+
+    fn vehicles(&self) -> &[String] {
+        self.names.all()
+    }
+
+    fn place(&self, number: u64) -> Place {
+        Place::Part(format!("sample {number} of topic `/swarm`"))
     }
 }
