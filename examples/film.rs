@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let path = Path::new("circle.gif");
     let view = View { size_px: [960, 540], ..View::default() };
-    let (extent, [start_s, end_s]) = (Extent::of(&timeline), timeline.range_s());
+    let (extent, [start_s, end_s]) = (Extent::of(&timeline), timeline.log.range_s());
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;
     let times: Vec<f64> = (0..u16::MAX)
         .map(|k| start_s + f64::from(k) * SPEED / f64::from(FPS))
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pictures = u32::try_from(times.len())?;
     let mut film = Film::new(&mut out, FilmFormat::of(path)?, view.size_px, FPS, pictures)?;
     for time_s in times {
-        let Some(frame) = timeline.at(time_s) else { break };
+        let Some(frame) = timeline.log.at(time_s) else { break };
         let camera = extent.camera(&timeline, &frame, &view)?;
         let scene = Scene::compose(&timeline, &extent, &frame, &view, camera);
         film.add(&[renderer.paint(&scene)?])?;

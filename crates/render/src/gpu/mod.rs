@@ -79,7 +79,7 @@ impl Renderer {
     /// # Errors
     /// [`RenderError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
     pub fn shoot(&mut self, timeline: &Timeline, time_s: f64, view: &View) -> Result<Picture, RenderError> {
-        let frame = timeline.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+        let frame = timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
         let extent = Extent::of(timeline);
         let camera = extent.camera(timeline, &frame, view)?;
         self.paint(&Scene::compose(timeline, &extent, &frame, view, camera))

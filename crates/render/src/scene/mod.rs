@@ -4,7 +4,6 @@
 //! (words, boxes, scales of colour) in pixels. Lengths are in the scene's coordinates, which are the recording's but for
 //! their origin: it lies amid the flight, so that single precision does for swarms far from the recording's origin.
 
-mod builder;
 mod camera;
 mod caption;
 mod colour;
@@ -14,7 +13,6 @@ mod extent;
 mod geometry;
 mod ground;
 mod labels;
-mod obstacles;
 mod quadrotors;
 mod view;
 

@@ -25,7 +25,7 @@ fn timeline(attitude: Option<UnitQuaternion<f64>>) -> Timeline {
 }
 
 fn scene(timeline: &Timeline, size_px: [u32; 2]) -> Scene {
-    let (frame, extent) = (timeline.at(0.0).expect("a frame"), Extent::of(timeline));
+    let (frame, extent) = (timeline.log.at(0.0).expect("a frame"), Extent::of(timeline));
     let view = View { size_px, layers: Layers { shells: true, ..Layers::NONE }, ..View::default() };
     let camera = extent.camera(timeline, &frame, &view).expect("a camera");
     Scene::compose(timeline, &extent, &frame, &view, camera)

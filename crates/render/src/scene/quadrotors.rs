@@ -2,8 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::builder::SceneBuilder;
 use super::colour::Colour;
+use super::compose::SceneBuilder;
 use super::draw_list::{Ball, Disc, Line, single};
 use crate::timeline::QuadrotorShape;
 

@@ -131,7 +131,7 @@ impl App {
                 state.frame(&open.extent, open.picture_px);
             }
             let (view, camera) = (state.view(open.picture_px), state.camera(open.picture_px));
-            let drawn = player.timeline.at(player.time_s).map(|frame| {
+            let drawn = player.timeline.log.at(player.time_s).map(|frame| {
                 let scene = Scene::compose(&player.timeline, &open.extent, &frame, &view, camera);
                 (frame, scene)
             });

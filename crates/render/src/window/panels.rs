@@ -11,8 +11,8 @@ use super::plot::plot;
 use super::state::WindowState;
 use crate::gpu::paint;
 use crate::scene::{Extent, Projected, Scene, metres};
-use crate::timeline::Frame;
 use tautline_core::swarm::{Pair, row};
+use tautline_report::flight_log::Frame;
 use tautline_sim::plan::Plan;
 
 /// Degrees that the camera turns for a point that the mouse is dragged.
@@ -158,7 +158,7 @@ fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
                 state.press(key, player);
             }
         }
-        let [first_s, last_s] = player.timeline.range_s();
+        let [first_s, last_s] = player.timeline.log.range_s();
         let mut time_s = player.time_s;
         ui.spacing_mut().slider_width = (ui.available_width() - 230.0).max(60.0);
         let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9))

@@ -14,10 +14,10 @@ pub(super) fn plot(ui: &mut Ui, player: &Player) {
     let painter = ui.painter_at(area);
     let visuals = ui.visuals();
     painter.rect_filled(area, 3.0, visuals.extreme_bg_color);
-    let [first_s, last_s] = player.timeline.range_s();
+    let [first_s, last_s] = player.timeline.log.range_s();
     let span_s = (last_s - first_s).max(1e-9);
     let delta_m = player.timeline.delta_m;
-    let keyframes = player.timeline.keyframes();
+    let keyframes = player.timeline.log.keyframes();
     let separations: Vec<_> =
         keyframes.iter().filter_map(|keyframe| Some([keyframe.time_s, keyframe.closest?.separation_m])).collect();
     // The smallest of those that share a point is what counts.
