@@ -155,7 +155,7 @@ pub(crate) fn fly(
         });
         let (report, ending) = flown?;
         closed?;
-        let page = page.map(|log| flight_page(scenario, &preflight, &log, &report, command));
+        let page = page.map(|log| flight_page(scenario, &preflight, log, &report, command));
         Ok((report, ending, (samples, witness), page))
     };
     let (flown, raised) = here(py, || catching(flight))?;

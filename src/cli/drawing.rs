@@ -63,7 +63,8 @@ pub(super) fn timeline(
         console.warn(&format!("note: {note}"));
     }
     if timeline.log.every() > 1 {
-        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", timeline.log.every()));
+        console
+            .warn(&format!("the recording is long: pictures are drawn from one in {} samples", timeline.log.every()));
     }
     Ok(timeline)
 }

@@ -248,6 +248,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             "closest" => {
                 let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
                 let closest = timeline
+                    .log
                     .closest()
                     .ok_or_else(|| Failure::input("render/no-closest", none, "leave `closest` out of --at"))?;
                 (closest.time_s, "closest".to_owned())

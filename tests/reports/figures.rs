@@ -363,7 +363,8 @@ fn nothing_in_a_recording_makes_a_figure_fail_or_hold_a_number_that_is_none() {
     histories.push(("of one sample", one));
     for (name, number) in [("NaN", f64::NAN), ("infinite", f64::INFINITY), ("huge", 1e300), ("tiny", 1e-300)] {
         for count in [1, 3, 20] {
-            let (mut energy, mut state, mut control) = (FlightLog::default(), FlightLog::default(), FlightLog::default());
+            let (mut energy, mut state, mut control) =
+                (FlightLog::default(), FlightLog::default(), FlightLog::default());
             samples(count, 0.1, 2.75, &mut |sample| {
                 energy.take(&Sample { energy: Some(number), ..*sample });
                 let mut swarm = sample.swarm.clone();

@@ -37,7 +37,8 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
         let preflight = Preflight::of(&scenario).expect("a law");
         let path = folder.path().join(name);
         let header = Header::new(name, "", scenario.count(), scenario.delta_m);
-        let (mut recorder, mut history) = (McapRecorder::create(&path, &header).expect("created"), FlightLog::default());
+        let (mut recorder, mut history) =
+            (McapRecorder::create(&path, &header).expect("created"), FlightLog::default());
         let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let fly = || {
             let sink = &mut (&mut recorder, &mut history);

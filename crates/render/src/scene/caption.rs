@@ -252,7 +252,8 @@ impl SceneBuilder<'_> {
     pub(super) fn distances(&self, labels: &mut LabelLayout) {
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
-        let alarmed = self.violated.iter().take(LABELLED).map(|&(violation, distance_m)| (violation.pair, distance_m, true));
+        let alarmed =
+            self.violated.iter().take(LABELLED).map(|&(violation, distance_m)| (violation.pair, distance_m, true));
         let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));

@@ -8,9 +8,13 @@ use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::space::Metric;
+use tautline_laws::space::{Metric, closest_pair};
+use tautline_report::figures;
 use tautline_report::flight_log::FlightLog;
-use tautline_sim::scenario::Scenario;
+use tautline_report::replay::PAGE_BYTES;
+use tautline_report::request::replay_of_run;
+use tautline_report::run::run;
+use tautline_sim::scenario::{Scenario, Source};
 
 /// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
 fn timeline() -> Timeline {
@@ -351,7 +355,8 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         let (_, without) = numbers(&view(false));
         dropped += without.len() - with.len().min(without.len());
         for k in 0..4 {
-            let place = Extent::of(&timeline).place(&timeline.log.at(0.0).expect("a frame").positions_m, k).expect("there");
+            let place =
+                Extent::of(&timeline).place(&timeline.log.at(0.0).expect("a frame").positions_m, k).expect("there");
             let Some(ball) = camera.project(place) else { continue };
             let clear = |at: &[f32; 2]| {
                 let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);
@@ -385,4 +390,42 @@ fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
     assert_eq!(slot(0.5, 1), first_m + Vector3::new(0.25, 0.0, 0.0));
     assert_eq!(slot(2.0, 1), Vector3::new(5.0 + 1.0, 0.0, 0.0));
     assert_eq!((plan.leg_at(0.5), plan.leg_at(2.0), plan.leader()), ((0, 2), (1, 2), Some(2)));
+}
+
+#[test]
+fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_caption_and_label() {
+    let mut scenario = Scenario::read(&Source::Builtin("swap".to_owned()), &[]).expect("built in");
+    scenario.time.record_hz = 1.0;
+    let mut log = FlightLog::of(&scenario);
+    let report = run(&scenario, &mut log).expect("a flight");
+    let (min_m, at_s) = (report.separation.min_m.expect("a distance"), report.separation.min_at_s.expect("a time"));
+    let [first, second] = report.separation.min_pair.expect("a pair");
+    log.conclude(min_m, at_s);
+    let closest = log.closest().expect("an approach");
+    assert_eq!((closest.separation_m, closest.time_s, closest.pair.numbers()), (min_m, at_s, [first, second]));
+    let sampled = log.keyframes().iter().filter_map(|keyframe| closest_pair(&keyframe.positions_m));
+    let sampled_m = sampled.map(|(_, distance_m)| distance_m).fold(f64::INFINITY, f64::min);
+    assert!(sampled_m > 1.05 * min_m, "the closest approach lies between samples: {sampled_m} m and {min_m} m");
+    assert_eq!(log.peak_control().map(|[peak, _]| peak), report.control.peak_m_s2);
+
+    let metres = format!("{} m", tautline_core::text::at_least(min_m, 3));
+    let figure = figures::distances(&log, scenario.delta_m, None, "Distances");
+    assert!(
+        figure.description.contains(&format!("Closest: {metres}, vehicles {first}-{second}")),
+        "{}",
+        figure.description
+    );
+    let control = figures::control(&log, "Control").description;
+    let peak = report.control.peak_m_s2.expect("a peak");
+    assert!(control.contains(&format!("at most {peak:.3} m/s")), "{control}");
+    let replay = replay_of_run(&scenario, &log, &report, PAGE_BYTES).expect("a replay");
+    let in_replay = format!("nearest so far {metres}, {first} and {second}");
+    assert!(replay.json().contains(&in_replay), "{in_replay}");
+
+    let timeline = Timeline::flown(&scenario, Arc::new(log));
+    let scene = scene(&timeline, at_s, &View::default());
+    let caption = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
+    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first}-{second}")), "{caption}");
+    assert!(words(&scene).contains(&metres.as_str()), "{:?}", words(&scene));
+    assert!(report.headline().contains(&metres), "{}", report.headline());
 }

@@ -153,6 +153,9 @@ impl Timeline {
                 Entry::Event(event) => timeline.note(&event),
             }
         }
+        if let Some(verdict) = recording.verdict() {
+            Arc::make_mut(&mut timeline.log).conclude(verdict.separation_m, verdict.separation_time_s);
+        }
         if !recording.is_complete() {
             let note = "the recording was not closed: it is drawn up to the last part that was written";
             timeline.notes.push(note.to_owned());

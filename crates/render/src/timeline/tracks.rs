@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 use super::{Timeline, UNKNOWN_RADIUS_M};
 use crate::error::{RenderError, check_lengths};
-use tautline_audit::recorded::{Approach, Outcome, RecordedError, Settings, TrackAuditor};
 use tautline_audit::Status;
+use tautline_audit::recorded::{Approach, Outcome, RecordedError, Settings, TrackAuditor};
 use tautline_core::swarm::{ClosestApproach, Rows, set_row};
 use tautline_core::track::{Item, Piece, Tracks};
 use tautline_report::flight_log::{BUDGET_BYTES, FlightLog, PICTURED, Violations};

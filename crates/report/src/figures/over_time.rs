@@ -51,7 +51,8 @@ fn channel(spans: &Spans<'_>, k: usize, most_thrust_n: Option<f64>) -> Figure {
     let series = &SERIES[k];
     let (what, unit, count) = (series.what, series.unit, spans.vehicles());
     let most = most_thrust_n.filter(|_| series.name == ROTORS);
-    let numbers = || spans.iter().flat_map(|span| &span.extremes.series[k]).copied().filter(|number| number.is_finite());
+    let numbers =
+        || spans.iter().flat_map(|span| &span.extremes.series[k]).copied().filter(|number| number.is_finite());
     let peak = numbers().fold(f64::NAN, f64::max);
     let y = Axis::linear(&format!("{what} [{unit}]"), numbers().chain(most).chain([0.0]), true);
     let mut chart = Chart::new(spans.time_axis(), y);

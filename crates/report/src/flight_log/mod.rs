@@ -167,7 +167,8 @@ impl FlightLog {
     /// is thinned.
     #[must_use]
     pub fn recorded(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Slices, samples: usize) -> Self {
-        let keyframe = |(number, (time_s, positions_m))| Keyframe { time_s, positions_m, number, ..Keyframe::default() };
+        let keyframe =
+            |(number, (time_s, positions_m))| Keyframe { time_s, positions_m, number, ..Keyframe::default() };
         let keyframes = std::iter::zip(times_s, positions_m).enumerate().map(keyframe).collect();
         Self { keyframes, samples, nearest: Some(nearest), ..Self::default() }
     }
@@ -229,6 +230,19 @@ impl FlightLog {
             }
             so_far = closer(so_far, keyframe.closest);
             keyframe.so_far = so_far;
+        }
+    }
+
+    /// Takes the smallest separation of the whole flight \[m\] and its time \[s\] as the judge concludes them. During the flight
+    /// the separation may be larger by rounding; a number that differs by more is of another flight and is passed over.
+    pub fn conclude(&mut self, separation_m: f64, time_s: f64) {
+        const ROUNDING: f64 = 1e-9;
+        let Some(closest) = self.closest().filter(|closest| closest.time_s == time_s) else { return };
+        if (closest.separation_m - separation_m).abs() <= ROUNDING * closest.separation_m {
+            let approaches =
+                self.keyframes.iter_mut().flat_map(|keyframe| [&mut keyframe.closest, &mut keyframe.so_far]);
+            let same = approaches.flatten().filter(|approach| **approach == closest);
+            same.for_each(|approach| approach.separation_m = separation_m);
         }
     }
 

@@ -11,7 +11,9 @@ use super::said::{self, Said, Words};
 use super::stage::Extent;
 use super::targets::{self, Targets};
 use super::visible::{breaks, place_of_weightiest, present, shown};
-use super::{Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles};
+use super::{
+    Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
+};
 use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
 use tautline_core::swarm::row;
@@ -224,7 +226,8 @@ impl Replay {
         if json.len() > room_bytes {
             return Err(no_room);
         }
-        let is_drawn = |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
+        let is_drawn =
+            |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
         let is_exact = |of: &&Moment| of.kind == Kind::Unseen || is_drawn(of);
         Ok(Self {
             chart: Chart::of(&near, &moments, judged.limit, [begin_s, end_s]),

@@ -71,7 +71,8 @@ impl Extent {
     /// That of the vehicles that are shown.
     pub(super) fn of(stage: &Stage, log: &FlightLog, shown: &[usize]) -> Self {
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        let places = log.keyframes().iter().flat_map(|at| shown.iter().map(move |&vehicle| row(&at.positions_m, vehicle)));
+        let places =
+            log.keyframes().iter().flat_map(|at| shown.iter().map(move |&vehicle| row(&at.positions_m, vehicle)));
         for at in places.filter(|at| at.iter().all(|x| x.is_finite())) {
             (low, high) = (low.inf(&at), high.sup(&at));
         }

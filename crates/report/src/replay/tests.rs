@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::*;
-use tautline_audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
 use crate::flight_log::FlightLog;
+use tautline_audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
 use tautline_core::record::Sample;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
 use tautline_sim::scenario::{Scenario, Source};

@@ -17,7 +17,7 @@ use super::verdict::{Fails, Verdict, at_rest, rises};
 use super::verification::Verification;
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{Breath, Reassignment};
-use tautline_core::swarm::Pair;
+use tautline_core::swarm::{ClosestApproach, Pair};
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -121,6 +121,14 @@ pub struct Separation<Delta = f64> {
 }
 
 impl<Delta> Separation<Delta> {
+    /// The closest approach of two vehicles over the whole run.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        let (separation_m, time_s, [first, second]) = (self.min_m?, self.min_at_s?, self.min_pair?);
+        let (first, second) = (first.checked_sub(1)?, second.checked_sub(1)?);
+        (first != second).then(|| ClosestApproach { pair: Pair::new(first, second), separation_m, time_s })
+    }
+
     /// Whether what was promised was promised of the time at which two came closest.
     pub(super) fn is_promised(&self) -> bool {
         self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)

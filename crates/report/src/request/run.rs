@@ -95,6 +95,9 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let _lock = folder.open(request.force)?;
     let mut log = FlightLog::of(scenario);
     let mut report = threads.install(|| fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
+    if let Some(closest) = report.separation.closest() {
+        log.conclude(closest.separation_m, closest.time_s);
+    }
     let log = Arc::new(log);
     report.performance = report.performance.filter(|_| request.is_timed);
     if request.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
@@ -196,7 +199,12 @@ pub fn threads(number: usize) -> Result<ThreadPool, Failure> {
 ///
 /// # Errors
 /// [`NoReplay`] where it does not fit, or nothing was flown.
-pub fn replay_of_run(scenario: &Scenario, log: &FlightLog, report: &Report, room_bytes: usize) -> Result<Replay, NoReplay> {
+pub fn replay_of_run(
+    scenario: &Scenario,
+    log: &FlightLog,
+    report: &Report,
+    room_bytes: usize,
+) -> Result<Replay, NoReplay> {
     let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
     let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
     Replay::new(&stage, log, &report.moments(&names), report.judgement(), room_bytes)
@@ -225,12 +233,15 @@ fn warnings(preflight: &Preflight) -> Vec<(String, String)> {
 pub fn flight_page(
     scenario: &Scenario,
     preflight: &Preflight,
-    log: &FlightLog,
+    mut log: FlightLog,
     report: &Report,
     command: &str,
 ) -> String {
-    let figures = figures(scenario, log, report);
-    let replay = replay_of_run(scenario, log, report, PAGE_BYTES);
+    if let Some(closest) = report.separation.closest() {
+        log.conclude(closest.separation_m, closest.time_s);
+    }
+    let figures = figures(scenario, &log, report);
+    let replay = replay_of_run(scenario, &log, report, PAGE_BYTES);
     let warnings = warnings(preflight);
     let page = RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &[], command };
     report.to_html(&page)
