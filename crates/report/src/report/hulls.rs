@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::flight::FlightResult;
 use tautline_audit::AuditOutcome;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{metres, metres_below, seconds};
@@ -31,18 +32,27 @@ pub struct PassedThrough {
 }
 
 impl Hulls {
-    /// Of solid hulls of these radii \[m\] that hit so, in steps of `dt_s`.
-    #[must_use]
-    pub fn solid(bounces: &[Bounce], audit: &AuditOutcome, hull_radius_m: &[f64], dt_s: f64) -> Self {
+    /// The hulls of a flight: solid in the engine, else those that points do not have.
+    pub(super) fn of(result: &FlightResult<'_>) -> Self {
+        let FlightResult { scenario, flight, .. } = *result;
+        let audit = flight.in_metres.as_ref().unwrap_or(&flight.audit);
+        if scenario.has_engine() {
+            Self::solid(&flight.bounces, audit, &scenario.hull_radius_m, scenario.time.dt_s)
+        } else {
+            Self::of_points(audit, &scenario.hull_radius_m)
+        }
+    }
+
+    /// Solid hulls of these radii \[m\] with these hits, in steps of `dt_s`.
+    fn solid(bounces: &[Bounce], audit: &AuditOutcome, hull_radius_m: &[f64], dt_s: f64) -> Self {
         let hit = |through: &PassedThrough, from_s: f64, to_s: f64| {
             bounces.iter().any(|b| b.pair == through.pair && from_s - dt_s <= b.time_s && b.time_s <= to_s + dt_s)
         };
         Self { bounces: Some(bounces.to_vec()), passed_through: Self::through(audit, hull_radius_m, hit) }
     }
 
-    /// Of points, with the radius of each hull that they do not have \[m\].
-    #[must_use]
-    pub fn of_points(audit: &AuditOutcome, hull_radius_m: &[f64]) -> Self {
+    /// Points, with the radius of the hull that each does not have \[m\].
+    fn of_points(audit: &AuditOutcome, hull_radius_m: &[f64]) -> Self {
         Self { bounces: None, passed_through: Self::through(audit, hull_radius_m, |_, _, _| false) }
     }
 

@@ -3,11 +3,12 @@
 use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 
-use super::energy::INTEGRATION;
-use super::findings::{Findings, finite};
+use super::flight::{FlightResult, finite};
 use super::page;
+use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
+use tautline_sim::sim::Ending;
 
 /// Violations that a page lists.
 const LISTED: usize = 50;
@@ -57,12 +58,12 @@ pub struct ObstacleViolation {
 }
 
 impl Obstacles {
-    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
-        let (outcome, names) = (findings.clearance?, findings.obstacles);
+    pub(super) fn of(result: &FlightResult<'_>) -> Option<Self> {
+        let (outcome, obstacles) = (result.flight.clearance.as_ref()?, &result.scenario.obstacles);
         let approach = |pair: ObjectPair, clearance_m: f64, min_m: f64, min_at_s: f64| match pair {
             ObjectPair::Obstacle { vehicle, obstacle } => Some(ObstacleApproach {
                 vehicle: vehicle + 1,
-                obstacle: names.get(obstacle).cloned().unwrap_or_default(),
+                obstacle: obstacles.get(obstacle).map(|obstacle| obstacle.name.clone()).unwrap_or_default(),
                 clearance_m,
                 min_m,
                 min_at_s,
@@ -76,8 +77,8 @@ impl Obstacles {
         };
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
-            status: if findings.run.ended_early.is_some() { status.and(Status::Undecided) } else { *status },
-            certified_room_m: findings.certificate.certified_room_m.and_then(finite),
+            status: if result.flight.ending != Ending::Completed { status.and(Status::Undecided) } else { *status },
+            certified_room_m: result.flight.certificate.certified_room_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
             undecided: undecided.len() as u64 + unresolved + refused,

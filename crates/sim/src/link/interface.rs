@@ -1,6 +1,7 @@
 //! Imperfections between the true world and the law, and their absence.
 
 use dyn_clone::DynClone;
+use serde::{Deserialize, Serialize};
 
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm};
@@ -69,8 +70,8 @@ pub struct Sensed<'a> {
     pub others: Others<'a>,
 }
 
-/// What was sent over a network up to now.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Messages of a network up to now.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Traffic {
     /// Messages, one for each who may hear it.
     pub sent: u64,

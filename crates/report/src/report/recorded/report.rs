@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::envelope::OfLimit;
 use super::named::{OfPair, OfVehicle};
-use crate::report::findings::finite;
+use crate::report::flight::finite;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
