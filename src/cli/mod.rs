@@ -5,19 +5,18 @@
 
 mod attack;
 mod audit_arguments;
+mod audit_formats;
 mod audits;
 mod campaign;
 mod check;
 mod command;
 mod compare;
-mod completions;
 mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
-mod events;
 mod export;
 mod list;
 mod margin;
@@ -27,8 +26,6 @@ mod reading;
 mod render;
 mod run;
 mod scenario;
-mod schema;
-mod summary;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::Vector3;
 
 use super::camera::{Camera, CameraSpec, ISO_DEG, Orbit};
-use super::view::View;
+use super::compose::View;
 use crate::error::RenderError;
 use crate::timeline::Timeline;
 use tautline_core::swarm::{Pair, Rows, row};

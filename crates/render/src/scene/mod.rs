@@ -13,21 +13,17 @@ mod extent;
 mod geometry;
 mod ground;
 mod labels;
-mod quadrotors;
-mod view;
 
 #[cfg(feature = "window")]
 pub(super) use camera::TAN_HALF_VIEW;
 pub use camera::{Camera, CameraSpec, Lens, Orbit, Projected};
 pub(super) use caption::metres;
 pub use colour::{Colour, Theme};
+pub use compose::{Layers, View};
 pub use draw_list::{Annotation, Ball, Disc, Line, Scene};
 pub use extent::Extent;
 #[cfg(test)]
 pub(super) use labels::width;
-pub use view::{Layers, View};
 
-#[cfg(test)]
-mod quadrotor_tests;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! The program between the window system and what is drawn.
 
+use std::cell::Cell;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,6 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::WindowId;
 
-use super::guard::{in_library, out_of_library};
 use super::open_window::OpenWindow;
 use super::panels::{self, Viewport};
 use super::player::{LiveUpdate, Player};
@@ -159,5 +159,49 @@ impl App {
         // What the panels leave is known now: the next picture fits.
         open.fit_picture(area_px);
         open.present(output)
+    }
+}
+
+thread_local! {
+    static WITHIN: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether this thread runs the window library, and no callback of this program. A panic there means that the display went
+/// away: the library reports it in no other way.
+#[must_use]
+pub fn is_in_window_library() -> bool {
+    WITHIN.get()
+}
+
+/// Runs a call of the window library.
+fn in_library<T>(act: impl FnOnce() -> T) -> T {
+    marked(true, act)
+}
+
+/// Runs a callback of this program.
+fn out_of_library<T>(act: impl FnOnce() -> T) -> T {
+    marked(false, act)
+}
+
+fn marked<T>(within: bool, act: impl FnOnce() -> T) -> T {
+    let before = WITHIN.replace(within);
+    let done = act();
+    WITHIN.set(before);
+    done
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_library_calls_of_ours_is_not_the_library() {
+        assert!(!is_in_window_library());
+        in_library(|| {
+            assert!(is_in_window_library());
+            assert!(!out_of_library(is_in_window_library));
+            assert!(is_in_window_library());
+        });
+        assert!(!is_in_window_library());
     }
 }

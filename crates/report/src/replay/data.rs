@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::chart::Chart;
 use super::decimate::{MOST_INSTANTS, Span, around_worst, chosen};
-use super::motion::Motion;
+use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
 use super::said::{self, Said, Words};
 use super::stage::Extent;
@@ -34,17 +34,28 @@ const VERSION: u32 = 2;
 
 /// A flight as data of a page.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Replay {
-    json: String,
-    chart: Chart,
-    rounding_m: f64,
-    instants: [usize; 2],
-    vehicles: [usize; 2],
-    moments: [usize; 2],
-    holds: bool,
-    inexact: usize,
-    unknown_radius: Option<(usize, f64)>,
-    obstacles_off_m: f64,
+    /// The data as JSON without any `<`, so that it may stand in a page's script element.
+    pub json: String,
+    /// Smallest distance of any two over time.
+    pub chart: Chart,
+    /// Largest error of a drawn coordinate \[m\].
+    pub rounding_m: f64,
+    /// Number of instants that are kept, and number of samples.
+    pub instants: [usize; 2],
+    /// Number of vehicles that are drawn, and number of all that are ever there.
+    pub vehicles: [usize; 2],
+    /// Number of findings that can be jumped to, and number of all.
+    pub moments: [usize; 2],
+    /// Whether vehicles are drawn at rest between two instants.
+    pub holds: bool,
+    /// Number of findings whose very instant, or one of whose vehicles, is not drawn.
+    pub inexact: usize,
+    /// Number of vehicles without a known radius, where there are any, and the radius that they are drawn with \[m\].
+    pub unknown_radius: Option<(usize, f64)>,
+    /// Largest distance of a drawn moving obstacle from its way \[m\].
+    pub obstacles_off_m: f64,
 }
 
 /// What the script reads. Lists of numbers are base64 of their bytes, the least first.
@@ -213,13 +224,13 @@ impl Replay {
         for [instant, vehicle] in breaks.split_off(breaks.len().min(most_breaks)) {
             instants[instant][vehicle] = None;
         }
-        let motion = Motion::new(&instants);
+        let motion = PackedMotion::new(&instants);
         let single_m = SINGLE * (extent.low_m - origin_m).amax().max((extent.high_m - origin_m).amax());
         let rounding_m = motion.rounding_m() + single_m;
         data.times_s = doubles(kept_s.into_iter());
         data.breaks =
             base64_of(breaks.iter().flatten().flat_map(|&at| u16::try_from(at).unwrap_or(u16::MAX).to_le_bytes()));
-        (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m(), motion.cell_m(), rounding_m);
+        (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m, motion.cell_m, rounding_m);
         data.starts = base64_of(motion.start_bytes().into_iter());
         data.steps = base64_of(motion.step_bytes().into_iter());
         let json = written(&data);
@@ -241,66 +252,6 @@ impl Replay {
             unknown_radius: stage.unknown_radii(&shown),
             obstacles_off_m,
         })
-    }
-
-    /// The data as JSON without any `<`, so that it may stand in a page's script element.
-    #[must_use]
-    pub fn json(&self) -> &str {
-        &self.json
-    }
-
-    /// How near any two were over time.
-    #[must_use]
-    pub fn chart(&self) -> &Chart {
-        &self.chart
-    }
-
-    /// Most that a drawn coordinate is off from what was recorded \[m\].
-    #[must_use]
-    pub fn rounding_m(&self) -> f64 {
-        self.rounding_m
-    }
-
-    /// Instants that are kept, and samples that there were.
-    #[must_use]
-    pub fn instants(&self) -> [usize; 2] {
-        self.instants
-    }
-
-    /// Vehicles that are drawn, and all that are ever there.
-    #[must_use]
-    pub fn vehicles(&self) -> [usize; 2] {
-        self.vehicles
-    }
-
-    /// Findings that are there to jump to, and all.
-    #[must_use]
-    pub fn moments(&self) -> [usize; 2] {
-        self.moments
-    }
-
-    /// Whether vehicles are drawn at rest between two instants.
-    #[must_use]
-    pub fn holds(&self) -> bool {
-        self.holds
-    }
-
-    /// Findings of which the very instant is not drawn, or not all of whom they are on.
-    #[must_use]
-    pub fn inexact(&self) -> usize {
-        self.inexact
-    }
-
-    /// How many vehicles have no known radius, where there are any, and what they are drawn with \[m\].
-    #[must_use]
-    pub fn unknown_radius(&self) -> Option<(usize, f64)> {
-        self.unknown_radius
-    }
-
-    /// Most that a moving obstacle is drawn off its way \[m\].
-    #[must_use]
-    pub fn obstacles_off_m(&self) -> f64 {
-        self.obstacles_off_m
     }
 }
 

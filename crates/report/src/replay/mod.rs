@@ -20,7 +20,6 @@ mod visible;
 pub use chart::Chart;
 pub use data::{Judged, Replay};
 pub use decimate::{MOST_INSTANTS, Span, chosen};
-pub use motion::Motion;
 pub use stage::Stage;
 pub use visible::MOST_VEHICLES;
 

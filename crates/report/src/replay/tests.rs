@@ -56,8 +56,8 @@ fn violation(vehicle: usize, from_s: f64, to_s: f64) -> Moment {
 
 fn packed(stage: &Stage, log: &FlightLog, moments: &[Moment], room_bytes: usize) -> (Replay, Value) {
     let replay = Replay::new(stage, log, moments, JUDGED, room_bytes).expect("a replay");
-    assert!(replay.json().len() <= room_bytes, "{} of {room_bytes} bytes", replay.json().len());
-    let data = serde_json::from_str(replay.json()).expect("JSON");
+    assert!(replay.json.len() <= room_bytes, "{} of {room_bytes} bytes", replay.json.len());
+    let data = serde_json::from_str(&replay.json).expect("JSON");
     (replay, data)
 }
 
@@ -69,7 +69,7 @@ fn doubles(data: &Value) -> Vec<f64> {
 #[test]
 fn a_short_flight_is_there_whole() {
     let (replay, data) = packed(&stage(3), &log(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES);
-    assert_eq!((replay.instants(), replay.vehicles(), replay.moments()), ([100, 100], [3, 3], [1, 1]));
+    assert_eq!((replay.instants, replay.vehicles, replay.moments), ([100, 100], [3, 3], [1, 1]));
     let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
     assert_eq!(doubles(&data["times_s"]), times);
     // The first slice is the first instant alone.
@@ -85,9 +85,9 @@ fn a_short_flight_is_there_whole() {
             (&Value::from(false), "1 violation so far")
         ]
     );
-    assert_eq!((replay.inexact(), replay.unknown_radius(), replay.obstacles_off_m()), (0, None, 0.0));
+    assert_eq!((replay.inexact, replay.unknown_radius, replay.obstacles_off_m), (0, None, 0.0));
     assert_eq!(data["moments"][0]["who"], serde_json::json!([2]));
-    assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m()) && replay.rounding_m() < 1e-5);
+    assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m) && replay.rounding_m < 1e-5);
     assert_eq!(packed(&stage(3), &log(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES).0, replay, "the same bytes");
 }
 
@@ -96,7 +96,7 @@ fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
     let log = log(5, 40_000);
     for room_bytes in [PAGE_BYTES, 60_000, 30_000] {
         let (replay, data) = packed(&stage(5), &log, &[violation(3, 1234.5, 1236.0)], room_bytes);
-        let [kept, samples] = replay.instants();
+        let [kept, samples] = replay.instants;
         assert!(samples == 40_000 && kept <= MOST_INSTANTS && kept > 150, "{kept} in {room_bytes}");
         let times = doubles(&data["times_s"]);
         let all_s = log.keyframes().iter().map(|keyframe| keyframe.time_s);
@@ -112,7 +112,7 @@ fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
 fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
     let vehicles = 100_000;
     let (replay, data) = packed(&stage(vehicles), &log(vehicles, 3), &[violation(77_777, 0.1, 0.1)], PAGE_BYTES);
-    assert_eq!(replay.vehicles(), [MOST_VEHICLES, vehicles]);
+    assert_eq!(replay.vehicles, [MOST_VEHICLES, vehicles]);
     let names = data["vehicles"].as_array().expect("names");
     let at = names.iter().position(|name| name == "77778").expect("the one that violated");
     assert_eq!(data["moments"][0]["who"], serde_json::json!([at]));
@@ -123,7 +123,7 @@ fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
 #[test]
 fn one_vehicle_one_sample_and_nobody() {
     let (replay, data) = packed(&stage(1), &log(1, 1), &[], PAGE_BYTES);
-    assert_eq!((replay.instants(), doubles(&data["near_s"]).len()), ([1, 1], 0));
+    assert_eq!((replay.instants, doubles(&data["near_s"]).len()), ([1, 1], 0));
     assert_eq!(Replay::new(&stage(2), &FlightLog::default(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
     let nowhere = FlightLog::recorded(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Slices::default(), 1);
     assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
@@ -158,7 +158,7 @@ fn foreign_text_neither_ends_the_script_nor_fills_the_page() {
     let said = "</SCRIPT>".repeat(100_000);
     let moment = Moment { said, ..violation(0, 0.0, 0.1) };
     let (replay, data) = packed(&hostile, &log(2, 10), &[moment], PAGE_BYTES);
-    assert!(!replay.json().contains('<') && replay.json().len() < 20_000);
+    assert!(!replay.json.contains('<') && replay.json.len() < 20_000);
     assert_eq!(data["vehicles"][0], "</script><script>alert(1)</script>");
     assert_eq!(data["vehicles"][1].as_str().map(|name| name.chars().count()), Some(41));
 }
@@ -238,18 +238,18 @@ fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
     let (replay, data) = packed(&stage(vehicles), &log, &moments, PAGE_BYTES);
     let times = doubles(&data["times_s"]);
     let missing = moments.iter().filter(|of| !times.contains(&of.span.at_s.max(0.0))).count();
-    assert_eq!((missing, replay.inexact()), (0, 0), "{:?} and {:?}", replay.instants(), replay.vehicles());
+    assert_eq!((missing, replay.inexact), (0, 0), "{:?} and {:?}", replay.instants, replay.vehicles);
     // Those that are not listed have theirs as long as there is room, and where there is none it is said.
     let at = |k: u32| 0.2 * f64::from(k);
     let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
     let longer = self::log(2, 4000);
     let (replay, data) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
-    assert_eq!((replay.moments(), replay.inexact()), ([200, 300], 0), "{:?}", replay.instants());
+    assert_eq!((replay.moments, replay.inexact), ([200, 300], 0), "{:?}", replay.instants);
     let alarms = data["verdicts"].as_array().expect("verdicts").iter().filter(|told| told[1] == true);
     let named: Vec<_> = alarms.map(|told| told[3].as_array().map_or(0, Vec::len)).collect();
     assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "those that are not listed are said with who they are");
     let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
-    assert!(replay.inexact() > 0, "{:?}", replay.instants());
+    assert!(replay.inexact > 0, "{:?}", replay.instants);
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn of_those_that_were_not_asked_for_nobody_is_drawn() {
     }
     let log = FlightLog::recorded(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
     let (replay, data) = packed(&stage(5000), &log, &[], PAGE_BYTES);
-    assert_eq!((replay.vehicles(), &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
+    assert_eq!((replay.vehicles, &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
 }
 
 #[test]
@@ -270,8 +270,8 @@ fn far_from_others_drawing_is_precise_where_the_weightiest_finding_is() {
     let (replay, data) = packed(&stage(3), &log, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
     let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(data[key].clone()).expect("numbers");
     assert_eq!(numbers("origin_m"), [5e5 + 0.35, 4e6, 0.0]);
-    assert!(replay.rounding_m() > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m());
-    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m() < 1e-3);
+    assert!(replay.rounding_m > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m);
+    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m < 1e-3);
 }
 
 #[test]
@@ -280,7 +280,7 @@ fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
     for (half_m, drawn_m) in [(0.025, 0.025), (1.0, 0.1)] {
         let (replay, data) = packed(&unknown(half_m), &two_instants(2), &[], PAGE_BYTES);
         assert_eq!(data["radius_m"], serde_json::json!([drawn_m, 0.3]));
-        assert_eq!(replay.unknown_radius(), Some((1, drawn_m)));
+        assert_eq!(replay.unknown_radius, Some((1, drawn_m)));
     }
 }
 

@@ -13,7 +13,7 @@ use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::vehicle::Airframe;
 
 /// Most violations, or hits of hulls, that are listed one by one.
-const LISTED: usize = 50;
+pub(super) const LISTED: usize = 50;
 
 /// Most bytes of a scenario on a page.
 const LONGEST_SCENARIO: usize = 100_000;
@@ -289,8 +289,8 @@ fn hits(bounces: &[Bounce]) -> Markup {
     }
 }
 
-/// How many of a list are not on the page.
-fn more(all: usize) -> Markup {
+/// The number of entries of a list that are not on the page.
+pub(super) fn more(all: usize) -> Markup {
     html! {
         @if let Some(more @ 1..) = all.checked_sub(LISTED) {
             p { (more) " more are in report.json." }

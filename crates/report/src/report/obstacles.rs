@@ -4,14 +4,12 @@ use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 
 use super::flight::{FlightResult, finite};
+use super::html::{LISTED, more};
 use super::page;
 use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
 use tautline_sim::sim::Ending;
-
-/// Violations that a page lists.
-const LISTED: usize = 50;
 
 /// The judge's findings on a flight past obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -171,9 +169,7 @@ impl Obstacles {
                         [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
                     }),
                 ))
-                @if let Some(more @ 1..) = self.violations.len().checked_sub(LISTED) {
-                    p { (more) " more are in report.json." }
-                }
+                (more(self.violations.len()))
             }
         }
     }
