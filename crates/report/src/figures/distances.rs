@@ -5,7 +5,7 @@ use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, Line, Mark};
 use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
-use crate::flight_log::{FEW_VEHICLES, FlightLog, pairs};
+use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
 use tautline_core::text::{at_least, counted};
 
@@ -104,8 +104,12 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
 
     // Between samples too, where the recording knows.
     let swept: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.closest?))).collect();
+    let nearest = |span: &Span<'_>| {
+        let (pair, separation_m) = nearest_present(span.positions_m, spans.log.metric())?;
+        Some(ClosestApproach { pair, separation_m, time_s: span.time_s })
+    };
     let closest: Vec<_> = if swept.is_empty() && ranked_pairs.len() == all {
-        instants.iter().filter_map(|span| Some((span.time_s, nearest(&scaled(span), span.time_s)?))).collect()
+        instants.iter().filter_map(|span| Some((span.time_s, nearest(span)?))).collect()
     } else {
         swept
     };
@@ -159,13 +163,6 @@ pub(super) fn quantile(numbers: &mut [f64], share: f64) -> f64 {
     *numbers.select_nth_unstable_by(place.min(last), f64::total_cmp).1
 }
 
-/// The closest pair at an instant.
-fn nearest(positions_m: &Rows, time_s: f64) -> Option<ClosestApproach> {
-    let apart = |(i, j)| ClosestApproach { pair: Pair::new(i, j), separation_m: separation(positions_m, i, j), time_s };
-    let finite = pairs(positions_m.nrows()).map(apart).filter(|closest| closest.separation_m.is_finite());
-    finite.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m))
-}
-
 /// The pairs that come closest, the closest first.
 fn closest_pairs(closest: &[(f64, ClosestApproach)], vehicles: usize) -> Vec<Pair> {
     let known = closest.iter().map(|(_, closest)| (closest.pair, closest.separation_m));
@@ -190,16 +187,6 @@ mod tests {
         assert_eq!([0.0, 0.05, 0.5, 1.0].map(|share| quantile(&mut numbers, share)), [0.0, 5.0, 50.0, 100.0]);
         assert_eq!(quantile(&mut [7.0], 0.95), 7.0);
         assert!(quantile(&mut [], 0.5).is_nan());
-    }
-
-    #[test]
-    fn the_nearest_pair_is_the_closest_one() {
-        let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 6.0, 0.0, 0.0]);
-        let closest = nearest(&positions_m, 3.0).unwrap();
-        assert_eq!((closest.pair, closest.separation_m), (Pair::new(1, 2), 1.0));
-        let ranked = quantiles_m(&positions_m, &ranked_pairs(3).0, &mut Vec::new());
-        assert_eq!(ranked[2], 5.0);
-        assert!(nearest(&Rows::zeros(1), 0.0).is_none());
     }
 
     #[test]

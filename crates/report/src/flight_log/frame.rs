@@ -84,7 +84,7 @@ impl FlightLog {
         let pair = match (around, before.closest) {
             (Some(around), _) if around.time_s == time_s => Some(around.pair),
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
-            _ => nearest_present(&positions_m, self.metric()),
+            _ => nearest_present(&positions_m, self.metric()).map(|(pair, _)| pair),
         };
         let worst = self.violations().of_vehicles().filter(|found| found.min_m.is_finite());
         let worst = worst.map(|v| ClosestApproach { pair: v.pair, separation_m: v.min_m, time_s: v.min_at_s });
@@ -157,10 +157,10 @@ pub(super) fn apart(positions_m: &Rows, pair: Pair, metric: Metric) -> Vector3<f
     metric.scaled(row(positions_m, pair.second()) - row(positions_m, pair.first()))
 }
 
-/// The nearest two of the vehicles that are there.
-fn nearest_present(positions_m: &Rows, metric: Metric) -> Option<Pair> {
+/// Returns the nearest two of the vehicles that are there and their distance \[m\], scaled.
+pub(crate) fn nearest_present(positions_m: &Rows, metric: Metric) -> Option<(Pair, f64)> {
     let is_there = |i: &usize| row(positions_m, *i).iter().all(|x| x.is_finite());
     let there: Vec<usize> = (0..positions_m.nrows()).filter(is_there).collect();
-    let (pair, _) = closest_pair(&metric.scaled_rows(&positions_m.select_rows(&there)))?;
-    Some(Pair::new(there[pair.first()], there[pair.second()]))
+    let (pair, distance_m) = closest_pair(&metric.scaled_rows(&positions_m.select_rows(&there)))?;
+    Some((Pair::new(there[pair.first()], there[pair.second()]), distance_m))
 }

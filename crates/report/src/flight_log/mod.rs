@@ -14,6 +14,7 @@ pub use violations::Violations;
 use std::collections::BTreeMap;
 
 use frame::apart;
+pub(crate) use frame::nearest_present;
 use tautline_audit::{Approach, ObjectPair, Slice, Slices};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Bounce, ClosestApproach, Rows, row, separation};

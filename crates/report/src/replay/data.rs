@@ -7,8 +7,8 @@ use super::chart::Chart;
 use super::decimate::{MOST_INSTANTS, Span, around_worst, chosen};
 use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
-use super::said::{self, Said, Words};
 use super::stage::Extent;
+use super::statements::{self, Statement, Words};
 use super::targets::{self, Targets};
 use super::visible::{breaks, place_of_weightiest, present, shown};
 use super::{
@@ -95,7 +95,7 @@ struct Data<'a> {
     near_s: String,
     near_who: String,
     /// What is said from when on \[s\]: of the nearest so far, and of the verdict.
-    nearest: Vec<Said>,
+    nearest: Vec<Statement>,
     verdicts: Vec<Verdict>,
     /// In order of time.
     moments: Vec<MomentData<'a>>,
@@ -161,7 +161,7 @@ impl Replay {
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let (nearest, holds) = (log.nearest(), log.holds);
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
-        let [near_s, near_who] = said::pairs(&near, end_s, place);
+        let [near_s, near_who] = statements::pairs(&near, end_s, place);
         let extent = Extent::of(stage, log, &shown);
         let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
@@ -171,7 +171,7 @@ impl Replay {
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, has_gaps, name };
-        let things = things(stage, &extent, listed, room_bytes);
+        let things = obstacle_meshes(stage, &extent, listed, room_bytes);
         let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {
             version: VERSION,
@@ -195,7 +195,7 @@ impl Replay {
             breaks: String::new(),
             near_s,
             near_who,
-            nearest: said::so_far(&nearest, &words, most_said[0]),
+            nearest: statements::so_far(&nearest, &words, most_said[0]),
             verdicts: verdicts(&moments, judged.is_else_known, begin_s, most_said[1], &place),
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
@@ -291,13 +291,13 @@ fn verdicts(
     most: usize,
     place: &impl Fn(usize) -> Option<usize>,
 ) -> Vec<Verdict> {
-    let told = said::over_time(moments, is_else_known, begin_s, most).into_iter();
-    let with_unlisted = |(from_s, alarm, said, of): said::Told| {
+    let all = statements::over_time(moments, is_else_known, begin_s, most).into_iter();
+    let with_unlisted = |(from_s, alarm, said, of): statements::VerdictStatement| {
         let unlisted = of.filter(|&k| k >= MOST_MOMENTS).map(|k| moments[k].data(place));
         let thing = unlisted.as_ref().and_then(|of| of.thing);
         (from_s, alarm, said, unlisted.map_or_else(Vec::new, |of| of.who), thing)
     };
-    told.map(with_unlisted).collect()
+    all.map(with_unlisted).collect()
 }
 
 fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
@@ -307,7 +307,7 @@ fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
 }
 
 /// Obstacles, with where they were at the moments that they have a part in.
-fn things(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
+fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
     let most = (room_bytes / 4 / POINT_BYTES / stage.obstacles.len().max(1)).clamp(4, MOST_POINTS);
     let thing = |(k, obstacle): (usize, &Obstacle)| {
         let own = moments.iter().filter(|moment| moment.obstacle == Some(k));

@@ -12,8 +12,8 @@ mod data;
 mod decimate;
 mod motion;
 mod obstacle_meshes;
-mod said;
 mod stage;
+mod statements;
 mod targets;
 mod visible;
 

@@ -1,4 +1,4 @@
-//! What a replay says in the course of a flight: the nearest so far, and the verdict.
+//! Statements of a replay in the course of a flight: on the nearest pair so far, and on the verdict.
 
 use std::collections::BTreeSet;
 
@@ -8,11 +8,11 @@ use tautline_core::text::{at_least, at_most, seconds};
 
 /// Decimals of a distance.
 const DECIMALS: u8 = 3;
-/// Stands for nobody, or for one who is not drawn.
-const NOBODY: u16 = u16::MAX;
+/// Place of a vehicle that is not drawn.
+const NOT_DRAWN: u16 = u16::MAX;
 
-/// What is said from a time \[s\] on.
-pub(super) type Said = (f64, String);
+/// A statement on the nearest pair and the time from which on it holds \[s\].
+pub(super) type Statement = (f64, String);
 
 /// How it is said.
 pub(super) struct Words<'a, N> {
@@ -26,7 +26,11 @@ pub(super) struct Words<'a, N> {
 
 /// What is said of the nearest so far, no more than so often (at least twice), of as many slices as leave room for that. In a slice
 /// in which it came to less, that is what it was at most.
-pub(super) fn so_far<N: Fn(usize) -> Option<String>>(slices: &Slices, words: &Words<'_, N>, most: usize) -> Vec<Said> {
+pub(super) fn so_far<N: Fn(usize) -> Option<String>>(
+    slices: &Slices,
+    words: &Words<'_, N>,
+    most: usize,
+) -> Vec<Statement> {
     let mut finest = slices.clone().finish(usize::MAX);
     let mut said = words.over(&finest);
     while said.len() > most && finest.len() > 1 {
@@ -37,8 +41,8 @@ pub(super) fn so_far<N: Fn(usize) -> Option<String>>(slices: &Slices, words: &Wo
 }
 
 impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
-    fn over(&self, slices: &[Slice]) -> Vec<Said> {
-        let mut said: Vec<Said> = Vec::new();
+    fn over(&self, slices: &[Slice]) -> Vec<Statement> {
+        let mut said: Vec<Statement> = Vec::new();
         let mut say = |from_s: f64, words: String| match said.last_mut() {
             Some(last) if last.0 == from_s => last.1 = words,
             _ => said.push((from_s, words)),
@@ -81,21 +85,21 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
     }
 }
 
-/// From when \[s\] on which two are the nearest, as doubles and as two 16-bit places each; 65535 is nobody.
+/// From when \[s\] on which two are the nearest, as doubles and as two 16-bit places each; 65535 is a vehicle that is not drawn.
 pub(super) fn pairs(slices: &[Slice], end_s: f64, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
-    let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOBODY);
+    let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);
     let pairs = slices.iter().zip(begins).flat_map(|(slice, next_s)| {
-        let two = slice.closest.pair.vehicles().map_or([NOBODY; 2], |two| [place(two.first()), place(two.second())]);
-        let nobody = (slice.to_s < next_s && slice.to_s < end_s).then_some((slice.to_s.next_up(), [NOBODY; 2]));
-        [Some((slice.from_s, two)), nobody].into_iter().flatten()
+        let two = slice.closest.pair.vehicles().map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
+        let none = (slice.to_s < next_s && slice.to_s < end_s).then_some((slice.to_s.next_up(), [NOT_DRAWN; 2]));
+        [Some((slice.from_s, two)), none].into_iter().flatten()
     });
     let (from_s, who): (Vec<_>, Vec<_>) = pairs.unzip();
     [doubles(from_s.into_iter()), base64_of(who.iter().flatten().flat_map(|at| at.to_le_bytes()))]
 }
 
 /// From when on \[s\], whether there is a violation, what is said, and the place of the violation under way that it is said of.
-pub(super) type Told = (f64, bool, String, Option<usize>);
+pub(super) type VerdictStatement = (f64, bool, String, Option<usize>);
 
 /// What is under way, by place in the list of moments, and what has begun.
 #[derive(Default)]
@@ -108,7 +112,7 @@ struct State<'a> {
 }
 
 /// What is said from the beginning on, no more than so often (at least once), of moments of which the weightiest come first.
-pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, most: usize) -> Vec<Told> {
+pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, most: usize) -> Vec<VerdictStatement> {
     // When each begins, and from when on it is over.
     let mut events: Vec<(f64, bool, usize)> = Vec::new();
     for (k, of) in moments.iter().enumerate().filter(|(_, of)| of.kind != Kind::Closest) {
@@ -117,9 +121,9 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
     events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
     let mut state = State { moments, is_else_known, ..State::default() };
     let mut groups: Vec<_> = events.chunk_by(|a, b| a.0 == b.0).collect();
-    let mut told = Vec::new();
+    let mut statements = Vec::new();
     if groups.first().is_none_or(|first| first[0].0 > begin_s) {
-        told.push((begin_s, false, state.said(), None));
+        statements.push((begin_s, false, state.said(), None));
     }
     let together = groups.len().div_ceil(most.max(1)).max(1);
     while !groups.is_empty() {
@@ -130,14 +134,14 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
         for group in &groups[1..] {
             state.take(group, &mut seen);
         }
-        told.push(match end_s.filter(|_| together > 1) {
+        statements.push(match end_s.filter(|_| together > 1) {
             Some(end_s) => state.said_of_several(&seen, from_s, end_s),
             None if together > 1 => state.said_of_several(&seen, from_s, f64::INFINITY),
             None => (from_s, !state.violations.is_empty(), state.said(), state.violations.first().copied()),
         });
         groups = rest;
     }
-    told
+    statements
 }
 
 impl State<'_> {
@@ -174,7 +178,12 @@ impl State<'_> {
     }
 
     /// Of a time in which more changes than can be said one by one.
-    fn said_of_several(&self, [violations, undecided]: &[BTreeSet<usize>; 2], from_s: f64, to_s: f64) -> Told {
+    fn said_of_several(
+        &self,
+        [violations, undecided]: &[BTreeSet<usize>; 2],
+        from_s: f64,
+        to_s: f64,
+    ) -> VerdictStatement {
         let to = if to_s.is_finite() { format!(" to {}", seconds(to_s)) } else { " on".to_owned() };
         let around = format!("from {}{to}", seconds(from_s));
         match (self.first_of(violations), self.first_of(undecided)) {
@@ -247,8 +256,8 @@ mod tests {
         Moment { kind, vehicles: vec![0], obstacle: None, span, brief: brief.to_owned(), said: String::new() }
     }
 
-    fn said(told: &[Told], time_s: f64) -> (bool, &str) {
-        let (_, alarm, said, _) = &told[told.partition_point(|told| told.0 <= time_s) - 1];
+    fn said(statements: &[VerdictStatement], time_s: f64) -> (bool, &str) {
+        let (_, alarm, said, _) = &statements[statements.partition_point(|statements| statements.0 <= time_s) - 1];
         (*alarm, said)
     }
 
@@ -256,39 +265,42 @@ mod tests {
     fn a_violation_is_said_while_it_lasts_and_counted_after_it() {
         let deep = moment(Kind::Violation, 3.0, 5.0, "a and b");
         let moments = [deep, moment(Kind::Violation, 4.0, 4.0, "c and d"), moment(Kind::Closest, 4.0, 4.0, "e")];
-        let told = over_time(&moments, true, 0.0, 100);
-        assert_eq!(said(&told, 2.9), (false, "no violation so far"));
-        assert_eq!(said(&told, 3.0), (true, "violation: a and b"));
-        assert_eq!(said(&told, 4.0), (true, "violation: a and b, and 1 more"));
-        assert_eq!(said(&told, 5.0), (true, "violation: a and b"));
-        assert_eq!(said(&told, 5.1), (false, "2 violations so far"));
-        assert_eq!(told.iter().map(|told| told.3).collect::<Vec<_>>(), [None, Some(0), Some(0), Some(0), None]);
+        let statements = over_time(&moments, true, 0.0, 100);
+        assert_eq!(said(&statements, 2.9), (false, "no violation so far"));
+        assert_eq!(said(&statements, 3.0), (true, "violation: a and b"));
+        assert_eq!(said(&statements, 4.0), (true, "violation: a and b, and 1 more"));
+        assert_eq!(said(&statements, 5.0), (true, "violation: a and b"));
+        assert_eq!(said(&statements, 5.1), (false, "2 violations so far"));
+        assert_eq!(
+            statements.iter().map(|statements| statements.3).collect::<Vec<_>>(),
+            [None, Some(0), Some(0), Some(0), None]
+        );
         assert_eq!(over_time(&[], true, 1.0, 100), [(1.0, false, "no violation so far".to_owned(), None)]);
     }
 
     #[test]
     fn what_is_not_known_is_said_and_never_that_there_was_no_violation() {
         let moments = [moment(Kind::Violation, 14.0, 15.0, "a and c"), moment(Kind::Unseen, 3.0, 8.0, "b is not seen")];
-        let told = over_time(&moments, true, 0.0, 100);
-        assert_eq!(said(&told, 2.9), (false, "no violation so far"));
-        assert_eq!(said(&told, 5.0), (false, "undecided: b is not seen"));
-        assert_eq!(said(&told, 10.0), (false, "undecided so far"));
-        assert_eq!(said(&told, 14.5), (true, "violation: a and c"));
-        assert_eq!(said(&told, 16.0), (false, "1 violation so far, not all is known"));
+        let statements = over_time(&moments, true, 0.0, 100);
+        assert_eq!(said(&statements, 2.9), (false, "no violation so far"));
+        assert_eq!(said(&statements, 5.0), (false, "undecided: b is not seen"));
+        assert_eq!(said(&statements, 10.0), (false, "undecided so far"));
+        assert_eq!(said(&statements, 14.5), (true, "violation: a and c"));
+        assert_eq!(said(&statements, 16.0), (false, "1 violation so far, not all is known"));
         assert_eq!(said(&over_time(&moments[..1], false, 0.0, 100), 0.0), (false, "undecided so far"));
         let last = moment(Kind::Undecided, 20.0, 21.0, "too near?");
-        let told = over_time(&[moments[0].clone(), last], true, 0.0, 100);
-        assert_eq!(said(&told, 20.5), (false, "1 violation so far; undecided: too near?"));
+        let statements = over_time(&[moments[0].clone(), last], true, 0.0, 100);
+        assert_eq!(said(&statements, 20.5), (false, "1 violation so far; undecided: too near?"));
     }
 
     #[test]
     fn of_more_than_there_is_room_for_no_time_is_said_to_be_free_of_one_that_has_it() {
         let moments: Vec<_> =
             (0..1000).map(f64::from).map(|k| moment(Kind::Violation, 2.0 * k, 2.0 * k + 0.5, "a and b")).collect();
-        let told = over_time(&moments, true, 0.0, 50);
-        assert!(told.len() <= 51, "{}", told.len());
-        let alarmed = moments.iter().filter(|of| said(&told, of.span.at_s).0).count();
+        let statements = over_time(&moments, true, 0.0, 50);
+        assert!(statements.len() <= 51, "{}", statements.len());
+        let alarmed = moments.iter().filter(|of| said(&statements, of.span.at_s).0).count();
         assert_eq!(alarmed, 1000);
-        assert!(said(&told, 0.1).1.starts_with("violation from 0.00 s to "), "{told:?}");
+        assert!(said(&statements, 0.1).1.starts_with("violation from 0.00 s to "), "{statements:?}");
     }
 }
