@@ -5,7 +5,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
+use tautline::flight_log::FlightLog;
 use tautline::render::scene::Extent;
 use tautline::render::{AdapterChoice, Film, FilmFormat, Renderer, Scene, Timeline, View};
 use tautline::scenario::{Override, Scenario, Source};
@@ -18,8 +20,9 @@ const SPEED: f64 = 6.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let shorter = Override::parse("time.duration_s=60")?;
     let scenario = Scenario::read(&Source::resolve("circle")?, &[shorter])?;
-    let mut timeline = Timeline::of(&scenario);
-    sim::fly(&scenario, Parts::of(&scenario)?, &mut timeline, &mut |_step| ControlFlow::Continue(()))?;
+    let mut log = FlightLog::of(&scenario);
+    sim::fly(&scenario, Parts::of(&scenario)?, &mut log, &mut |_step| ControlFlow::Continue(()))?;
+    let timeline = Timeline::flown(&scenario, Arc::new(log));
 
     let path = Path::new("circle.gif");
     let view = View { size_px: [960, 540], ..View::default() };

@@ -410,7 +410,7 @@ impl FlightLog {
         let mut dropped: Option<Keyframe> = None;
         for mut keyframe in self.keyframes.split_off(from) {
             if let Some(dropped) = dropped.take() {
-                keyframe.absorb(dropped);
+                keyframe.absorb(&dropped);
             }
             if keyframe.number + 1 == self.samples || self.stays(&keyframe) {
                 self.keyframes.push(keyframe);
@@ -439,7 +439,7 @@ impl Sink for FlightLog {
 
 impl Keyframe {
     /// Takes over the extremes of an earlier keyframe.
-    fn absorb(&mut self, earlier: Self) {
+    fn absorb(&mut self, earlier: &Self) {
         self.closest = closer(earlier.closest, self.closest);
         self.extremes.absorb(&earlier.extremes);
     }
@@ -447,7 +447,7 @@ impl Keyframe {
     /// Memory \[bytes\].
     fn bytes(&self) -> usize {
         let Extremes { control_m_s2, series, pair_min_m, .. } = &self.extremes;
-        let numbers = self.positions_m.len() + self.control_m_s2.as_ref().map_or(0, |control| control.len());
+        let numbers = self.positions_m.len() + self.control_m_s2.as_ref().map_or(0, Rows::len);
         let numbers = numbers + control_m_s2.len() + pair_min_m.len() + series.iter().map(Vec::len).sum::<usize>();
         size_of::<Self>() + size_of_val(&*self.attitudes) + numbers * size_of::<f64>()
     }

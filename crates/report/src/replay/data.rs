@@ -16,7 +16,7 @@ use super::{
 };
 use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
-use tautline_core::swarm::row;
+use tautline_core::swarm::{Rows, row};
 
 /// Most findings.
 const MOST_MOMENTS: usize = 200;
@@ -150,14 +150,12 @@ impl Replay {
     ) -> Result<Self, NoReplay> {
         let present = present(stage, log)?;
         let [begin_s, end_s] = log.range_s();
-        let keyframes = log.keyframes();
-        let times_s: Vec<_> = keyframes.iter().map(|keyframe| keyframe.time_s).collect();
+        let times_s: Vec<_> = log.keyframes().iter().map(|keyframe| keyframe.time_s).collect();
         let moments: Vec<_> = moments.iter().map(|moment| moment.within(begin_s, end_s)).collect();
         let listed = &moments[..moments.len().min(MOST_MOMENTS)];
         let shown = shown(&times_s, &present, listed, room_bytes);
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
-        let mut plan = stage.plan.clone();
-        plan.iter_mut().for_each(|plan| log.targets().iter().for_each(|event| plan.note(event)));
+        let plan = stage.plan_of(log);
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let (nearest, holds) = (log.nearest(), log.holds);
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
@@ -212,13 +210,7 @@ impl Replay {
         }
         let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
         let kept = chosen(&times_s, &spans, most.min(MOST_INSTANTS));
-        let place_at = |&k: &usize| {
-            let (time_s, positions_m) = (keyframes[k].time_s, &keyframes[k].positions_m);
-            let there = |at: Vector3<f64>| at.iter().all(|x| x.is_finite()).then_some(at);
-            let vehicles = shown.iter().map(|&vehicle| there(row(positions_m, vehicle)));
-            vehicles.chain(guides.at(plan.as_ref(), time_s, positions_m)).collect::<Vec<_>>()
-        };
-        let mut instants: Vec<_> = kept.iter().map(place_at).collect();
+        let mut instants = instants(log, &kept, &shown, |time_s, at_m| guides.at(plan.as_ref(), time_s, at_m));
         let kept_s: Vec<_> = kept.iter().map(|&k| times_s[k]).collect();
         let mut breaks = breaks(log, &kept_s, place);
         for [instant, vehicle] in breaks.split_off(breaks.len().min(most_breaks)) {
@@ -315,6 +307,22 @@ fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_byte
         Thing::of(obstacle, extent, &times_s, most)
     };
     stage.obstacles.iter().enumerate().map(thing).collect()
+}
+
+/// Places of the vehicles that are drawn, and of guides, at the instants that are kept \[m\]; none where one is not there.
+fn instants<G: IntoIterator<Item = Option<Vector3<f64>>>>(
+    log: &FlightLog,
+    kept: &[usize],
+    shown: &[usize],
+    guides: impl Fn(f64, &Rows) -> G,
+) -> Vec<Vec<Option<Vector3<f64>>>> {
+    let there = |at: Vector3<f64>| at.iter().all(|x| x.is_finite()).then_some(at);
+    let instant = |&k: &usize| {
+        let keyframe = &log.keyframes()[k];
+        let vehicles = shown.iter().map(|&vehicle| there(row(&keyframe.positions_m, vehicle)));
+        vehicles.chain(guides(keyframe.time_s, &keyframe.positions_m)).collect()
+    };
+    kept.iter().map(instant).collect()
 }
 
 /// Whether the instant at which a span is at its worst is kept, or the two samples on either side.

@@ -28,6 +28,13 @@ pub struct Stage {
 const UNKNOWN_RADIUS_M: f64 = 0.1;
 
 impl Stage {
+    /// Formations and graph, with the changes of the target during the flight.
+    pub(super) fn plan_of(&self, log: &FlightLog) -> Option<Plan> {
+        let mut plan = self.plan.clone()?;
+        log.targets().iter().for_each(|event| plan.note(event));
+        Some(plan)
+    }
+
     /// What a vehicle of unknown radius is drawn with \[m\]: two that keep their distance do not touch.
     pub(super) fn unknown_radius_m(&self) -> f64 {
         self.shell_m.into_iter().flatten().fold(UNKNOWN_RADIUS_M, f64::min)

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::flight::{FailedVehicle, FlightResult, Report};
 use super::legs;
+use super::obstacles::Obstacles;
 use tautline_audit::Status;
 use tautline_core::record::EnergyRise;
 use tautline_core::text::{counted, metres, metres_below, seconds};
@@ -30,7 +31,7 @@ impl Verdict {
             refused(result),
             violation(result),
             unresolved_by_step(result),
-            report.obstacles.as_ref().and_then(|obstacles| obstacles.reason()),
+            report.obstacles.as_ref().and_then(Obstacles::reason),
             report.hulls.reason(),
             disagreement(result),
             undecided(result),
