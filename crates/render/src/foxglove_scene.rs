@@ -88,15 +88,15 @@ impl FoxgloveScene {
         let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
         let attitudes = if count <= MOST_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
         let attitude = |k: usize| attitudes.get(k).copied().flatten();
-        let fliers = (0..count).filter_map(|k| {
+        let quadrotors = (0..count).filter_map(|k| {
             let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
             Some(quadrotor(&shape, row(positions_m, k), attitude(k)?, hull_colour(k)))
         });
-        let fliers: Vec<_> = fliers.collect();
+        let quadrotors: Vec<_> = quadrotors.collect();
         let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
         let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
-        let bodies = fliers.iter().map(|flier| flier.body);
-        let rotors = fliers.iter().flat_map(|flier| flier.rotors);
+        let bodies = quadrotors.iter().map(|quadrotor| quadrotor.body);
+        let rotors = quadrotors.iter().flat_map(|quadrotor| quadrotor.rotors);
         let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
@@ -133,7 +133,7 @@ impl FoxgloveScene {
                 lines: Some(lines)
                     .filter(|lines| !lines.points.is_empty())
                     .into_iter()
-                    .chain(fliers.iter().map(|flier| flier.arms.clone()))
+                    .chain(quadrotors.iter().map(|quadrotor| quadrotor.arms.clone()))
                     .collect(),
                 ..SceneEntity::default()
             }],

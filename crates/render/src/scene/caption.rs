@@ -1,4 +1,4 @@
-//! Words about what is seen: caption, verdict, legend, numbers of the vehicles, the closest pair.
+//! Words of a picture: caption, verdict, legend, names of the vehicles, distances of pairs.
 
 use super::camera::Projected;
 use super::colour::Colour;
@@ -87,7 +87,7 @@ impl SceneBuilder<'_> {
         self.alarm(labels, &texts)
     }
 
-    /// The same where nobody is too near to another vehicle, and somebody to an obstacle.
+    /// The banner of a vehicle too near to an obstacle, where no two vehicles are too close.
     fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
         let Some(&[vehicle, obstacle]) = self.too_near.first() else { return self.margin() };
         let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
@@ -118,7 +118,7 @@ impl SceneBuilder<'_> {
         bottom + 0.6 * self.margin()
     }
 
-    /// What can be said up to now, in a few words and in fewer.
+    /// The verdict up to now, from the longest wording to the shortest.
     fn verdict(&self) -> (Vec<String>, Colour) {
         let (theme, now_s) = (self.view.theme, self.frame.time_s);
         if let Some(why) = self.timeline.unjudged() {
@@ -241,7 +241,7 @@ impl SceneBuilder<'_> {
 
     /// Keeps words off the vehicles that have names.
     pub(super) fn keep_off_vehicles(&self, labels: &mut LabelLayout) {
-        for (k, at) in self.named() {
+        for (k, at) in self.labelled_vehicles() {
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
@@ -272,24 +272,24 @@ impl SceneBuilder<'_> {
     }
 
     /// The vehicles that have names, with where they are: all of few, else those of the worst violations.
-    fn named(&self) -> impl Iterator<Item = (usize, Projected)> {
-        let mut named: Vec<usize> = Vec::new();
+    fn labelled_vehicles(&self) -> impl Iterator<Item = (usize, Projected)> {
+        let mut labelled: Vec<usize> = Vec::new();
         if self.timeline.count() <= NAMED {
-            named.extend(0..self.timeline.count());
+            labelled.extend(0..self.timeline.count());
         } else {
             for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
-                if named.len() < NAMED && !named.contains(&k) {
-                    named.push(k);
+                if labelled.len() < NAMED && !labelled.contains(&k) {
+                    labelled.push(k);
                 }
             }
         }
-        named.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
+        labelled.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
     }
 
     /// The names of the vehicles, on those that are large enough and beside the others.
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
-        for (k, at) in self.named() {
+        for (k, at) in self.labelled_vehicles() {
             // One that is too close to another is often behind it.
             let is_hidden = self.is_hidden(k, at);
             if is_hidden && !self.alarmed[k] {
@@ -339,7 +339,7 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// A length to the millimetre, rounded down: what is said to be clear is clear.
+/// A length to the millimetre, rounded down, so that no distance is shown larger than it is.
 pub(crate) fn metres(length_m: f64) -> String {
     format!("{} m", at_least(length_m, 3))
 }

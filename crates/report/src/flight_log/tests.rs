@@ -231,3 +231,26 @@ fn violations_of_vehicles_that_the_flight_does_not_have_are_passed_over() {
     assert_eq!((log.closest(), log.violations().all().len()), (None, 0));
     assert!(log.at(0.0).expect("a frame").nearest.is_none());
 }
+
+#[test]
+fn a_violation_that_never_ends_leaves_memory_bounded() {
+    let mut log = FlightLog::new(Metric::default(), 1.0).within(100_000);
+    log.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 0.0 });
+    (0..10_000_u32).for_each(|k| sample(&mut log, f64::from(k), 0.5, 0.5));
+    let keyframes = log.keyframes();
+    assert!(keyframes.len() * keyframes[0].bytes() <= 100_000 && log.range_s() == [0.0, 9999.0], "{}", keyframes.len());
+}
+
+#[test]
+fn the_conclusion_of_the_judge_replaces_the_closest_approach_within_rounding() {
+    let mut log = log(100, |k| if k == 50 { 1.5 } else { 3.0 });
+    let less_m = 1.5_f64.next_down();
+    log.conclude(less_m, 0.25);
+    log.conclude(1.4, 0.5);
+    log.conclude(f64::NAN, 0.5);
+    assert_eq!(log.closest(), Some(approach(1.5, 0.5)), "another time, another distance, no number");
+    log.conclude(less_m, 0.5);
+    assert_eq!(log.closest(), Some(approach(less_m, 0.5)));
+    let frame = log.at(0.5).expect("a frame");
+    assert_eq!(frame.distance_m(Pair::new(0, 1)), less_m);
+}
