@@ -45,7 +45,7 @@ fn benchmarks(criterion: &mut Criterion) {
     for count in [10, 200, 1_000, 10_000] {
         let timeline = timeline(count);
         let extent = Extent::of(&timeline);
-        let frame = timeline.at(15.0).expect("a frame");
+        let frame = timeline.log.at(15.0).expect("a frame");
         let list_of = |view: &View| {
             let camera = extent.camera(&timeline, &frame, view).expect("a camera");
             Scene::compose(&timeline, &extent, &frame, view, camera)
@@ -53,7 +53,7 @@ fn benchmarks(criterion: &mut Criterion) {
         let list = || list_of(&view);
         let near = View { camera: CameraSpec::Closest, ..View::default() };
         criterion.bench_with_input(BenchmarkId::new("frame", count), &timeline, |bencher, timeline| {
-            bencher.iter(|| timeline.at(black_box(15.03)));
+            bencher.iter(|| timeline.log.at(black_box(15.03)));
         });
         criterion.bench_function(&format!("draw list/{count}"), |bencher| {
             bencher.iter(|| black_box(list()));

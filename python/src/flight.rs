@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyArray3};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
-use tautline::figures::RunHistory;
+use tautline::flight_log::FlightLog;
 use tautline::mcap::{Header, McapRecorder};
 use tautline::preflight::Preflight;
 use tautline::record::{Event, RecordError, Sample, Sink};
-use tautline::replay::Film;
 use tautline::report::Report;
 use tautline::request::{OwnRecording, flight_page, run_audit};
 use tautline::run::run_with;
@@ -101,7 +100,7 @@ impl Flown {
 #[derive(Default)]
 struct Beside {
     recording: Option<McapRecorder>,
-    page: Option<(RunHistory, Film)>,
+    page: Option<FlightLog>,
 }
 
 impl Sink for Beside {
@@ -115,14 +114,8 @@ impl Sink for Beside {
         self.page.as_mut().map_or(Ok(()), |page| page.event(event))
     }
 
-    fn step(&mut self, step: &tautline::record::Step<'_>) {
-        if let Some(page) = &mut self.page {
-            page.step(step);
-        }
-    }
-
     fn looks_at_steps(&self) -> bool {
-        self.page.as_ref().is_some_and(Sink::looks_at_steps)
+        false
     }
 }
 
@@ -156,7 +149,7 @@ pub(crate) fn fly(
             let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
             McapRecorder::create(path, &header)
         });
-        let page = html.is_some().then(|| (RunHistory::new().scaled_by(scenario.metric()), Film::new()));
+        let page = html.is_some().then(|| FlightLog::of(scenario));
         let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
@@ -167,7 +160,7 @@ pub(crate) fn fly(
         });
         let (report, ending) = flown?;
         closed?;
-        let page = page.map(|seen| flight_page(scenario, &preflight, &seen, &report, command));
+        let page = page.map(|log| flight_page(scenario, &preflight, log, &report, command));
         Ok((report, ending, samples, page))
     };
     let (flown, raised) = here(py, || catching(flight))?;

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::console::{Console, Terminal};
 use super::reading::{ReadArguments, one_of};
-use super::{Exit, console, events, reading, summary};
+use super::{Exit, audit_formats, console, reading};
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
 use tautline_recordings::read::Format;
@@ -64,7 +64,7 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
         }
     }
     if !is_one {
-        monitor.say(&summary::counts(&judged, failures.len()));
+        monitor.say(&audit_formats::counts(&judged, failures.len()));
     }
     answer(arguments, &judged, &failures, is_one)?;
     let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
@@ -86,19 +86,19 @@ fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, i
         }
     }
     if let Some(Annotations::Github) = arguments.annotations {
-        let lines = summary::github(judged, failures);
+        let lines = audit_formats::github(judged, failures);
         if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
     }
     if let Some(file) = &arguments.events {
-        write_atomically(file, &events::csv(judged, !is_one)?)?;
+        write_atomically(file, &audit_formats::csv(judged, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
-        write_atomically(file, events::junit(judged, failures)?.as_bytes())?;
+        write_atomically(file, audit_formats::junit(judged, failures)?.as_bytes())?;
     }
     if let Some(file) = &arguments.summary {
         // Pages of jobs are written by one step after another.
         let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
-        write_atomically(file, &[before, summary::markdown(judged, failures).into_bytes()].concat())?;
+        write_atomically(file, &[before, audit_formats::markdown(judged, failures).into_bytes()].concat())?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::sync::Once;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use super::Exit;
-use super::{attack, audit, campaign, check, compare, completions, export, list, margin, run, schema, validate};
+use super::{attack, audit, campaign, check, compare, export, list, margin, run, validate};
 #[cfg(feature = "viewer")]
 use super::{render, view};
 use tautline_recordings::read;
@@ -56,7 +56,7 @@ pub(super) enum Command {
     /// Print the JSON Schema of the scenario file.
     Schema,
     /// Print a completion script for a shell.
-    Completions(completions::CompletionsArguments),
+    Completions(list::CompletionsArguments),
 }
 
 /// Keeps the panic hook from speaking of what becomes an error anyway.
@@ -93,8 +93,8 @@ pub(super) fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
         #[cfg(feature = "viewer")]
         Command::View(arguments) => view::view(&arguments),
         Command::List(arguments) => list::list(&arguments),
-        Command::Schema => schema::schema(),
-        Command::Completions(arguments) => completions::completions(&arguments, &mut Arguments::command()),
+        Command::Schema => list::schema(),
+        Command::Completions(arguments) => list::completions(&arguments, &mut Arguments::command()),
     }
 }
 

@@ -56,14 +56,15 @@ pub(super) fn timeline(
         }
         _ => of_others(recording, reading, delta_m)?,
     };
-    if timeline.keyframes().is_empty() {
+    if timeline.log.keyframes().is_empty() {
         return Err(RenderError::Empty(recording.display().to_string()).into());
     }
     for note in &timeline.notes {
         console.warn(&format!("note: {note}"));
     }
-    if timeline.every() > 1 {
-        console.warn(&format!("the recording is long: pictures are drawn from one in {} samples", timeline.every()));
+    if timeline.log.every() > 1 {
+        console
+            .warn(&format!("the recording is long: pictures are drawn from one in {} samples", timeline.log.every()));
     }
     Ok(timeline)
 }

@@ -1,13 +1,15 @@
-//! `tautline list`: the built-in scenarios, and the one of a recording.
+//! Commands that print a part of the program: `list` (built-in scenarios), `schema` (of the scenario file) and
+//! `completions` (of a shell).
 
 use std::path::Path;
 
 use clap::Args;
+use clap_complete::Shell;
 
 use super::{Exit, console};
 use tautline_recordings::mcap::McapRecording;
 use tautline_report::request::Failure;
-use tautline_sim::scenario::builtin;
+use tautline_sim::scenario::{self, builtin};
 
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]
@@ -52,4 +54,24 @@ fn table() -> String {
     let width = builtin::all().iter().map(|builtin| builtin.name.len()).max().unwrap_or(0);
     let lines: Vec<_> = builtin::all().iter().map(|b| format!("{:width$}  {}\n", b.name, b.summary)).collect();
     lines.concat()
+}
+
+/// Prints the JSON Schema of the scenario file.
+pub(super) fn schema() -> Result<Exit, Failure> {
+    console::json(&scenario::schema())?;
+    Ok(Exit::Good)
+}
+
+/// Arguments of `tautline completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArguments {
+    /// The shell.
+    shell: Shell,
+}
+
+pub(super) fn completions(arguments: &CompletionsArguments, program: &mut clap::Command) -> Result<Exit, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, program, env!("CARGO_PKG_NAME"), &mut script);
+    console::data(&String::from_utf8_lossy(&script))?;
+    Ok(Exit::Good)
 }

@@ -5,18 +5,17 @@
 
 mod attack;
 mod audit;
+mod audit_formats;
 mod campaign;
 mod check;
 mod command;
 mod compare;
-mod completions;
 mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 mod driver;
-mod events;
 mod export;
 mod list;
 mod margin;
@@ -26,8 +25,6 @@ mod reading;
 mod render;
 mod run;
 mod scenario;
-mod schema;
-mod summary;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;

@@ -132,7 +132,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;
     let extent = Extent::of(&timeline);
-    let start = timeline.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+    let start = timeline.log.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
     extent.camera(&timeline, &start, &view)?;
     // Targets are tried before the work.
     if !stills.is_empty() || sheet.is_some() {
@@ -211,7 +211,7 @@ impl Batch<'_> {
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
-        let frame = self.timeline.at(time_s).ok_or_else(|| RenderError::Empty(self.timeline.name.clone()))?;
+        let frame = self.timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(self.timeline.name.clone()))?;
         let camera = self.extent.camera(self.timeline, &frame, &self.view)?;
         let picture = self.renderer.paint(&Scene::compose(self.timeline, &self.extent, &frame, &self.view, camera))?;
         self.progress.inc(1);
@@ -233,12 +233,12 @@ fn writable(folder: &Path) -> Result<(), Failure> {
 
 /// The pictures asked for, each with its file.
 fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Result<Vec<Still>, Failure> {
-    let [start_s, end_s] = timeline.range_s();
+    let [start_s, end_s] = timeline.log.range_s();
     let nothing_else = arguments.every.is_none() && arguments.film.is_none() && arguments.sheet.is_none();
     let mut wanted: Vec<&str> = arguments.at.iter().map(|text| text.trim()).collect();
     if wanted.is_empty() && nothing_else {
         // One vehicle alone has no closest approach.
-        wanted = if timeline.closest().is_some() { vec!["start", "closest", "end"] } else { vec!["start", "end"] };
+        wanted = if timeline.log.closest().is_some() { vec!["start", "closest", "end"] } else { vec!["start", "end"] };
     }
     let mut stills = Vec::new();
     for text in wanted {
@@ -248,6 +248,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             "closest" => {
                 let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
                 let closest = timeline
+                    .log
                     .closest()
                     .ok_or_else(|| Failure::input("render/no-closest", none, "leave `closest` out of --at"))?;
                 (closest.time_s, "closest".to_owned())
@@ -283,7 +284,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
 
 /// Times from the start of a flight to its end, so far apart \[s\].
 fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = timeline.range_s();
+    let [start_s, end_s] = timeline.log.range_s();
     positive(apart_s, option)?;
     let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
     if count > MOST_PICTURES {
@@ -307,7 +308,7 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
 }
 
 fn film_times(fps: u32, speed: Option<f64>, timeline: &Timeline) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = timeline.range_s();
+    let [start_s, end_s] = timeline.log.range_s();
     let fps = f64::from(fps.max(1));
     let speed = match speed {
         Some(speed) => positive(speed, "--speed")?,
@@ -331,7 +332,7 @@ fn sheet_plan(
             "give fewer pictures with --sheet, or a larger --size",
         ));
     }
-    let [start_s, end_s] = timeline.range_s();
+    let [start_s, end_s] = timeline.log.range_s();
     let last = (u64::from(columns) * u64::from(rows) - 1).max(1) as f64;
     if last > MOST_PICTURES {
         return Err(Failure::input(

@@ -52,32 +52,21 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format);
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
+    let no_effect =
+        |what: &str, help: &str| Err(Failure::input("usage/no-effect", format!("{what} has no effect on it"), help));
     let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
-            let help = "leave --set out, or give a scenario";
-            return Err(Failure::input(
-                "usage/no-effect",
-                "a recording has been flown: --set has no effect on it",
-                help,
-            ));
+            return no_effect("a recording has been flown: --set", "leave --set out, or give a scenario");
         }
         (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
             let help = "leave --delta out, or give --set with the scenario's own key";
-            return Err(Failure::input(
-                "usage/no-effect",
-                "a scenario says itself what it is judged by: --delta has no effect on it",
-                help,
-            ));
+            return no_effect("a scenario has its own safety distance: --delta", help);
         }
         if reading != ReadOptions::default() {
             let help = "leave the options of reading out, or give a recording";
-            return Err(Failure::input(
-                "usage/no-effect",
-                "a scenario is flown: how a recording is read has no effect on it",
-                help,
-            ));
+            return no_effect("a scenario is flown: the way in which a recording is read", help);
         }
         let scenario = ScenarioRequest::named(&path.to_string_lossy(), &arguments.overrides)?.read()?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))

@@ -1,6 +1,7 @@
 //! Figures of what else is known of each vehicle: attitude, rotors, wind, age of messages.
 
-use tautline::figures::{self, Criteria, Figure, RunHistory};
+use tautline::figures::{self, Criteria, Figure};
+use tautline::flight_log::FlightLog;
 use tautline::record::{Channel, Sample};
 use tautline::swarm::{Rows, Swarm};
 
@@ -31,11 +32,11 @@ fn channels(count: usize, scale: f64) -> [Channel; 4] {
 
 /// Figures of `samples` samples 0.05 s apart; in sample `k` all numbers are those of `channels` times `scale(k)`.
 fn drawn(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> {
-    let mut history = RunHistory::new();
+    let mut history = FlightLog::default();
     let (swarm, control) = (Swarm::at_rest(Rows::from_fn(count, |i, axis| (3 * i + axis) as f64)), Rows::zeros(count));
     for k in 0..samples {
         let channels = channels(count, scale(k));
-        history.observe(&Sample { channels: &channels, ..Sample::new(0.05 * k as f64, k, &swarm, &control) });
+        history.take(&Sample { channels: &channels, ..Sample::new(0.05 * k as f64, k, &swarm, &control) });
     }
     let criteria = Criteria {
         delta_m: 1.0,
@@ -91,10 +92,10 @@ fn the_figures_of_a_large_swarm_are_bounded() {
 
 #[test]
 fn a_channel_of_other_columns_or_of_other_vehicles_has_no_figure() {
-    let mut history = RunHistory::new();
+    let mut history = FlightLog::default();
     let (swarm, control) = (Swarm::at_rest(Rows::zeros(2)), Rows::zeros(2));
     let euler = Channel { values: vec![0.0; 6], ..Channel::new("attitude", &["roll", "pitch", "yaw"]) };
     let [_, rotors, ..] = channels(3, 1.0);
-    history.observe(&Sample { channels: &[euler, rotors], ..Sample::new(0.0, 0, &swarm, &control) });
+    history.take(&Sample { channels: &[euler, rotors], ..Sample::new(0.0, 0, &swarm, &control) });
     assert!(figures::channels(&history, Some(MOST_N)).is_empty());
 }

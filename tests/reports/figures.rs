@@ -1,7 +1,8 @@
 //! Figures show what they claim: their SVG is read back and measured against its own axes.
 
 use roxmltree::{Document, Node};
-use tautline::figures::{self, Criteria, Figure, RunHistory};
+use tautline::figures::{self, Criteria, Figure};
+use tautline::flight_log::FlightLog;
 use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::EdgeTension;
@@ -127,14 +128,14 @@ fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sampl
     }
 }
 
-fn history(count: usize) -> RunHistory {
-    let mut history = RunHistory::new();
-    samples(count, 0.0, 2.75, &mut |sample| history.observe(sample));
+fn history(count: usize) -> FlightLog {
+    let mut history = FlightLog::default();
+    samples(count, 0.0, 2.75, &mut |sample| history.take(sample));
     history
 }
 
-fn all_of(history: &RunHistory, delta_m: f64) -> Vec<Figure> {
-    let (formation, graph) = (Formation::line(history.vehicles(), 4.0), Graph::complete(history.vehicles()));
+fn all_of(history: &FlightLog, delta_m: f64) -> Vec<Figure> {
+    let (formation, graph) = (Formation::line(history.count(), 4.0), Graph::complete(history.count()));
     let criteria = Criteria {
         delta_m,
         certified_m: Some(CERTIFIED_M),
@@ -248,14 +249,14 @@ fn width(words: &str) -> f64 {
 fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
     let mut most = 0.0_f64;
     for (offset, scale) in [(0.0, 1.0), (0.0, 1e3), (123_456.0, 1.0), (-1e6, 10.0), (0.0, 1e-3), (0.0, 1e7)] {
-        let mut history = RunHistory::new();
+        let mut history = FlightLog::default();
         samples(3, 0.0, 2.75, &mut |sample| {
             let mut swarm = sample.swarm.clone();
             swarm.positions_m = swarm.positions_m.map(|x| offset + scale * x);
             swarm.velocities_m_s *= scale;
             let (control, time_s) = (sample.control * scale, sample.time_s * scale);
             let energy = sample.energy.map(|energy| energy * scale);
-            history.observe(&Sample { swarm: &swarm, control: &control, time_s, energy, separation: None, ..*sample });
+            history.take(&Sample { swarm: &swarm, control: &control, time_s, energy, separation: None, ..*sample });
         });
         for figure in all_of(&history, DELTA_M * scale) {
             let drawing = Drawing::of(&figure);
@@ -288,16 +289,16 @@ fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
 fn a_run_has_the_figures_that_it_has_data_for() {
     let level = ["paths", "distances", "control", "energy", "shape-error", "disagreement"];
     assert_eq!(names(&all_of(&history(3), DELTA_M)), level);
-    let mut in_space = RunHistory::new();
-    samples(3, 0.3, 2.75, &mut |sample| in_space.observe(sample));
+    let mut in_space = FlightLog::default();
+    samples(3, 0.3, 2.75, &mut |sample| in_space.take(sample));
     let figures = all_of(&in_space, DELTA_M);
     assert_eq!(names(&figures)[..3], ["paths", "paths-3d", "distances"]);
     let words = Drawing::of(&figures[1]).words();
     for label in ["x [m]", "y [m]", "z [m]"] {
         assert!(words.iter().any(|word| word == label), "{label}: {words:?}");
     }
-    let mut without_energy = RunHistory::new();
-    samples(1, 0.0, 0.0, &mut |sample| without_energy.observe(&Sample { energy: None, ..*sample }));
+    let mut without_energy = FlightLog::default();
+    samples(1, 0.0, 0.0, &mut |sample| without_energy.take(&Sample { energy: None, ..*sample }));
     assert_eq!(names(&all_of(&without_energy, DELTA_M)), ["paths", "control", "shape-error", "disagreement"]);
     for figure in all_of(&in_space, DELTA_M) {
         assert!(figures::NAMES_OF_RUN.contains(&figure.name.as_str()), "{}", figure.name);
@@ -319,13 +320,13 @@ fn of_a_large_swarm_bands_and_the_closest_pairs_are_drawn() {
 
 #[test]
 fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
-    let mut history = RunHistory::new();
+    let mut history = FlightLog::default();
     let (count, control) = (5000, Rows::from_element(5000, 1.0));
     for k in 0..300_u32 {
         // Every vehicle goes its own crooked way.
         let place = |i: usize, axis: usize| (i * (axis + 1)) as f64 + 50.0 * f64::from(k * k) * (i as f64 + 1.0).sin();
         let swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| place(i, axis).sin() * 100.0));
-        history.observe(&Sample {
+        history.take(&Sample {
             separation: Some(ClosestApproach { pair: Pair::new(4321, 4999), separation_m: 1.0, time_s: 7.0 }),
             energy: Some(f64::from(k % 7)),
             ..Sample::new(f64::from(k), u64::from(k), &swarm, &control)
@@ -351,27 +352,28 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
 
 #[test]
 fn nothing_in_a_recording_makes_a_figure_fail_or_hold_a_number_that_is_none() {
-    let mut histories = vec![("without samples", RunHistory::new())];
-    let mut one = RunHistory::new();
+    let mut histories = vec![("without samples", FlightLog::default())];
+    let mut one = FlightLog::default();
     let mut first = true;
     samples(3, 0.0, 2.75, &mut |sample| {
         if std::mem::take(&mut first) {
-            one.observe(sample);
+            one.take(sample);
         }
     });
     histories.push(("of one sample", one));
     for (name, number) in [("NaN", f64::NAN), ("infinite", f64::INFINITY), ("huge", 1e300), ("tiny", 1e-300)] {
         for count in [1, 3, 20] {
-            let (mut energy, mut state, mut control) = (RunHistory::new(), RunHistory::new(), RunHistory::new());
+            let (mut energy, mut state, mut control) =
+                (FlightLog::default(), FlightLog::default(), FlightLog::default());
             samples(count, 0.1, 2.75, &mut |sample| {
-                energy.observe(&Sample { energy: Some(number), ..*sample });
+                energy.take(&Sample { energy: Some(number), ..*sample });
                 let mut swarm = sample.swarm.clone();
                 swarm.positions_m[(0, 1)] = number;
                 swarm.velocities_m_s[(0, 1)] = number;
                 let separation = sample.separation.map(|closest| ClosestApproach { separation_m: number, ..closest });
-                state.observe(&Sample { swarm: &swarm, separation, ..*sample });
+                state.take(&Sample { swarm: &swarm, separation, ..*sample });
                 let rows = Rows::from_element(count, number);
-                control.observe(&Sample { control: &rows, time_s: number, ..*sample });
+                control.take(&Sample { control: &rows, time_s: number, ..*sample });
             });
             histories.extend([(name, energy), (name, state), (name, control)]);
         }
@@ -399,7 +401,7 @@ fn a_recording_read_back_gives_the_same_bytes_as_the_run_that_was_watched() {
     let mut recorder = McapRecorder::create(&path, &Header::new("line", "", 3, DELTA_M)).expect("a recording");
     samples(3, 0.0, 2.75, &mut |sample| recorder.sample(sample).expect("recorded"));
     recorder.finish().expect("closed");
-    let read = RunHistory::read(McapRecording::open(&path).expect("opens")).expect("reads");
+    let read = FlightLog::read(McapRecording::open(&path).expect("opens")).expect("reads");
     assert_eq!(all_of(&read, DELTA_M), all_of(&history(3), DELTA_M));
 }
 

@@ -6,14 +6,15 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use tautline::figures::{self, RunHistory};
+use tautline::figures;
+use tautline::flight_log::FlightLog;
 use tautline::report::page::{self, Badge, Page, Picture, Render as _};
 
 const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=x onerror='y'>";
 
 fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
-    let figure = figures::paths(&RunHistory::new(), HOSTILE);
+    let figure = figures::paths(&FlightLog::default(), HOSTILE);
     let picture = Picture { description: text(), data_uri: text() };
     let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
     let content = [

@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 
 use tautline::audit::Status;
-use tautline::figures::{Criteria, RunHistory, of_run};
+use tautline::figures::{Criteria, of_run};
+use tautline::flight_log::FlightLog;
 use tautline::mcap::{Header, McapRecorder};
 use tautline::preflight::Preflight;
 use tautline::run::run_while;
@@ -36,7 +37,8 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
         let preflight = Preflight::of(&scenario).expect("a law");
         let path = folder.path().join(name);
         let header = Header::new(name, "", scenario.count(), scenario.delta_m);
-        let (mut recorder, mut history) = (McapRecorder::create(&path, &header).expect("created"), RunHistory::new());
+        let (mut recorder, mut history) =
+            (McapRecorder::create(&path, &header).expect("created"), FlightLog::default());
         let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
         let fly = || {
             let sink = &mut (&mut recorder, &mut history);

@@ -273,7 +273,7 @@ fn first_vehicle(recording: &Path, size_px: [u32; 2]) -> [u32; 2] {
     let timeline = Timeline::read_mcap(recording).expect("a recording");
     let extent = Extent::of(&timeline);
     let (orbit, target_m) = extent.orbit(size_px);
-    let frame = timeline.at(f64::INFINITY).expect("a frame");
+    let frame = timeline.log.at(f64::INFINITY).expect("a frame");
     let place = frame.positions_m.row(0).transpose().fixed_rows::<3>(0) - extent.origin_m();
     let at = Camera::orbiting(orbit, target_m, size_px).project(place).expect("before the camera");
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the picture")]

@@ -1,24 +1,24 @@
 //! A run as a 3-D scene that Foxglove shows without a plug-in.
 
-use std::collections::BTreeSet;
 use std::io;
 
 use foxglove::messages::line_primitive::Type as LineType;
 use foxglove::messages::{
-    CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, SceneEntity, SceneUpdate, SpherePrimitive, Timestamp,
-    Vector3,
+    Color, CubePrimitive, CylinderPrimitive, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate,
+    SpherePrimitive, Timestamp, Vector3,
 };
 use foxglove::{Encode as _, Schema};
 use nalgebra::UnitQuaternion;
 
-use super::foxglove_parts::{ball, colour, pose, quadrotor, turned};
 use super::scene::{Colour, Theme};
-use super::timeline::{QuadrotorShape, attitudes_of};
+use super::timeline::QuadrotorShape;
+use tautline_audit::ObjectPair;
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{Pair, Rows, row, separation};
 use tautline_laws::graph::Graph;
 use tautline_laws::space::{Obstacle, Shape};
 use tautline_recordings::mcap::{ExtraTopic, Topic};
+use tautline_report::flight_log::{Violations, attitudes_of};
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
@@ -54,8 +54,7 @@ pub struct FoxgloveScene {
     shell_ratio: f64,
     next_s: f64,
     schema: Option<Schema>,
-    /// Pairs that are closer than delta, by the judge of the flight.
-    violated: BTreeSet<Pair>,
+    violations: Violations,
 }
 
 impl FoxgloveScene {
@@ -70,7 +69,7 @@ impl FoxgloveScene {
             shell_ratio: scenario.metric().ratio(),
             next_s: f64::NEG_INFINITY,
             schema: SceneUpdate::get_schema(),
-            violated: BTreeSet::new(),
+            violations: Violations::default(),
         }
     }
 
@@ -79,7 +78,8 @@ impl FoxgloveScene {
         let (time_s, positions_m) = (sample.time_s, &sample.swarm.positions_m);
         let count = positions_m.nrows();
         let mut alarm = vec![false; count];
-        for pair in self.violated.iter().filter(|pair| pair.second() < count) {
+        let too_close = self.violations.open().filter_map(ObjectPair::vehicles);
+        for pair in too_close.filter(|pair| pair.second() < count) {
             (alarm[pair.first()], alarm[pair.second()]) = (true, true);
         }
         // The share of the vehicles up to this one passes a whole number at those that are chosen.
@@ -88,15 +88,15 @@ impl FoxgloveScene {
         let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
         let attitudes = if count <= MOST_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
         let attitude = |k: usize| attitudes.get(k).copied().flatten();
-        let fliers = (0..count).filter_map(|k| {
+        let quadrotors = (0..count).filter_map(|k| {
             let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
             Some(quadrotor(&shape, row(positions_m, k), attitude(k)?, hull_colour(k)))
         });
-        let fliers: Vec<_> = fliers.collect();
+        let quadrotors: Vec<_> = quadrotors.collect();
         let hulls = (0..count).filter(is_shown).filter(|&k| attitude(k).is_none());
         let hulls = hulls.map(|k| sphere(positions_m, k, self.radius_m[k], hull_colour(k)));
-        let bodies = fliers.iter().map(|flier| flier.body);
-        let rotors = fliers.iter().flat_map(|flier| flier.rotors);
+        let bodies = quadrotors.iter().map(|quadrotor| quadrotor.body);
+        let rotors = quadrotors.iter().flat_map(|quadrotor| quadrotor.rotors);
         let solids = self.plan.obstacles.iter().filter_map(|obstacle| match obstacle.shape {
             Shape::Ball { radius_m } => Some(ball(obstacle.place_m, radius_m, theme.obstacle())),
             _ => None,
@@ -133,7 +133,7 @@ impl FoxgloveScene {
                 lines: Some(lines)
                     .filter(|lines| !lines.points.is_empty())
                     .into_iter()
-                    .chain(fliers.iter().map(|flier| flier.arms.clone()))
+                    .chain(quadrotors.iter().map(|quadrotor| quadrotor.arms.clone()))
                     .collect(),
                 ..SceneEntity::default()
             }],
@@ -163,11 +163,7 @@ impl ExtraTopic for FoxgloveScene {
 
     fn note(&mut self, event: &Event) {
         self.plan.note(event);
-        match *event {
-            Event::ViolationBegan { pair, .. } => _ = self.violated.insert(pair),
-            Event::ViolationEnded { pair, .. } => _ = self.violated.remove(&pair),
-            _ => {}
-        }
+        self.violations.note(event, self.delta_m, self.radius_m.len());
     }
 }
 
@@ -215,6 +211,79 @@ fn timestamp(time_s: f64) -> Timestamp {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the casts saturate")]
     let (seconds, nanoseconds) = (time_s.floor() as u32, ((time_s - time_s.floor()) * 1e9) as u32);
     Timestamp::new_checked(seconds, nanoseconds).unwrap_or(Timestamp::MAX)
+}
+
+/// In units of the arm: radius of the body, width of an arm, how far ahead its mark reaches, height of a rotor.
+const BODY: f64 = 0.3;
+const ARM: f64 = 0.11;
+const AHEAD: f64 = 0.72;
+const ROTOR: f64 = 0.04;
+/// Opacity of a rotor.
+const OPACITY: f32 = 0.5;
+
+/// A quadrotor: its body, its rotors, and its arms with a mark ahead, all turned as it is.
+struct QuadrotorParts {
+    body: SpherePrimitive,
+    rotors: [CylinderPrimitive; 4],
+    arms: LinePrimitive,
+}
+
+/// The parts of a quadrotor at a place \[m\].
+fn quadrotor(
+    shape: &QuadrotorShape,
+    place_m: nalgebra::Vector3<f64>,
+    attitude: UnitQuaternion<f64>,
+    shown: Colour,
+) -> QuadrotorParts {
+    let (arm_m, side) = (shape.arm_m(), 2.0 * shape.rotor_radius_m);
+    let rotors = shape.rotors_m.map(|rotor_m| CylinderPrimitive {
+        pose: Some(turned(place_m + attitude * rotor_m, attitude)),
+        size: Some(Vector3 { x: side, y: side, z: ROTOR * arm_m }),
+        bottom_scale: 1.0,
+        top_scale: 1.0,
+        color: Some(colour(shown.at(OPACITY))),
+    });
+    let ahead_m = nalgebra::Vector3::x() * (AHEAD * arm_m);
+    let ends = shape.rotors_m.into_iter().chain([ahead_m]);
+    let arms = LinePrimitive {
+        r#type: LineType::LineList.into(),
+        pose: Some(turned(place_m, attitude)),
+        thickness: ARM * arm_m,
+        points: ends.flat_map(|end| [Point3::default(), Point3 { x: end.x, y: end.y, z: end.z }]).collect(),
+        color: Some(colour(shown)),
+        ..LinePrimitive::default()
+    };
+    QuadrotorParts { body: ball(place_m, BODY * arm_m, shown), rotors, arms }
+}
+
+/// Moved to a place and turned.
+fn turned(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
+    let [x, y, z, w] = turn.coords.into();
+    Pose {
+        position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
+        orientation: Some(Quaternion { x, y, z, w }),
+    }
+}
+
+/// A ball of a radius \[m\].
+fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePrimitive {
+    let side = 2.0 * radius_m;
+    SpherePrimitive {
+        pose: Some(pose(Vector3 { x: place.x, y: place.y, z: place.z })),
+        size: Some(Vector3 { x: side, y: side, z: side }),
+        color: Some(colour(shown)),
+    }
+}
+
+/// Moved to a place and not turned.
+fn pose(position: Vector3) -> Pose {
+    Pose { position: Some(position), orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }) }
+}
+
+/// The colour as Foxglove has it.
+fn colour(colour: Colour) -> Color {
+    let [r, g, b, a] = colour.rgba.map(|channel| f64::from(channel) / 255.0);
+    Color { r, g, b, a }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Pictures, films and a window of a flight.
 //!
-//! [`Timeline`] is a recorded flight in memory, [`scene`] makes a draw list of any time of it, [`gpu`] draws that list
+//! [`Timeline`] is a flight with its log, [`scene`] makes a draw list of any time of it, [`gpu`] draws that list
 //! without a screen into a [`Picture`], and [`Film`] strings pictures together. Only [`gpu`] and the window know of wgpu.
 //!
 //! ```no_run
@@ -10,7 +10,7 @@
 //!
 //! let timeline = Timeline::read_mcap(Path::new("out/pentagon/run.mcap"))?;
 //! let mut renderer = Renderer::open(&AdapterChoice::Best)?;
-//! let picture = renderer.shoot(&timeline, timeline.range_s()[1], &View::default())?;
+//! let picture = renderer.shoot(&timeline, timeline.log.range_s()[1], &View::default())?;
 //! std::fs::write("end.png", picture.to_png()?)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -19,13 +19,11 @@
 
 mod error;
 mod film;
-mod foxglove_parts;
 mod foxglove_scene;
 pub mod gpu;
 mod picture;
 mod run_pictures;
 pub mod scene;
-mod snapshots;
 mod timeline;
 #[cfg(feature = "window")]
 mod window;
@@ -35,10 +33,10 @@ pub use film::{Film, FilmFormat};
 pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, Renderer};
 pub use picture::{Picture, contact_sheet, data_uri};
-pub use run_pictures::RunPictures;
+pub use run_pictures::{RunPictures, Snapshot, snapshot_names, snapshots_of_run};
 pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
-pub use snapshots::{Snapshot, snapshot_names, snapshots_of_run};
+pub use tautline_report::flight_log::{FlightLog, Frame, Keyframe};
 pub use tautline_sim::plan::Plan;
-pub use timeline::{Frame, Keyframe, QuadrotorShape, Timeline, TooNear, TracksError};
+pub use timeline::{QuadrotorShape, Timeline, TracksError};
 #[cfg(feature = "window")]
 pub use window::{LiveUpdate, is_in_window_library, show};

@@ -1,19 +1,20 @@
-//! Pictures for the folder and the page of a run.
+//! The pictures that a run leaves in its folder and on its page.
 
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
+use crate::scene::metres;
 use crate::{
-    FoxgloveScene, Picture, RenderError, Renderer, Snapshot, Theme, Timeline, View, data_uri, snapshot_names,
-    snapshots_of_run,
+    CameraSpec, Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri,
 };
-use tautline_core::record::{Event, RecordError, Sample, Sink};
+use tautline_core::swarm::Pair;
 use tautline_recordings::mcap::ExtraTopic;
+use tautline_report::flight_log::{FlightLog, PICTURED};
 use tautline_report::report::page;
-use tautline_report::request::{Failure, FlightPictures, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
+use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_report::run::run_while;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
@@ -40,10 +41,44 @@ impl RunPictures {
     }
 }
 
+impl RunPictures {
+    fn snapshots(&self, scenario: &Scenario, log: &Arc<FlightLog>) -> Result<Vec<Snapshot>, RenderError> {
+        let timeline = Timeline::flown(scenario, Arc::clone(log));
+        if log.keyframes().is_empty() {
+            return Err(RenderError::Empty(timeline.name));
+        }
+        let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
+        snapshots_of_run(&mut renderer, &timeline, &View { theme: Theme::Light, ..View::default() })
+    }
+}
+
 impl Pictures for RunPictures {
-    fn observe(&self, scenario: &Scenario) -> Box<dyn FlightPictures> {
-        let timeline = self.takes_snapshots.then(|| Timeline::of(scenario));
-        Box::new(Observer { timeline, adapter: self.adapter.clone() })
+    /// Writes `snapshots/*.png`; those of an earlier run are removed.
+    fn draw(
+        &self,
+        scenario: &Scenario,
+        log: &Arc<FlightLog>,
+        folder: &Path,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<NamedPicture>, Failure> {
+        let snapshots = if self.takes_snapshots { self.snapshots(scenario, log) } else { Ok(Vec::new()) };
+        let snapshots = snapshots.unwrap_or_else(|error| {
+            monitor.warn(&format!("no pictures were taken: {}", Failure::from(error).in_words()));
+            Vec::new()
+        });
+        let file = |name: &str| format!("{name}.png");
+        let room = PICTURES_BYTES / snapshots.len().max(1);
+        let encoded: Vec<_> =
+            snapshots.par_iter().map(|snapshot| encoded(&snapshot.picture, room)).collect::<Result<_, _>>()?;
+        let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
+        let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
+            .map(|(Snapshot { name, description, .. }, [png, small])| {
+                let picture = page::Picture { description, data_uri: data_uri(&small) };
+                ((file(&name), png), (name.clone(), picture))
+            })
+            .unzip();
+        write_files(&folder.join("snapshots"), &names, &files)?;
+        Ok(on_page)
     }
 
     fn shot(&self, scenario: &Scenario, at_s: f64, room_bytes: usize) -> Result<String, Failure> {
@@ -66,68 +101,75 @@ impl Pictures for RunPictures {
 fn flown_to(scenario: &Scenario, time_s: f64) -> Result<Timeline, Failure> {
     let mut scenario = scenario.clone();
     scenario.time.record_hz = 1.0 / scenario.time.dt_s;
-    let mut timeline = Timeline::of(&scenario);
+    let mut log = FlightLog::of(&scenario);
     let mut carry_on = |step: u64| {
         if scenario.time.end_s(step) > time_s { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    run_while(&scenario, &Preflight::of(&scenario)?, &mut timeline, &mut carry_on)?;
-    Ok(timeline)
+    run_while(&scenario, &Preflight::of(&scenario)?, &mut log, &mut carry_on)?;
+    Ok(Timeline::flown(&scenario, Arc::new(log)))
 }
 
-/// A flight as it is observed to take pictures of it.
-struct Observer {
-    /// None where no pictures are wanted.
-    timeline: Option<Timeline>,
-    adapter: String,
+/// A picture with its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Name of its file without `.png`.
+    pub name: String,
+    /// What it shows, in a sentence.
+    pub description: String,
+    /// The picture.
+    pub picture: Picture,
 }
 
-impl Observer {
-    fn snapshots(&self) -> Result<Vec<Snapshot>, RenderError> {
-        let Some(timeline) = &self.timeline else { return Ok(Vec::new()) };
-        let view = View { theme: Theme::Light, ..View::default() };
-        if timeline.keyframes().is_empty() {
-            return Err(RenderError::Empty(timeline.name.clone()));
-        }
-        let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
-        snapshots_of_run(&mut renderer, timeline, &view)
-    }
+/// Names of all pictures that [`snapshots_of_run`] can take.
+#[must_use]
+pub fn snapshot_names() -> Vec<String> {
+    let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
+    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(violations).collect()
 }
 
-impl Sink for Observer {
-    fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.timeline.as_mut().map_or(Ok(()), |timeline| timeline.sample(sample))
+/// Pictures of the start, the closest approach, the end, the first violation of an obstacle's clearance and the first ten of two vehicles of a flight; none of a flight
+/// without samples.
+///
+/// # Errors
+/// [`RenderError`] when the adapter fails.
+pub fn snapshots_of_run(
+    renderer: &mut Renderer,
+    timeline: &Timeline,
+    view: &View,
+) -> Result<Vec<Snapshot>, RenderError> {
+    let extent = Extent::of(timeline);
+    let view = View { camera: CameraSpec::Iso, ..view.clone() };
+    let mut snapshots = Vec::new();
+    // The whole flight, or one pair from near.
+    let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
+        let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
+        let camera = match pair {
+            Some(pair) => extent.close_up(timeline, &frame, pair, view.size_px),
+            None => extent.camera(timeline, &frame, &view)?,
+        };
+        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, &view, camera))?;
+        snapshots.push(Snapshot { name: name.to_owned(), description, picture });
+        Ok::<(), RenderError>(())
+    };
+    let [start_s, end_s] = timeline.log.range_s();
+    shoot("start", format!("The start, at {start_s:.2} s."), start_s, None)?;
+    if let Some(closest) = timeline.log.closest() {
+        let (pair, time_s, apart) = (closest.pair, closest.time_s, metres(closest.separation_m));
+        let what = format!("The closest approach of the flight: vehicles {pair} at {time_s:.2} s, {apart} apart.");
+        shoot("closest", what, time_s, None)?;
     }
-
-    fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.timeline.as_mut().map_or(Ok(()), |timeline| timeline.event(event))
+    shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
+    if let Some((near, [vehicle, obstacle])) = timeline.log.violations().of_obstacles().next() {
+        let (vehicle, obstacle) = (&timeline.vehicles[vehicle], timeline.obstacle(obstacle));
+        let what = format!("Vehicle {vehicle} came too near to {obstacle} at {:.2} s.", near.from_s);
+        shoot("obstacle", what, f64::midpoint(near.from_s, near.to_s.min(end_s)), None)?;
     }
-
-    fn looks_at_steps(&self) -> bool {
-        false
+    for (k, span) in timeline.log.violations().of_vehicles().take(PICTURED).enumerate() {
+        let (pair, from_s, to_s) = (span.pair, span.from_s, span.to_s.min(end_s));
+        let what = format!("Vehicles {pair} were closer than delta from {from_s:.2} s to {to_s:.2} s.");
+        shoot(&format!("violation-{}", k + 1), what, span.min_at_s, Some(pair))?;
     }
-}
-
-impl FlightPictures for Observer {
-    /// Writes `snapshots/*.png`; those of an earlier run are removed.
-    fn write(&self, folder: &Path, monitor: &dyn Monitor) -> Result<Vec<NamedPicture>, Failure> {
-        let snapshots = self.snapshots().unwrap_or_else(|error| {
-            monitor.warn(&format!("no pictures were taken: {}", Failure::from(error).in_words()));
-            Vec::new()
-        });
-        let file = |name: &str| format!("{name}.png");
-        let room = PICTURES_BYTES / snapshots.len().max(1);
-        let encoded: Vec<_> =
-            snapshots.par_iter().map(|snapshot| encoded(&snapshot.picture, room)).collect::<Result<_, _>>()?;
-        let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
-        let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
-            .map(|(Snapshot { name, description, .. }, [png, small])| {
-                let picture = page::Picture { description, data_uri: data_uri(&small) };
-                ((file(&name), png), (name.clone(), picture))
-            })
-            .unzip();
-        write_files(&folder.join("snapshots"), &names, &files)?;
-        Ok(on_page)
-    }
+    Ok(snapshots)
 }
 
 /// A picture as PNG, and smaller where that takes more than its room on a page \[bytes\].

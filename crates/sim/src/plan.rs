@@ -46,11 +46,7 @@ impl Plan {
 
     /// Takes note of what happened.
     pub fn note(&mut self, event: &Event) {
-        match event {
-            &Event::LegBegan { leg, time_s } => self.course.begin(leg, time_s),
-            Event::Assigned { slots, time_s } => self.course.assign(slots, *time_s),
-            _ => {}
-        }
+        self.course.note(event);
     }
 
     /// The leg that is under way at a time \[s\], from 0, and how many there are.

@@ -5,7 +5,7 @@ use super::claim::{Judged, Progress, Untried, stated};
 use super::flights::{builtin, engine, separation_m};
 use tautline_audit::Status;
 use tautline_core::swarm::Pair;
-use tautline_report::figures::RunHistory;
+use tautline_report::flight_log::FlightLog;
 use tautline_sim::metrics::Metrics;
 use tautline_sim::sim::Flight;
 
@@ -21,7 +21,7 @@ const CIRCLE_MIN_M: f64 = 1.238_135;
 pub(super) struct Flown {
     pub(super) delta_m: f64,
     pub(super) flight: Flight,
-    pub(super) history: RunHistory,
+    pub(super) log: FlightLog,
     /// \[s\]; NaN where it never is.
     reached_at_s: f64,
 }
@@ -40,14 +40,14 @@ fn fly(name: &str, progress: &Progress<'_>) -> Result<Flown, Untried> {
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
         .free_by(freedom)
         .carried_by(scenario.reference.as_ref());
-    let mut history = RunHistory::new();
+    let mut log = FlightLog::of(&scenario);
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);
-        history.observe(sample);
+        log.take(sample);
     })?;
     progress(1);
     let reached_at_s = metrics.finish().reached_at_s.unwrap_or(f64::NAN);
-    Ok(Flown { delta_m: scenario.delta_m, reached_at_s, flight, history })
+    Ok(Flown { delta_m: scenario.delta_m, reached_at_s, flight, log })
 }
 
 /// Pairs in violation by the closed form, in index order.

@@ -96,7 +96,7 @@ pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<
     drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
     drawn.extend(of_flight(&flights.circle, ["figure-3a", "figure-3b", "figure-3c"], "Fig. 3", "circle"));
     let baseline = &flights.baseline;
-    let distances = figures::distances(&baseline.history, baseline.delta_m, None, "Fig. 4: pentagon without avoidance");
+    let distances = figures::distances(&baseline.log, baseline.delta_m, None, "Fig. 4: pentagon without avoidance");
     drawn.push(named("figure-4", distances));
     drawn.push(figures::convergence(&steps, "Rapier against continuous time"));
     Ok(drawn)
@@ -105,11 +105,11 @@ pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<
 /// Paths, control effort and distances.
 fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
     let [a, b, c] = names;
-    let (history, certified_m) = (&flown.history, flown.flight.certificate.certified_m);
+    let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
     [
-        named(a, figures::paths(history, &format!("{number}(a): {flight}, paths"))),
-        named(b, figures::control(history, &format!("{number}(b): {flight}, control effort"))),
-        named(c, figures::distances(history, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
+        named(a, figures::paths(log, &format!("{number}(a): {flight}, paths"))),
+        named(b, figures::control(log, &format!("{number}(b): {flight}, control effort"))),
+        named(c, figures::distances(log, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
     ]
 }
 

@@ -2,6 +2,7 @@
 
 use super::Leg;
 use crate::formation::Formation;
+use tautline_core::record::Event;
 
 /// Legs with the times at which they began and at which vehicles were assigned to their slots anew, as the flight tells.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +33,15 @@ impl Course {
         let mut legs = legs.clone();
         if assign_anew(&mut legs, leg, slots) {
             self.assigned.push((time_s, legs));
+        }
+    }
+
+    /// Takes an event: a leg that began, or an assignment.
+    pub fn note(&mut self, event: &Event) {
+        match event {
+            &Event::LegBegan { leg, time_s } => self.begin(leg, time_s),
+            Event::Assigned { slots, time_s } => self.assign(slots, *time_s),
+            _ => {}
         }
     }
 

@@ -5,7 +5,7 @@ use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
 use egui_wgpu::ScreenDescriptor;
 
 use super::adapter::Gpu;
-use super::target::{Target, WORDS_FORMAT};
+use super::{Target, WORDS_FORMAT};
 use crate::scene::{Annotation, Colour};
 
 /// Lays annotations over pictures.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use super::adapter::Gpu;
-use super::target::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
+use super::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
 use crate::scene::{Ball, Disc, Lens, Line, Scene};
 
 /// `Camera` in shaders/scene.wgsl: right, up, back, eye, lens and range.

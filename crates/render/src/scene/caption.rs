@@ -1,13 +1,13 @@
-//! Words about what is seen: caption, verdict, legend, numbers of the vehicles, the closest pair.
+//! Words of a picture: caption, verdict, legend, names of the vehicles, distances of pairs.
 
-use super::builder::SceneBuilder;
 use super::camera::Projected;
 use super::colour::Colour;
+use super::compose::SceneBuilder;
 use super::draw_list::{Annotation, pixels};
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use tautline_audit::Violation;
-use tautline_core::swarm::Pair;
+use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::at_least;
 use tautline_sim::plan::Plan;
 
@@ -65,11 +65,11 @@ impl SceneBuilder<'_> {
 
     /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(&(violation, drawn_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
-        let Violation { min_m, min_at_s, limit_m, .. } = *violation;
+        let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
+        let Violation { min_m, min_at_s, limit_m, .. } = violation;
         let (pair, limit) = (self.pair(violation.pair), metres(limit_m));
-        let apart = if drawn_m < limit_m {
-            format!("{} apart", metres(drawn_m))
+        let apart = if distance_m < limit_m {
+            format!("{} apart", metres(distance_m))
         } else if min_m < limit_m {
             format!("{} apart at {min_at_s:.2} s", metres(min_m))
         } else {
@@ -87,10 +87,10 @@ impl SceneBuilder<'_> {
         self.alarm(labels, &texts)
     }
 
-    /// The same where nobody is too near to another vehicle, and somebody to an obstacle.
+    /// The banner of a vehicle too near to an obstacle, where no two vehicles are too close.
     fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(near) = self.too_near.first() else { return self.margin() };
-        let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+        let Some(&[vehicle, obstacle]) = self.too_near.first() else { return self.margin() };
+        let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
         let more = match self.too_near.len() - 1 {
             0 => String::new(),
             more => format!(" and {more} more"),
@@ -118,7 +118,7 @@ impl SceneBuilder<'_> {
         bottom + 0.6 * self.margin()
     }
 
-    /// What can be said up to now, in a few words and in fewer.
+    /// The verdict up to now, from the longest wording to the shortest.
     fn verdict(&self) -> (Vec<String>, Colour) {
         let (theme, now_s) = (self.view.theme, self.frame.time_s);
         if let Some(why) = self.timeline.unjudged() {
@@ -127,10 +127,10 @@ impl SceneBuilder<'_> {
         let began: Vec<_> = self.timeline.begun(now_s).collect();
         let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
         if began.is_empty()
-            && let Some(near) = self.timeline.too_near_by(now_s).next()
+            && let Some((found, [vehicle, obstacle])) = self.timeline.too_near_by(now_s).next()
         {
-            let at = format!("violated at {:.2} s", near.from_s);
-            let (vehicle, obstacle) = (&self.timeline.vehicles[near.vehicle], self.timeline.obstacle(near.obstacle));
+            let at = format!("violated at {:.2} s", found.from_s);
+            let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
             let texts = vec![format!("{at} by {vehicle} near {obstacle}"), at, "violated".to_owned()];
             return (texts, theme.alarm());
         }
@@ -142,7 +142,7 @@ impl SceneBuilder<'_> {
             }
             (None, None) => (vec!["clear so far".to_owned()], theme.good()),
             (None, Some(from_s)) => {
-                let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.range_s()[0]));
+                let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.log.range_s()[0]));
                 (vec![since, "undecided".to_owned()], theme.soft_ink())
             }
             (Some(span), _) => {
@@ -151,7 +151,8 @@ impl SceneBuilder<'_> {
                     many => format!("{many} violations, the first at {:.2} s", span.from_s),
                 };
                 let mut texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
-                if let Some((hit_s, pair, closing_m_s)) = self.timeline.hit.filter(|&(hit_s, ..)| hit_s <= now_s) {
+                let hit = self.timeline.log.hits().0.first().filter(|hit| hit.time_s <= now_s);
+                if let Some(&Bounce { time_s: hit_s, pair, closing_m_s }) = hit {
                     let hit = format!("hulls of {} hit at {hit_s:.2} s, {closing_m_s:.2} m/s", self.pair(pair));
                     texts.splice(..0, [format!("{}; {hit}", texts[0]), hit, "violated, hulls hit".to_owned()]);
                 }
@@ -165,7 +166,7 @@ impl SceneBuilder<'_> {
         let Some(approach) = self.frame.so_far else { return Vec::new() };
         let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
         let at = format!("{:.2} s", approach.time_s);
-        let scaled = if self.timeline.metric.is_metres() { "" } else { ", scaled" };
+        let scaled = if self.timeline.log.metric().is_metres() { "" } else { ", scaled" };
         let delta = |delta_m| format!("  (delta {}{scaled})", metres(delta_m));
         let delta = self.timeline.delta_m.map_or(String::new(), delta);
         vec![
@@ -229,7 +230,7 @@ impl SceneBuilder<'_> {
             }
             x = write(labels, x + size_px, "reference");
         }
-        let is_ball = self.timeline.metric.is_metres();
+        let is_ball = self.timeline.log.metric().is_metres();
         let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
         if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
             labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
@@ -240,7 +241,7 @@ impl SceneBuilder<'_> {
 
     /// Keeps words off the vehicles that have names.
     pub(super) fn keep_off_vehicles(&self, labels: &mut LabelLayout) {
-        for (k, at) in self.named() {
+        for (k, at) in self.labelled_vehicles() {
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
@@ -251,7 +252,8 @@ impl SceneBuilder<'_> {
     pub(super) fn distances(&self, labels: &mut LabelLayout) {
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
-        let alarmed = self.violated.iter().take(LABELLED).map(|&(violation, drawn_m)| (violation.pair, drawn_m, true));
+        let alarmed =
+            self.violated.iter().take(LABELLED).map(|&(violation, distance_m)| (violation.pair, distance_m, true));
         let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
@@ -270,24 +272,24 @@ impl SceneBuilder<'_> {
     }
 
     /// The vehicles that have names, with where they are: all of few, else those of the worst violations.
-    fn named(&self) -> impl Iterator<Item = (usize, Projected)> {
-        let mut named: Vec<usize> = Vec::new();
+    fn labelled_vehicles(&self) -> impl Iterator<Item = (usize, Projected)> {
+        let mut labelled: Vec<usize> = Vec::new();
         if self.timeline.count() <= NAMED {
-            named.extend(0..self.timeline.count());
+            labelled.extend(0..self.timeline.count());
         } else {
             for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
-                if named.len() < NAMED && !named.contains(&k) {
-                    named.push(k);
+                if labelled.len() < NAMED && !labelled.contains(&k) {
+                    labelled.push(k);
                 }
             }
         }
-        named.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
+        labelled.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
     }
 
     /// The names of the vehicles, on those that are large enough and beside the others.
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
-        for (k, at) in self.named() {
+        for (k, at) in self.labelled_vehicles() {
             // One that is too close to another is often behind it.
             let is_hidden = self.is_hidden(k, at);
             if is_hidden && !self.alarmed[k] {
@@ -337,7 +339,7 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// A length to the millimetre, rounded down: what is said to be clear is clear.
+/// A length to the millimetre, rounded down, so that no distance is shown larger than it is.
 pub(crate) fn metres(length_m: f64) -> String {
     format!("{} m", at_least(length_m, 3))
 }

@@ -5,11 +5,12 @@ use std::sync::{Mutex, PoisonError};
 use nalgebra::Vector3;
 
 use super::camera::{Camera, CameraSpec, ISO_DEG, Orbit};
-use super::view::View;
+use super::compose::View;
 use crate::error::RenderError;
-use crate::timeline::{Frame, Timeline};
+use crate::timeline::Timeline;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::{Obstacle, Shape};
+use tautline_report::flight_log::Frame;
 
 /// Most places of vehicles that framing looks at.
 const FRAMED_PLACES: usize = 200_000;
@@ -51,7 +52,7 @@ impl Extent {
     /// The extent of a flight, as far as it is known.
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
-        let keyframes = timeline.keyframes();
+        let keyframes = timeline.log.keyframes();
         let stride = keyframes.len().div_ceil((FRAMED_PLACES / timeline.count().max(1)).max(2)).max(1);
         let mut places: Vec<(Vector3<f64>, f64)> = Vec::new();
         for keyframe in keyframes.iter().step_by(stride).chain(keyframes.last()) {

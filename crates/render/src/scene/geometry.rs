@@ -1,12 +1,16 @@
-//! What has a place in space: vehicles, shells, edges, trails, start marks and goal slots.
+//! Vehicles, shells, edges, trails, start marks, goal slots and obstacles.
+//!
+//! Balls are solid, capsules are made of balls, boxes and planes are drawn by lines.
 
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
-use super::builder::SceneBuilder;
 use super::camera::Lens;
-use super::colour::Theme;
-use super::draw_list::{Ball, Line, Scene, single};
+use super::colour::{Colour, Theme};
+use super::compose::SceneBuilder;
+use super::draw_list::{Ball, Disc, Line, Scene, single};
+use crate::timeline::QuadrotorShape;
 use tautline_core::swarm::Pair;
+use tautline_laws::space::{Obstacle, Shape};
 use tautline_sim::plan::Plan;
 
 /// Most edges that are drawn: more hide what they join.
@@ -52,7 +56,7 @@ impl SceneBuilder<'_> {
             let place = self.vehicle(k)?;
             let at = self.camera.project(place)?;
             let radius_m = self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]);
-            let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.metric.longest_m(shell_m));
+            let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.log.metric().longest_m(shell_m));
             Some((at.at_px, radius_m.max(shell_m) * at.px_per_m))
         };
         (0..self.timeline.count()).filter_map(cover).collect()
@@ -76,7 +80,7 @@ impl SceneBuilder<'_> {
                 let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
                 let ball = ball(radius_m, colour);
                 // In parallel projection every line of sight is along the view.
-                let metric = self.timeline.metric;
+                let metric = self.timeline.log.metric();
                 let away = metric.scaled(place - self.camera.eye_m);
                 let power = match self.camera.lens {
                     Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
@@ -119,8 +123,8 @@ impl SceneBuilder<'_> {
     /// Where every vehicle came from, as long ago as is asked for, fading with age. The corners are samples whose number is a multiple of a power of
     /// two, so that a trail does not shimmer as time goes on.
     pub(super) fn trails(&self, lines: &mut Vec<Line>) {
-        let (count, last, keyframes) = (self.timeline.count(), self.frame.keyframe, self.timeline.keyframes());
-        let ([first_s, last_s], now_s) = (self.timeline.range_s(), self.frame.time_s);
+        let (count, last, keyframes) = (self.timeline.count(), self.frame.keyframe, self.timeline.log.keyframes());
+        let ([first_s, last_s], now_s) = (self.timeline.log.range_s(), self.frame.time_s);
         let fading_s = self.view.trail_s.unwrap_or(FADED_AFTER * (last_s - first_s)).max(1e-9);
         let since_s = self.view.trail_s.map_or(first_s, |trail_s| now_s - trail_s);
         let first = keyframes.partition_point(|keyframe| keyframe.time_s < since_s);
@@ -132,7 +136,7 @@ impl SceneBuilder<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
         let opacity = |time_s: f64| FADED + (FRESH - FADED) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
         let width_px = if count < 50 { 2.0 } else { 1.3 } * self.view.unit_px();
-        let begins = self.timeline.positions_m(since_s).filter(|_| since_s > first_s);
+        let begins = self.timeline.log.positions_m(since_s).filter(|_| since_s > first_s);
         let recorded = (first..=last).filter(|k| k.is_multiple_of(stride)).map(|k| &keyframes[k]);
         let corners: Vec<_> = (begins.iter().map(|positions_m| (positions_m, opacity(since_s))))
             .chain(recorded.map(|corner| (&corner.positions_m, opacity(corner.time_s))))
@@ -160,7 +164,7 @@ impl SceneBuilder<'_> {
     /// way, moved as the law leaves it free to be so that it fits best.
     pub(super) fn starts_and_goals(&self, lines: &mut Vec<Line>) {
         let count = self.timeline.count();
-        let Some(first) = self.timeline.keyframes().first().filter(|_| count <= MOST_MARKS) else { return };
+        let Some(first) = self.timeline.log.keyframes().first().filter(|_| count <= MOST_MARKS) else { return };
         let (right, up) = (self.camera.right, self.camera.up);
         let width_px = 1.8 * self.view.unit_px();
         // Many opaque ones would hide what they mark.
@@ -196,5 +200,203 @@ impl SceneBuilder<'_> {
         let corners = [centre + up, centre + right, centre - up, centre - right];
         let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.ink(), width_px);
         lines.extend((0..4).map(side));
+    }
+}
+
+/// Balls that a capsule is made of: so many a radius, and no more than this in all.
+const BALLS_A_RADIUS: f64 = 24.0;
+const MOST_BALLS: f64 = 3000.0;
+/// Lines across each side of a box, and of a plane.
+const HATCHES: u32 = 12;
+/// Opacity of lines across a side, of its rims, and of lines of a plane.
+const HATCH: f32 = 0.35;
+const RIM: f32 = 0.95;
+const PLANE: f32 = 0.18;
+
+impl SceneBuilder<'_> {
+    fn solids(&self) -> &[Obstacle] {
+        self.timeline.plan.as_ref().map_or(&[], |plan| &plan.obstacles)
+    }
+
+    /// Balls and capsules.
+    pub(super) fn round_obstacles(&self, scene: &mut Scene) {
+        let colour = self.view.theme.obstacle();
+        for obstacle in self.solids() {
+            let place = obstacle.place_m - self.extent.origin_m();
+            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+            let ball = |centre, radius_m: f64| Ball { centre_m: single(centre), radius_m: radius_m as f32, colour };
+            match obstacle.shape {
+                Shape::Ball { radius_m } => scene.balls.push(ball(place, radius_m)),
+                Shape::Capsule { from_m, to_m, radius_m } => {
+                    let wanted = (BALLS_A_RADIUS * (to_m - from_m).norm() / radius_m).ceil();
+                    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+                    let count = wanted.clamp(1.0, MOST_BALLS) as u32;
+                    let along = |k: u32| place + from_m.lerp(&to_m, f64::from(k) / f64::from(count));
+                    scene.balls.extend((0..=count).map(|k| ball(along(k), radius_m)));
+                }
+                Shape::Box { .. } | Shape::HalfSpace { .. } => {}
+            }
+        }
+    }
+
+    /// Boxes and planes.
+    pub(super) fn flat_obstacles(&self, lines: &mut Vec<Line>) {
+        for obstacle in self.solids() {
+            let place = obstacle.place_m - self.extent.origin_m();
+            match obstacle.shape {
+                Shape::Box { half_m, yaw_deg } => {
+                    let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
+                    for side in 0..6 {
+                        let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
+                        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+                        let of = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
+                        self.hatched([RIM, HATCH], place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
+                    }
+                }
+                Shape::HalfSpace { normal } => {
+                    let normal = normal.normalize();
+                    let (centre, reach_m) = self.extent.reach();
+                    let foot = centre - normal * (centre - place).dot(&normal);
+                    let least = normal.iamin();
+                    let u = normal.cross(&Vector3::ith(least, 1.0)).normalize() * reach_m;
+                    self.hatched([PLANE; 2], foot, u, normal.cross(&u), lines);
+                }
+                Shape::Ball { .. } | Shape::Capsule { .. } => {}
+            }
+        }
+    }
+
+    /// A flat piece around its middle, from minus to plus two vectors.
+    fn hatched(
+        &self,
+        [rim, hatch]: [f32; 2],
+        middle: Vector3<f64>,
+        u: Vector3<f64>,
+        v: Vector3<f64>,
+        lines: &mut Vec<Line>,
+    ) {
+        let (colour, width_px) = (self.view.theme.obstacle(), 1.4 * self.view.unit_px());
+        for k in 0..=HATCHES {
+            let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
+            let is_rim = k == 0 || k == HATCHES;
+            let strength = if is_rim { rim } else { hatch };
+            let mut line = |from, to| lines.push(Line::new([from, to], colour.at(strength), width_px));
+            line(middle + u * share - v, middle + u * share + v);
+            if is_rim {
+                line(middle + v * share - u, middle + v * share + u);
+            }
+        }
+    }
+}
+
+/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is
+/// a ball, which is seen better.
+const LEAST_HULL_PX: [f64; 2] = [9.0, 6.0];
+/// In units of the arm: radius of the body and of the mark ahead, how far ahead that is, height of the rotors above the
+/// body's middle, width of an arm.
+const BODY: f64 = 0.3;
+const NOSE: f64 = 0.13;
+const AHEAD: f64 = 0.72;
+const ABOVE: f64 = 0.18;
+const ARM: f64 = 0.11;
+/// Least width of an arm, and that of a blade, in a picture 720 pixels high \[pixels\].
+const ARM_PX: f32 = 1.5;
+const BLADE_PX: f32 = 1.2;
+/// Opacity of a rotor's rim and of its blade.
+const DISC: f32 = 0.7;
+const BLADE: f32 = 0.75;
+
+/// A quadrotor in place, in the scene's coordinates.
+pub(super) struct Quadrotor {
+    place: Vector3<f64>,
+    attitude: UnitQuaternion<f64>,
+    shape: QuadrotorShape,
+    arm_m: f64,
+}
+
+impl Quadrotor {
+    /// A place on the body in the scene's coordinates \[m\].
+    fn at(&self, on_body_m: Vector3<f64>) -> Vector3<f64> {
+        self.place + self.attitude * on_body_m
+    }
+
+    /// The body and the mark ahead.
+    pub(super) fn body(&self, colour: Colour, nose: Colour) -> [Ball; 2] {
+        #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+        let ball = |centre, share: f64, colour| Ball {
+            centre_m: single(centre),
+            radius_m: (share * self.arm_m) as f32,
+            colour,
+        };
+        [ball(self.place, BODY, colour), ball(self.nose(), NOSE, nose)]
+    }
+
+    fn nose(&self) -> Vector3<f64> {
+        self.at(Vector3::x() * (AHEAD * self.arm_m))
+    }
+
+    /// Middles of the rotors \[m\].
+    fn rotors(&self) -> [Vector3<f64>; 4] {
+        let above = Vector3::z() * (ABOVE * self.arm_m);
+        self.shape.rotors_m.map(|rotor_m| self.at(rotor_m + above))
+    }
+
+    /// Unit vector along the thrust.
+    fn up(&self) -> Vector3<f64> {
+        self.attitude * Vector3::z()
+    }
+}
+
+impl SceneBuilder<'_> {
+    /// A vehicle whose attitude is known, where it is large enough in the picture to be seen as more than a ball.
+    pub(super) fn quadrotor(&self, k: usize) -> Option<Quadrotor> {
+        let attitude = self.frame.attitude(k)?;
+        let place = self.vehicle(k)?;
+        let radius_m = self.timeline.radius_m[k];
+        let radius_px = radius_m * self.camera.project(place)?.px_per_m;
+        let [at_720, least] = LEAST_HULL_PX;
+        if radius_px < least.max(at_720 * f64::from(self.view.unit_px())) {
+            return None;
+        }
+        let shape = self.timeline.shape.unwrap_or_else(|| QuadrotorShape::within(radius_m));
+        Some(Quadrotor { place, attitude, shape, arm_m: shape.arm_m() })
+    }
+
+    fn quadrotors(&self) -> impl Iterator<Item = (Quadrotor, Colour)> {
+        (0..self.timeline.count()).filter_map(|k| Some((self.quadrotor(k)?, self.body_colour(k))))
+    }
+
+    /// What rotors sweep, the farthest first.
+    pub(super) fn rotors(&self, discs: &mut Vec<Disc>) {
+        let mut ordered = Vec::new();
+        for (quadrotor, colour) in self.quadrotors() {
+            let (normal, colour) = (single(quadrotor.up()), colour.at(DISC));
+            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+            let radius_m = quadrotor.shape.rotor_radius_m as f32;
+            let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, colour };
+            ordered.extend(quadrotor.rotors().map(|centre| (self.camera.seen(centre).z, disc(centre))));
+        }
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+        discs.extend(ordered.into_iter().map(|(_, disc)| disc));
+    }
+
+    /// Arms, the neck of the mark ahead, and in every disc its diameter across the line of sight, which is seen from
+    /// its edge too.
+    pub(super) fn arms(&self, lines: &mut Vec<Line>) {
+        let unit_px = self.view.unit_px();
+        for (quadrotor, colour) in self.quadrotors() {
+            let px_per_m = self.camera.project(quadrotor.place).map_or(0.0, |at| at.px_per_m);
+            #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+            let width_px = (ARM * quadrotor.arm_m * px_per_m) as f32;
+            let width_px = width_px.max(ARM_PX * unit_px);
+            lines.push(Line::new([quadrotor.place, quadrotor.nose()], self.view.theme.ink(), width_px));
+            let across = quadrotor.up().cross(&self.camera.back).try_normalize(1e-6);
+            for rotor in quadrotor.rotors() {
+                lines.push(Line::new([quadrotor.place, rotor], colour, width_px));
+                let reach = across.map(|across| across * quadrotor.shape.rotor_radius_m);
+                let blade = reach.map(|reach| [rotor - reach, rotor + reach]);
+                lines.extend(blade.map(|ends| Line::new(ends, colour.at(BLADE), BLADE_PX * unit_px)));
+            }
+        }
     }
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::builder::SceneBuilder;
 use super::colour::{Colour, Theme};
+use super::compose::SceneBuilder;
 use super::draw_list::Line;
 use super::labels::{LabelLayout, width};
 use tautline_core::text::decimals_of;

@@ -4,7 +4,6 @@
 //! (words, boxes, scales of colour) in pixels. Lengths are in the scene's coordinates, which are the recording's but for
 //! their origin: it lies amid the flight, so that single precision does for swarms far from the recording's origin.
 
-mod builder;
 mod camera;
 mod caption;
 mod colour;
@@ -14,22 +13,17 @@ mod extent;
 mod geometry;
 mod ground;
 mod labels;
-mod obstacles;
-mod quadrotors;
-mod view;
 
 #[cfg(feature = "window")]
 pub(super) use camera::TAN_HALF_VIEW;
 pub use camera::{Camera, CameraSpec, Lens, Orbit, Projected};
 pub(super) use caption::metres;
 pub use colour::{Colour, Theme};
+pub use compose::{Layers, View};
 pub use draw_list::{Annotation, Ball, Disc, Line, Scene};
 pub use extent::Extent;
 #[cfg(test)]
 pub(super) use labels::width;
-pub use view::{Layers, View};
 
-#[cfg(test)]
-mod quadrotor_tests;
 #[cfg(test)]
 mod tests;

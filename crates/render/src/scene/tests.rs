@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::*;
@@ -6,15 +8,25 @@ use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::space::Metric;
-use tautline_sim::scenario::Scenario;
+use tautline_laws::space::{Metric, closest_pair};
+use tautline_report::figures;
+use tautline_report::flight_log::FlightLog;
+use tautline_report::replay::PAGE_BYTES;
+use tautline_report::request::replay_of_run;
+use tautline_report::run::run;
+use tautline_sim::scenario::{Scenario, Source};
 
 /// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
 fn timeline() -> Timeline {
+    timeline_in(Metric::default())
+}
+
+fn timeline_in(metric: Metric) -> Timeline {
     let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 3.0, 1.0, 0.0, 3.0, 1.0]));
     let formation = Formation { slots_m: start.positions_m.clone() };
     let scenario = Scenario::new("square", start.clone(), formation, 2.0, 10.0);
-    let mut timeline = Timeline::of(&scenario);
+    let log = FlightLog::new(metric, scenario.delta_m);
+    let mut timeline = Timeline::flown(&scenario, Arc::new(log));
     for k in 0..=10_u32 {
         let time_s = f64::from(k);
         let mut swarm = start.clone();
@@ -29,7 +41,7 @@ fn timeline() -> Timeline {
 }
 
 fn scene(timeline: &Timeline, time_s: f64, view: &View) -> Scene {
-    let (frame, extent) = (timeline.at(time_s).expect("a frame"), Extent::of(timeline));
+    let (frame, extent) = (timeline.log.at(time_s).expect("a frame"), Extent::of(timeline));
     let camera = extent.camera(timeline, &frame, view).expect("a camera");
     Scene::compose(timeline, &extent, &frame, view, camera)
 }
@@ -61,12 +73,11 @@ fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
 
 #[test]
 fn shells_come_farthest_first_along_every_line_of_sight() {
-    let mut timeline = timeline();
     for (text, ratio) in
         ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
     {
         let metric = Metric::of_ratio(ratio);
-        timeline.metric = metric;
+        let timeline = timeline_in(metric);
         let scene = scene(&timeline, 2.0, &camera(text));
         assert_eq!(f64::from(scene.shell_ratio), ratio);
         let camera = scene.camera;
@@ -124,17 +135,18 @@ fn a_violation_shows_while_it_lasts_and_is_remembered() {
 }
 
 #[test]
-fn a_violation_that_no_sample_shows_is_told_by_its_judge_and_drawn_as_it_is_known() {
+fn a_violation_between_samples_has_the_distance_of_its_judge_in_banner_label_and_caption() {
     let mut timeline = timeline();
     let pair = Pair::new(2, 3);
     timeline.note(&Event::ViolationBegan { pair, time_s: 8.2 });
     timeline.note(&Event::ViolationEnded { pair, time_s: 8.4, min_m: 1.25 });
-    let violation = timeline.violations()[1];
+    let violation = timeline.log.violations().of_vehicles().nth(1).expect("a violation");
     assert_eq!((violation.min_m, violation.min_at_s), (1.25, 0.5 * (8.2 + 8.4)));
     let scene = scene(&timeline, violation.min_at_s, &View::default());
-    let (banner, label) = ("VIOLATION  vehicles 3-4 1.250 m apart at 8.30 s, delta 2.000 m", "3.000 m");
+    let (banner, label) = ("VIOLATION  vehicles 3-4 1.250 m apart, delta 2.000 m", "1.250 m");
     assert!(words(&scene).contains(&banner) && words(&scene).contains(&label), "{:?}", words(&scene));
-    assert!(!words(&scene).contains(&"1.250 m"), "they are drawn 3 m apart");
+    let closest = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
+    assert!(closest.starts_with("closest so far 1.250 m, vehicles 3-4 at 8.30 s"), "{closest}");
 }
 
 #[test]
@@ -203,7 +215,7 @@ fn edges_push_below_their_rest_length_and_pull_beyond_it() {
 #[test]
 fn a_follower_of_nobody_is_told_whom_it_can_follow() {
     let timeline = timeline();
-    let frame = timeline.at(0.0).expect("a frame");
+    let frame = timeline.log.at(0.0).expect("a frame");
     let error = Extent::of(&timeline).camera(&timeline, &frame, &camera("follow:9")).expect_err("no vehicle 9");
     assert_eq!(error.to_string(), "there is no vehicle `9` to follow; the flight has 1, 2, 3, 4");
 }
@@ -343,7 +355,8 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
         let (_, without) = numbers(&view(false));
         dropped += without.len() - with.len().min(without.len());
         for k in 0..4 {
-            let place = Extent::of(&timeline).place(&timeline.at(0.0).expect("a frame").positions_m, k).expect("there");
+            let place =
+                Extent::of(&timeline).place(&timeline.log.at(0.0).expect("a frame").positions_m, k).expect("there");
             let Some(ball) = camera.project(place) else { continue };
             let clear = |at: &[f32; 2]| {
                 let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);
@@ -377,4 +390,130 @@ fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
     assert_eq!(slot(0.5, 1), first_m + Vector3::new(0.25, 0.0, 0.0));
     assert_eq!(slot(2.0, 1), Vector3::new(5.0 + 1.0, 0.0, 0.0));
     assert_eq!((plan.leg_at(0.5), plan.leg_at(2.0), plan.leader()), ((0, 2), (1, 2), Some(2)));
+}
+
+#[test]
+fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_caption_and_label() {
+    let mut scenario = Scenario::read(&Source::Builtin("swap".to_owned()), &[]).expect("built in");
+    scenario.time.record_hz = 1.0;
+    let mut log = FlightLog::of(&scenario);
+    let report = run(&scenario, &mut log).expect("a flight");
+    let (min_m, at_s) = (report.separation.min_m.expect("a distance"), report.separation.min_at_s.expect("a time"));
+    let [first, second] = report.separation.min_pair.expect("a pair");
+    log.conclude(min_m, at_s);
+    let closest = log.closest().expect("an approach");
+    assert_eq!((closest.separation_m, closest.time_s, closest.pair.numbers()), (min_m, at_s, [first, second]));
+    let sampled = log.keyframes().iter().filter_map(|keyframe| closest_pair(&keyframe.positions_m));
+    let sampled_m = sampled.map(|(_, distance_m)| distance_m).fold(f64::INFINITY, f64::min);
+    assert!(sampled_m > 1.05 * min_m, "the closest approach lies between samples: {sampled_m} m and {min_m} m");
+    assert_eq!(log.peak_control().map(|[peak, _]| peak), report.control.peak_m_s2);
+
+    let metres = format!("{} m", tautline_core::text::at_least(min_m, 3));
+    let figure = figures::distances(&log, scenario.delta_m, None, "Distances");
+    assert!(
+        figure.description.contains(&format!("Closest: {metres}, vehicles {first}-{second}")),
+        "{}",
+        figure.description
+    );
+    let control = figures::control(&log, "Control").description;
+    let peak = report.control.peak_m_s2.expect("a peak");
+    assert!(control.contains(&format!("at most {peak:.3} m/s")), "{control}");
+    let replay = replay_of_run(&scenario, &log, &report, PAGE_BYTES).expect("a replay");
+    let in_replay = format!("nearest so far {metres}, {first} and {second}");
+    assert!(replay.json.contains(&in_replay), "{in_replay}");
+
+    let timeline = Timeline::flown(&scenario, Arc::new(log));
+    let scene = scene(&timeline, at_s, &View::default());
+    let caption = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
+    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first}-{second}")), "{caption}");
+    assert!(words(&scene).contains(&metres.as_str()), "{:?}", words(&scene));
+    assert!(report.headline().contains(&metres), "{}", report.headline());
+}
+
+/// Vehicles whose attitude is known.
+mod quadrotors {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::super::*;
+    use crate::timeline::{QuadrotorShape, Timeline};
+    use tautline_core::record::{Channel, Sample};
+    use tautline_core::swarm::{Rows, Swarm};
+
+    const ABOVE: f64 = 0.18;
+    const PLACES_M: [f64; 6] = [0.0, 0.0, 1.0, 3.0, 0.0, 1.0];
+
+    /// Two vehicles 3 m apart, both with one attitude.
+    fn timeline(attitude: Option<UnitQuaternion<f64>>) -> Timeline {
+        let swarm = Swarm::at_rest(Rows::from_row_slice(&PLACES_M));
+        let mut timeline = Timeline::new("pair", 2);
+        timeline.radius_m = vec![0.25; 2];
+        timeline.delta_m = Some(1.0);
+        let mut channels = Vec::new();
+        if let Some(q) = attitude {
+            let values = [q.w, q.i, q.j, q.k].repeat(2);
+            channels.push(Channel { values, ..Channel::new("attitude", &["qw", "qx", "qy", "qz"]) });
+        }
+        let control = Rows::zeros(2);
+        timeline.take(&Sample { channels: &channels, ..Sample::new(0.0, 0, &swarm, &control) });
+        timeline
+    }
+
+    fn scene(timeline: &Timeline, size_px: [u32; 2]) -> Scene {
+        let (frame, extent) = (timeline.log.at(0.0).expect("a frame"), Extent::of(timeline));
+        let view = View { size_px, layers: Layers { shells: true, ..Layers::NONE }, ..View::default() };
+        let camera = extent.camera(timeline, &frame, &view).expect("a camera");
+        Scene::compose(timeline, &extent, &frame, &view, camera)
+    }
+
+    /// How far the discs of a scene are from where the rotors of both vehicles are under an attitude \[m\].
+    fn off_m(timeline: &Timeline, attitude: UnitQuaternion<f64>) -> f64 {
+        let (shape, origin_m) = (QuadrotorShape::within(0.25), Extent::of(timeline).origin_m());
+        let scene = scene(timeline, [1280, 720]);
+        assert_eq!(scene.discs.len(), 8);
+        let expected = PLACES_M.chunks_exact(3).flat_map(|place| {
+            let place = Vector3::new(place[0], place[1], place[2]) - origin_m;
+            shape.rotors_m.map(|rotor_m| place + attitude * (rotor_m + Vector3::z() * (ABOVE * shape.arm_m())))
+        });
+        let nearest = |rotor: Vector3<f64>| {
+            let off = |disc: &Disc| {
+                let normal = Vector3::from(disc.normal.map(f64::from));
+                let centre = Vector3::from(disc.centre_m.map(f64::from));
+                (centre - rotor).norm() + (normal - attitude * Vector3::z()).norm()
+            };
+            scene.discs.iter().map(off).fold(f64::INFINITY, f64::min)
+        };
+        expected.map(nearest).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_discs_of_a_tilted_quadrotor_are_where_its_attitude_says() {
+        let tilted = UnitQuaternion::from_euler_angles(0.3, -0.4, 1.1);
+        assert!(off_m(&timeline(Some(tilted)), tilted) < 1e-6);
+        assert!(off_m(&timeline(Some(tilted)), UnitQuaternion::identity()) > 0.05, "level they would be elsewhere");
+        assert!(off_m(&timeline(Some(tilted)), tilted.inverse()) > 0.05, "turned the other way they would be too");
+    }
+
+    #[test]
+    fn a_quadrotor_keeps_its_shell_and_shows_where_it_looks() {
+        let left = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        let timeline = timeline(Some(left));
+        let scene = scene(&timeline, [1280, 720]);
+        assert_eq!(scene.shells.len(), 2);
+        // A body and the mark ahead each.
+        assert_eq!(scene.balls.len(), 4);
+        let [body, nose] = [0, 1].map(|k| Vector3::from(scene.balls[k].centre_m.map(f64::from)));
+        let ahead = (nose - body).normalize();
+        assert!((ahead - Vector3::y()).norm() < 1e-6, "{ahead}");
+        assert!(scene.balls[1].radius_m < scene.balls[0].radius_m && scene.balls[0].radius_m < 0.25);
+    }
+
+    #[test]
+    fn what_is_small_or_of_unknown_attitude_is_a_ball() {
+        let level = timeline(Some(UnitQuaternion::identity()));
+        let small = scene(&level, [64, 36]);
+        let unknown = scene(&timeline(None), [64, 36]);
+        assert_eq!((small.balls, small.discs.len(), small.lines.len()), (unknown.balls, 0, 0));
+        let large = scene(&timeline(None), [1280, 720]);
+        assert_eq!((large.balls.len(), large.discs.len(), large.lines.len()), (2, 0, 0));
+    }
 }

@@ -1,19 +1,239 @@
 //! A recorded flight, ready to be drawn at any time of it.
 
-mod airframe;
-mod frame;
-mod history;
-mod judge;
-mod obstacles;
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use crate::error::{RenderError, check_lengths};
+use tautline_audit::{ObjectPair, Violation};
+use tautline_core::record::{Event, Sample};
+use tautline_laws::space::Metric;
+use tautline_recordings::mcap::{Entry, McapRecording, StoredAudit};
+use tautline_report::flight_log::FlightLog;
+use tautline_sim::plan::Plan;
+use tautline_sim::scenario::{Scenario, Source};
+
 mod tracks;
 
-pub use airframe::QuadrotorShape;
-pub(super) use airframe::attitudes_of;
-pub use frame::{Frame, Keyframe};
-pub(super) use history::PICTURED;
-pub use history::Timeline;
-pub use obstacles::TooNear;
 pub use tracks::TracksError;
+
+/// Radius of a vehicle of which nothing is known \[m\].
+const UNKNOWN_RADIUS_M: f64 = 0.1;
+/// Distance of the rotors from the centre and their radius, over the radius of the hull, where the model is not known.
+const ARM: f64 = 0.66;
+const ROTOR: f64 = 0.33;
+
+/// Places and size of the rotors of a quadrotor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadrotorShape {
+    /// Their middles from the centre of the body, x ahead and y to the left \[m\].
+    pub rotors_m: [Vector3<f64>; 4],
+    /// Radius of each \[m\].
+    pub rotor_radius_m: f64,
+}
+
+impl QuadrotorShape {
+    /// Shape of a scenario's model, where its vehicles are quadrotors.
+    pub(crate) fn of(scenario: &Scenario) -> Option<Self> {
+        let model = &scenario.airframe.quadrotor()?.model;
+        let rotors_m = model.rotor_positions_m.map(|[x, y]| Vector3::new(x, y, 0.0));
+        Some(Self { rotors_m, rotor_radius_m: model.rotor_radius_m })
+    }
+
+    /// Four rotors within a hull of this radius \[m\].
+    #[must_use]
+    pub fn within(hull_radius_m: f64) -> Self {
+        let out = hull_radius_m * ARM * std::f64::consts::FRAC_1_SQRT_2;
+        let rotors_m = [[1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+        Self {
+            rotors_m: rotors_m.map(|[x, y]| Vector3::new(x * out, y * out, 0.0)),
+            rotor_radius_m: hull_radius_m * ROTOR,
+        }
+    }
+
+    /// Distance of the outermost rotor from the centre \[m\].
+    #[must_use]
+    pub fn arm_m(&self) -> f64 {
+        self.rotors_m.iter().map(Vector3::norm).fold(0.0, f64::max)
+    }
+}
+
+/// A flight with everything that its pictures show: its log, and what does not change while it is flown.
+#[derive(Clone, Debug)]
+pub struct Timeline {
+    /// Name of the flight.
+    pub name: String,
+    /// Names of the vehicles.
+    pub vehicles: Vec<String>,
+    /// Radius of each vehicle's hull \[m\].
+    pub radius_m: Vec<f64>,
+    /// Safety distance delta \[m\], where the flight is judged by one.
+    pub delta_m: Option<f64>,
+    /// Rotors of every vehicle, where the flight has a model.
+    pub shape: Option<QuadrotorShape>,
+    /// Formation and graph, where the flight has them.
+    pub plan: Option<Plan>,
+    /// Notes on how the flight was read, a sentence each.
+    pub notes: Vec<String>,
+    /// Motion, closest approaches and violations.
+    pub log: Arc<FlightLog>,
+    /// From when on the judge cannot tell whether two were too close \[s\].
+    pub(crate) undecided_s: Option<f64>,
+    /// Every vehicle has a radius of its own in the recording, which is judged by where there is no delta.
+    by_radii: bool,
+    /// The judge assumed straight lines between samples.
+    pub(crate) assumes_straight: bool,
+    /// The judge refused the motion.
+    refused: bool,
+}
+
+impl Timeline {
+    /// An empty flight of this name by so many vehicles, numbered from 1.
+    #[must_use]
+    pub fn new(name: &str, vehicles: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            vehicles: (1..=vehicles).map(|number| number.to_string()).collect(),
+            radius_m: vec![UNKNOWN_RADIUS_M; vehicles],
+            delta_m: None,
+            shape: None,
+            plan: None,
+            notes: Vec::new(),
+            log: Arc::default(),
+            undecided_s: None,
+            by_radii: false,
+            assumes_straight: false,
+            refused: false,
+        }
+    }
+
+    /// An empty flight of this scenario.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        Self::flown(scenario, Arc::new(FlightLog::of(scenario)))
+    }
+
+    /// A flight of this scenario with its log.
+    #[must_use]
+    pub fn flown(scenario: &Scenario, log: Arc<FlightLog>) -> Self {
+        let mut plan = Plan::of(scenario);
+        log.targets().iter().for_each(|event| plan.note(event));
+        Self {
+            radius_m: scenario.hull_radius_m.clone(),
+            delta_m: Some(scenario.delta_m),
+            shape: QuadrotorShape::of(scenario),
+            plan: Some(plan),
+            log,
+            ..Self::new(&scenario.name, scenario.count())
+        }
+    }
+
+    /// Reads a recording of this program. Where its scenario cannot be understood, formation and graph are not known.
+    ///
+    /// The result may be without keyframes.
+    ///
+    /// # Errors
+    /// [`RenderError`] when it cannot be read, or a vehicle is beyond [`FARTHEST_M`](crate::FARTHEST_M).
+    pub fn read_mcap(path: &Path) -> Result<Self, RenderError> {
+        let mut recording = McapRecording::open(path)?;
+        let header = recording.header().clone();
+        let source = Source::Text { name: header.scenario_name.clone(), text: header.scenario_toml.clone() };
+        let mut timeline = match Scenario::read(&source, &[]) {
+            Ok(scenario) if scenario.count() == header.vehicles => Self::of(&scenario),
+            _ => Self {
+                delta_m: Some(header.delta_m),
+                log: Arc::new(FlightLog::new(Metric::default(), header.delta_m)),
+                ..Self::new(&header.scenario_name, header.vehicles)
+            },
+        };
+        for entry in recording.by_ref() {
+            match entry? {
+                Entry::Sample(sample) => timeline.take_checked(&sample.as_sample())?,
+                Entry::Event(event) => timeline.note(&event),
+            }
+        }
+        if let StoredAudit::AsWritten(audit) = recording.stored_audit()
+            && let Some(closest) = audit.closest.iter().find(|approach| approach.other_vehicle > 0)
+        {
+            // The audit of ellipsoids counts in half axes, of which the limit has two; the log counts in delta.
+            let scale = if audit.limit_m == header.delta_m { 1.0 } else { header.delta_m / audit.limit_m };
+            Arc::make_mut(&mut timeline.log).conclude(closest.min_m * scale, closest.min_at_s);
+        }
+        if !recording.is_complete() {
+            let note = "the recording was not closed: it is drawn up to the last part that was written";
+            timeline.notes.push(note.to_owned());
+        }
+        Ok(timeline)
+    }
+
+    /// Number of vehicles N.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.vehicles.len()
+    }
+
+    /// Radius around a vehicle that must stay empty: half of delta, half of an ellipsoid's longer axis, or its own radius
+    /// where that is more \[m\].
+    pub(crate) fn keep_out_m(&self, vehicle: usize) -> f64 {
+        self.delta_m.map_or(0.0, |delta_m| self.log.metric().longest_m(delta_m) / 2.0).max(self.radius_m[vehicle])
+    }
+
+    /// The violations of two vehicles that have begun by a time \[s\]; at the end of the flight all of them.
+    pub(crate) fn begun(&self, time_s: f64) -> impl Iterator<Item = Violation> {
+        let until_s = self.until_s(time_s);
+        self.log.violations().of_vehicles().filter(move |violation| violation.from_s <= until_s)
+    }
+
+    /// The violations of obstacles that have begun by a time \[s\], each with its vehicle and obstacle; at the end of the
+    /// flight all of them.
+    pub(crate) fn too_near_by(&self, time_s: f64) -> impl Iterator<Item = (&Violation<ObjectPair>, [usize; 2])> {
+        let until_s = self.until_s(time_s);
+        self.log.violations().of_obstacles().filter(move |(found, _)| found.from_s <= until_s)
+    }
+
+    fn until_s(&self, time_s: f64) -> f64 {
+        if time_s < self.log.range_s()[1] { time_s } else { f64::INFINITY }
+    }
+
+    /// Name of an obstacle, in quotes; its number where it is not known.
+    pub(crate) fn obstacle(&self, k: usize) -> String {
+        let known = self.plan.as_ref().and_then(|plan| plan.obstacles.get(k));
+        known.map_or_else(|| format!("obstacle {}", k + 1), |obstacle| format!("`{}`", obstacle.name))
+    }
+
+    /// Why nothing is judged, where nothing is.
+    pub(crate) fn unjudged(&self) -> Option<&'static str> {
+        match self.delta_m {
+            None if !self.by_radii => Some("no delta"),
+            _ if self.refused => Some("refused"),
+            _ => None,
+        }
+    }
+
+    /// Takes one sample, which must be later than the one before.
+    pub fn take(&mut self, sample: &Sample<'_>) {
+        Arc::make_mut(&mut self.log).take(sample);
+    }
+
+    /// Takes one sample unless a vehicle of it is too far away to be drawn.
+    pub(crate) fn take_checked(&mut self, sample: &Sample<'_>) -> Result<(), RenderError> {
+        for (k, place) in sample.swarm.positions_m.row_iter().enumerate() {
+            let name = || self.vehicles.get(k).map_or_else(|| (k + 1).to_string(), Clone::clone);
+            check_lengths(place.iter(), "coordinate", sample.time_s, name)?;
+        }
+        self.take(sample);
+        Ok(())
+    }
+
+    /// Takes one event of the judge of the flight.
+    pub fn note(&mut self, event: &Event) {
+        if let Some(plan) = &mut self.plan {
+            plan.note(event);
+        }
+        Arc::make_mut(&mut self.log).note(event);
+    }
+}
 
 #[cfg(test)]
 mod tests;

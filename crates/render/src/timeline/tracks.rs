@@ -1,13 +1,16 @@
-//! A timeline of recorded motion, whoever recorded it.
+//! A timeline of recorded motion of any origin, judged as it is read.
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::frame::Keyframe;
-use super::history::{BUDGET_BYTES, Timeline, UNKNOWN_RADIUS_M};
-use super::judge::{Judge, moments_s};
+use super::{Timeline, UNKNOWN_RADIUS_M};
 use crate::error::{RenderError, check_lengths};
-use tautline_core::swarm::{Rows, set_row};
+use tautline_audit::Status;
+use tautline_audit::recorded::{Approach, Outcome, RecordedError, Settings, TrackAuditor};
+use tautline_core::swarm::{ClosestApproach, Rows, set_row};
 use tautline_core::track::{Item, Piece, Tracks};
+use tautline_report::flight_log::{BUDGET_BYTES, FlightLog, PICTURED, Violations};
 
 /// Keyframes a second at which known curves are drawn \[Hz\].
 const CURVE_HZ: f64 = 30.0;
@@ -63,7 +66,7 @@ impl Timeline {
         timeline.by_radii = !tracks.is_empty() && tracks.iter().all(|track| track.radius_m.is_some());
         timeline.assumes_straight = tracks.iter().any(|track| !track.samples.is_empty());
         let mut places = vec![0; tracks.len()];
-        let judged = judge.finish();
+        let (judged, mut log) = (judge.finish(), FlightLog::default());
         for time_s in common_times(&tracks, &moments_s(&judged)) {
             let mut positions_m = Rows::zeros(tracks.len());
             for (k, track) in tracks.iter().enumerate() {
@@ -72,10 +75,10 @@ impl Timeline {
                 check_lengths(position_m.iter(), "coordinate", time_s, || timeline.vehicles[k].clone())?;
                 set_row(&mut positions_m, k, position_m);
             }
-            let (attitudes, control_m_s2, closest, so_far) = (Vec::new(), None, None, None);
-            timeline.push(Keyframe { time_s, positions_m, attitudes, control_m_s2, closest, so_far, number: 0 });
+            log.take_positions(time_s, positions_m);
         }
-        timeline.take_outcome(judged);
+        timeline.take_outcome(&mut log, judged);
+        timeline.log = Arc::new(log);
         timeline.notes.extend_from_slice(recording.notes());
         Ok(timeline)
     }
@@ -167,4 +170,70 @@ fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     times.sort_unstable_by(f64::total_cmp);
     times.dedup();
     times
+}
+
+/// Safety distance of a recording that is to be drawn and not judged \[m\]: the closest approach is asked for alone.
+const NO_DELTA_M: f64 = 1e-9;
+
+/// The judge of recordings, as it reads on. Motion that it refuses is drawn and labelled as not judged.
+struct Judge {
+    auditor: Result<TrackAuditor, RecordedError>,
+}
+
+impl Judge {
+    fn new(delta_m: Option<f64>) -> Self {
+        let settings = Settings::delta(delta_m.unwrap_or(NO_DELTA_M));
+        Self { auditor: TrackAuditor::new(settings).map(TrackAuditor::with_smallest) }
+    }
+
+    fn push(&mut self, names: &[String], items: &[Item]) {
+        if let Ok(auditor) = &mut self.auditor
+            && let Err(refused) = auditor.push(names, items)
+        {
+            self.auditor = Err(refused);
+        }
+    }
+
+    fn finish(self) -> Result<Outcome, RecordedError> {
+        self.auditor?.finish()
+    }
+}
+
+/// Times of the closest approach and of the worst moments of the first violations \[s\].
+fn moments_s(judged: &Result<Outcome, RecordedError>) -> Vec<f64> {
+    let worst = |outcome: &Outcome| outcome.violations.iter().take(PICTURED).map(|found| found.min_at_s).collect();
+    let mut moments: Vec<f64> = judged.as_ref().map_or_else(|_| Vec::new(), worst);
+    moments.extend(judged.iter().filter_map(|outcome| outcome.closest.first()).map(|closest| closest.time_s));
+    moments
+}
+
+impl Timeline {
+    /// Takes the outcome of the judge on the motion of a log.
+    fn take_outcome(&mut self, log: &mut FlightLog, judged: Result<Outcome, RecordedError>) {
+        let outcome = match judged {
+            Ok(outcome) => outcome,
+            Err(refused) => {
+                self.notes.push(format!("it was not judged: {refused}"));
+                self.refused = true;
+                return;
+            }
+        };
+        let found = outcome.smallest.iter().map(|slice| &slice.closest).chain(outcome.closest.first());
+        let mut closest: Vec<_> = found.filter_map(approach).collect();
+        closest.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let is_judged = self.delta_m.is_some() || self.by_radii;
+        let violations = outcome.violations.into_iter().filter(|found| is_judged && found.pair.vehicles().is_some());
+        log.judge(closest, Violations::judged(violations.collect()));
+        if is_judged {
+            let undecided = outcome.undecided.iter().map(|undecided| undecided.from_s);
+            let open_s = undecided.chain(outcome.gaps.iter().map(|gap| gap.from_s)).reduce(f64::min);
+            let open_s = open_s.or((outcome.status == Status::Undecided).then_some(f64::NEG_INFINITY));
+            self.undecided_s = open_s.filter(|_| outcome.status != Status::Clear);
+        }
+    }
+}
+
+fn approach(found: &Approach) -> Option<ClosestApproach> {
+    let (pair, separation_m, time_s) = (found.pair.vehicles()?, found.certain_m(), found.time_s);
+    Some(ClosestApproach { pair, separation_m, time_s })
 }

@@ -67,7 +67,7 @@ impl OpenWindow {
         let view = &renderer.draw(&Scene::blank(picture_px), false)?.words_view;
         let nearest = wgpu::FilterMode::Nearest;
         let texture = panels.renderer.write().register_native_texture(&panels.device, view, nearest);
-        let (extent, known) = (Extent::of(timeline), timeline.keyframes().len());
+        let (extent, known) = (Extent::of(timeline), timeline.log.keyframes().len());
         window.request_redraw();
         Ok(Self { painter, panels, renderer, input, extent, known, texture, picture_px, window })
     }
@@ -82,7 +82,7 @@ impl OpenWindow {
 
     /// Looks again at how far a flight in the air reaches, when it has grown by a tenth.
     pub(super) fn update_extent(&mut self, timeline: &Timeline) {
-        let now = timeline.keyframes().len();
+        let now = timeline.log.keyframes().len();
         if now > self.known + self.known / 10 || now < self.known {
             (self.extent, self.known) = (Extent::of(timeline), now);
         }

@@ -34,7 +34,7 @@ pub(super) struct Player {
 
 impl Player {
     pub(super) fn new(timeline: Timeline, live: Option<Receiver<LiveUpdate>>) -> Self {
-        let time_s = timeline.range_s()[0];
+        let time_s = timeline.log.range_s()[0];
         Self { timeline, live, said: None, time_s, playing: true, speed: 1.0 }
     }
 
@@ -70,7 +70,7 @@ impl Player {
 
     /// Lets time pass; at the end of a flight that has ended it stops, at the end of one in the air it waits.
     pub(super) fn advance(&mut self, seconds: f64) {
-        let [first_s, last_s] = self.timeline.range_s();
+        let [first_s, last_s] = self.timeline.log.range_s();
         if self.playing {
             self.time_s += seconds * self.speed;
         }
@@ -82,7 +82,7 @@ impl Player {
 
     /// Plays or pauses; from the end it plays again from the start.
     pub(super) fn toggle(&mut self) {
-        let [first_s, last_s] = self.timeline.range_s();
+        let [first_s, last_s] = self.timeline.log.range_s();
         if !self.playing && self.time_s >= last_s && !self.is_live() {
             self.time_s = first_s;
         }
@@ -90,14 +90,14 @@ impl Player {
     }
 
     pub(super) fn seek(&mut self, time_s: f64) {
-        let [first_s, last_s] = self.timeline.range_s();
+        let [first_s, last_s] = self.timeline.log.range_s();
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
     /// Goes so many samples on, or back.
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
-        let keyframes = self.timeline.keyframes();
+        let keyframes = self.timeline.log.keyframes();
         let at = keyframes.partition_point(|keyframe| keyframe.time_s <= self.time_s).saturating_sub(1);
         let between = keyframes.get(at).is_some_and(|keyframe| keyframe.time_s < self.time_s);
         // Back from between two samples is the one before.
@@ -183,7 +183,7 @@ mod tests {
             sender.send(LiveUpdate::Sample(Box::new(sample))).expect("sent");
         }
         assert!(player.receive() && !player.is_live());
-        assert_eq!(player.timeline.range_s(), [0.0, 0.0]);
+        assert_eq!(player.timeline.log.range_s(), [0.0, 0.0]);
         let said = player.said.expect("a sentence");
         assert!(said.starts_with("vehicle 1 has a coordinate of -10000000000.0 m at 1 s"), "{said}");
     }

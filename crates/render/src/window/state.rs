@@ -121,7 +121,7 @@ impl WindowState {
             Key::Home => player.seek(f64::NEG_INFINITY),
             Key::End => player.seek(f64::INFINITY),
             Key::N => {
-                if let Some(closest) = player.timeline.closest() {
+                if let Some(closest) = player.timeline.log.closest() {
                     player.playing = false;
                     player.seek(closest.time_s);
                 }

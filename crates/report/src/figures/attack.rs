@@ -1,8 +1,8 @@
 //! The worst of a search over its flights.
 
+use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
-use super::figure::Figure;
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use tautline_core::text::metres;
 

@@ -1,9 +1,8 @@
 //! A chart as plain data, and its drawing.
 
+use super::Figure;
 use super::axis::Axis;
-use super::figure::Figure;
-use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px};
-use super::thin::thinned;
+use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px, thinned};
 
 /// Width of a figure \[px\].
 pub(super) const WIDTH: f64 = 460.0;

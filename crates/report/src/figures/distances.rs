@@ -1,10 +1,11 @@
 //! Distances of pairs over time.
 
+use super::Figure;
 use super::axis::{Axis, Scale};
 use super::chart::{Band, Chart, Line, Mark};
-use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory, Span, evenly, pairs};
+use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
 use tautline_core::text::{at_least, counted};
 
@@ -25,14 +26,14 @@ const TOLD_APART: usize = 15;
 ///
 /// The closest approach is marked with what the recording says of the time between samples too.
 #[must_use]
-pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, title: &str) -> Figure {
-    let closest = history.closest();
-    let mut chart = Chart::new(history.time_axis(), Axis::distances("m", &[], delta_m));
-    let note = if history.vehicles() <= FEW_VEHICLES {
-        chart.lines = of_all_pairs(history);
+pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title: &str) -> Figure {
+    let (spans, closest) = (Spans::of(log), log.closest());
+    let mut chart = Chart::new(spans.time_axis(), Axis::distances("m", &[], delta_m));
+    let note = if spans.vehicles() <= FEW_VEHICLES {
+        chart.lines = of_all_pairs(&spans);
         String::new()
     } else {
-        of_many_pairs(history, &mut chart)
+        of_many_pairs(&spans, &mut chart)
     };
     let drawn = chart.lines.iter().flat_map(|line| line.points.iter().map(|&(_, y)| y));
     let bands = chart.bands.iter().flat_map(|band| band.points.iter().map(|&(_, _, high)| high));
@@ -44,10 +45,10 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
-    let of = if history.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
+    let of = if log.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
     let mut description = format!(
         "Distances between {} vehicles{of} over time{scale}; the safety distance is {delta_m} m.",
-        history.vehicles()
+        spans.vehicles()
     );
     if let Some(closest) = closest {
         let metres = at_least(closest.separation_m, 3);
@@ -56,20 +57,23 @@ pub fn distances(history: &RunHistory, delta_m: f64, certified_m: Option<f64>, t
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
     }
-    for (k, at) in history.hits().enumerate() {
-        let label = (k == 0).then(|| format!("hulls hit, {}", counted(history.hit_count() as u64, "time", "times")));
+    let (hits, hit_count) = log.hits();
+    let in_words = counted(hit_count as u64, "time", "times");
+    let places = hits.iter().filter_map(|hit| Some((hit.time_s, log.hit_distance_m(hit)?)));
+    for (k, at) in places.enumerate() {
+        let label = (k == 0).then(|| format!("hulls hit, {in_words}"));
         chart.marks.push(Mark::cross(at, PALETTE[HIT], label));
     }
-    if history.hit_count() > 0 {
-        description.extend([" Hulls hit ", &counted(history.hit_count() as u64, "time", "times"), "."]);
+    if hit_count > 0 {
+        description.extend([" Hulls hit ", &in_words, "."]);
     }
     chart.figure("distances", title, &(description + &note))
 }
 
-fn of_all_pairs(history: &RunHistory) -> Vec<Line> {
-    let count = pairs(history.vehicles()).count();
-    let lines = pairs(history.vehicles()).enumerate().map(|(k, (i, j))| {
-        let points = history.spans().map(|span| (span.time_s, span.pair_min_m[k])).collect();
+fn of_all_pairs(spans: &Spans<'_>) -> Vec<Line> {
+    let count = pairs(spans.vehicles()).count();
+    let lines = pairs(spans.vehicles()).enumerate().map(|(k, (i, j))| {
+        let points = spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
         let (stroke, label) = if count <= TOLD_APART {
             (Stroke::of_line(k), Some(Pair::new(i, j).to_string()))
         } else {
@@ -81,11 +85,11 @@ fn of_all_pairs(history: &RunHistory) -> Vec<Line> {
 }
 
 /// Draws the pairs of a large swarm; says what is drawn of all that could be, as a sentence behind a space.
-fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
-    let (ranked_pairs, all) = ranked_pairs(history.vehicles());
-    let instants = history.spread(RANKED_INSTANTS);
+fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
+    let (ranked_pairs, all) = ranked_pairs(spans.vehicles());
+    let instants = spans.spread(RANKED_INSTANTS);
     let mut scratch = Vec::new();
-    let scaled = |span: &Span| history.metric().scaled_rows(&span.positions_m);
+    let scaled = |span: &Span<'_>| spans.log.metric().scaled_rows(span.positions_m);
     let ranks: Vec<_> = instants.iter().map(|span| quantiles_m(&scaled(span), &ranked_pairs, &mut scratch)).collect();
     let times_s = || instants.iter().map(|span| span.time_s);
     let band = |low: usize, high: usize, opacity: f64, label: &str| Band {
@@ -99,15 +103,19 @@ fn of_many_pairs(history: &RunHistory, chart: &mut Chart) -> String {
     chart.line(median, Stroke::solid(PALETTE[0], 1.6), "median");
 
     // Between samples too, where the recording knows.
-    let swept: Vec<_> = history.spans().filter_map(|span| Some((span.time_s, span.closest?))).collect();
+    let swept: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.closest?))).collect();
+    let nearest = |span: &Span<'_>| {
+        let (pair, separation_m) = nearest_present(span.positions_m, spans.log.metric())?;
+        Some(ClosestApproach { pair, separation_m, time_s: span.time_s })
+    };
     let closest: Vec<_> = if swept.is_empty() && ranked_pairs.len() == all {
-        instants.iter().filter_map(|span| Some((span.time_s, nearest(&scaled(span), span.time_s)?))).collect()
+        instants.iter().filter_map(|span| Some((span.time_s, nearest(span)?))).collect()
     } else {
         swept
     };
-    for (k, pair) in closest_pairs(&closest, history.vehicles()).into_iter().enumerate() {
-        let apart_m = |span: &Span| separation(&scaled(span), pair.first(), pair.second());
-        let apart = history.spans().map(|span| (span.time_s, apart_m(span))).collect();
+    for (k, pair) in closest_pairs(&closest, spans.vehicles()).into_iter().enumerate() {
+        let apart_m = |span: &Span<'_>| separation(&scaled(span), pair.first(), pair.second());
+        let apart = spans.iter().map(|span| (span.time_s, apart_m(span))).collect();
         chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string());
     }
     let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
@@ -131,6 +139,15 @@ fn ranked_pairs(count: usize) -> (Vec<(usize, usize)>, usize) {
     ((0..RANKED_PAIRS).map(pair).collect(), all)
 }
 
+/// The `k`-th of numbers below `count` that fill them evenly and follow no order of theirs: multiples of the golden ratio
+/// spread over the unit interval.
+pub(super) fn evenly(k: usize, count: usize) -> usize {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+    let number = ((golden * k as f64).fract() * count as f64) as usize;
+    number.min(count - 1)
+}
+
 /// Quantiles of 5, 25, 50, 75 and 95 % of the distances of pairs \[m\]; NaN where no distance is finite.
 fn quantiles_m(positions_m: &Rows, pairs: &[(usize, usize)], scratch: &mut Vec<f64>) -> [f64; 5] {
     scratch.clear();
@@ -144,13 +161,6 @@ pub(super) fn quantile(numbers: &mut [f64], share: f64) -> f64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
     let place = (share * last as f64).round() as usize;
     *numbers.select_nth_unstable_by(place.min(last), f64::total_cmp).1
-}
-
-/// The closest pair at an instant.
-fn nearest(positions_m: &Rows, time_s: f64) -> Option<ClosestApproach> {
-    let apart = |(i, j)| ClosestApproach { pair: Pair::new(i, j), separation_m: separation(positions_m, i, j), time_s };
-    let finite = pairs(positions_m.nrows()).map(apart).filter(|closest| closest.separation_m.is_finite());
-    finite.min_by(|a, b| a.separation_m.total_cmp(&b.separation_m))
 }
 
 /// The pairs that come closest, the closest first.
@@ -177,16 +187,6 @@ mod tests {
         assert_eq!([0.0, 0.05, 0.5, 1.0].map(|share| quantile(&mut numbers, share)), [0.0, 5.0, 50.0, 100.0]);
         assert_eq!(quantile(&mut [7.0], 0.95), 7.0);
         assert!(quantile(&mut [], 0.5).is_nan());
-    }
-
-    #[test]
-    fn the_nearest_pair_is_the_closest_one() {
-        let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 6.0, 0.0, 0.0]);
-        let closest = nearest(&positions_m, 3.0).unwrap();
-        assert_eq!((closest.pair, closest.separation_m), (Pair::new(1, 2), 1.0));
-        let ranked = quantiles_m(&positions_m, &ranked_pairs(3).0, &mut Vec::new());
-        assert_eq!(ranked[2], 5.0);
-        assert!(nearest(&Rows::zeros(1), 0.0).is_none());
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! How often numbers of many flights fall where.
 
+use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line};
-use super::figure::Figure;
 use super::svg::{SOFT_INK, Stroke};
 
 /// Numbers of one kind counted in intervals of one width.

@@ -1,8 +1,8 @@
 //! Shares of flights over the values of a key.
 
+use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark};
-use super::figure::Figure;
 use super::svg::{Marker, PALETTE, SOFT_INK, Stroke};
 
 /// The flights of one value.

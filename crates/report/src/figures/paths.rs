@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 
+use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark, TITLE, WIDTH};
-use super::figure::Figure;
-use super::history::{FEW_VEHICLES, RunHistory, evenly};
-use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke};
-use super::thin::thinned;
+use super::distances::evenly;
+use super::spans::Spans;
+use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke, thinned};
+use crate::flight_log::{FEW_VEHICLES, FlightLog};
 use tautline_core::swarm::row;
 
 /// Share of the extent left free on each side.
@@ -19,17 +20,18 @@ const MOST_PATHS: usize = 300;
 /// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, as many are drawn, chosen
 /// evenly, and the two that come closest.
 #[must_use]
-pub fn paths(history: &RunHistory, title: &str) -> Figure {
+pub fn paths(log: &FlightLog, title: &str) -> Figure {
+    let spans = Spans::of(log);
     let axis = |axis: usize, label: &str| {
-        let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
+        let (low, high) = spans.extent(axis).unwrap_or((0.0, 1.0));
         let margin = MARGIN * (high - low);
         Axis::linear(label, [low - margin, high + margin], false)
     };
     let mut chart = Chart::new(axis(0, "x [m]"), axis(1, "y [m]"));
     chart.equal = true;
-    for (k, &i) in drawn(history).iter().enumerate() {
-        let look = Look::of(i, history.vehicles());
-        let points: Vec<_> = history.spans().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
+    for (k, &i) in drawn(log).iter().enumerate() {
+        let look = Look::of(i, log.count());
+        let points: Vec<_> = spans.iter().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
         let mark = |at: Option<&(f64, f64)>, marker, colour, label: &str| {
             let label = (k == 0).then(|| label.to_owned());
             at.map(|&at| Mark { at, marker, colour, radius: look.radius, text: look.number.clone(), label })
@@ -38,16 +40,16 @@ pub fn paths(history: &RunHistory, title: &str) -> Figure {
         chart.marks.extend(mark(points.last(), Marker::Ring, look.end, "end"));
         chart.lines.push(Line { points, stroke: look.path, label: None });
     }
-    chart.figure("paths", title, &description(history, "from above"))
+    chart.figure("paths", title, &description(log, "from above"))
 }
 
 /// The vehicles whose paths are drawn.
-fn drawn(history: &RunHistory) -> Vec<usize> {
-    let count = history.vehicles();
+fn drawn(log: &FlightLog) -> Vec<usize> {
+    let count = log.count();
     if count <= MOST_PATHS {
         return (0..count).collect();
     }
-    let closest = history.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
+    let closest = log.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
     let spread = (0..MOST_PATHS).map(|k| evenly(k, count));
     let mut drawn: Vec<_> = spread.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
     drawn.sort_unstable();
@@ -77,9 +79,9 @@ impl Look {
     }
 }
 
-fn description(history: &RunHistory, from: &str) -> String {
-    let (count, end_s) = (history.vehicles(), history.end_s());
-    let of_all = match drawn(history).len() {
+fn description(log: &FlightLog, from: &str) -> String {
+    let (count, end_s) = (log.count(), log.range_s()[1]);
+    let of_all = match drawn(log).len() {
         drawn if drawn < count => format!("{drawn} of {count} vehicles, chosen evenly,"),
         _ => format!("{count} vehicles"),
     };
@@ -99,13 +101,14 @@ const BESIDE_PX: f64 = 4.0;
 /// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Which
 /// vehicles, marks and colours as in [`paths`].
 #[must_use]
-pub fn paths_in_space(history: &RunHistory, title: &str) -> Figure {
-    let view = View::of(history);
+pub fn paths_in_space(log: &FlightLog, title: &str) -> Figure {
+    let spans = Spans::of(log);
+    let view = View::of(&spans);
     let mut canvas = Canvas::new((WIDTH, TITLE + HEIGHT), title, WIDTH / 2.0);
     view.draw_axes(&mut canvas);
-    let lines = drawn(history).into_iter().map(|i| {
-        let look = Look::of(i, history.vehicles());
-        let places = history.spans().map(|span| row(&span.positions_m, i)).filter(|place| view.shows(place));
+    let lines = drawn(log).into_iter().map(|i| {
+        let look = Look::of(i, log.count());
+        let places = spans.iter().map(|span| row(span.positions_m, i)).filter(|place| view.shows(place));
         (look, places.map(|place| view.on_paper(place)).collect())
     });
     for (look, points) in thinned(lines.collect()) {
@@ -118,7 +121,7 @@ pub fn paths_in_space(history: &RunHistory, title: &str) -> Figure {
             }
         }
     }
-    canvas.figure("paths-3d", &description(history, "in space"))
+    canvas.figure("paths-3d", &description(log, "in space"))
 }
 
 /// A box of axes, seen from above its edge where x is largest and y smallest.
@@ -129,18 +132,18 @@ struct View {
 }
 
 impl View {
-    fn of(history: &RunHistory) -> Self {
-        let spans = [(0, "x [m]"), (1, "y [m]"), (2, "z [m]")].map(|(axis, label)| {
-            let (low, high) = history.extent(axis).unwrap_or((0.0, 1.0));
+    fn of(spans: &Spans<'_>) -> Self {
+        let axes = [(0, "x [m]"), (1, "y [m]"), (2, "z [m]")].map(|(axis, label)| {
+            let (low, high) = spans.extent(axis).unwrap_or((0.0, 1.0));
             Axis::linear(label, [low, high], true)
         });
-        let [across, deep, up] = spans.each_ref().map(|axis| axis.to - axis.from);
+        let [across, deep, up] = axes.each_ref().map(|axis| axis.to - axis.from);
         let seen_across = across * YAW.cos() + deep * YAW.sin();
         let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
         let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up);
         // How much of a length along each axis is seen across: numbers beside each other must not meet.
         let axes = [(0, YAW.cos()), (1, YAW.sin()), (2, 0.0)].map(|(k, across)| {
-            let Axis { label, from, to, .. } = &spans[k];
+            let Axis { label, from, to, .. } = &axes[k];
             let spanning = |tick_px: f64| Axis::spanning(label, *from, *to, (unit * (to - from) / tick_px).max(1.0));
             let axis = spanning(TICK_PX);
             let wide_px = if across > 0.0 { (axis.labels_px() + BESIDE_PX) / across } else { 0.0 };

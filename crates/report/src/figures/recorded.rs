@@ -1,8 +1,8 @@
 //! Two of a recording: their distance over time, and their closest approach from above.
 
+use super::Figure;
 use super::axis::{Axis, Scale, extent};
 use super::chart::{Band, Chart, Inset, Mark};
-use super::figure::Figure;
 use super::svg::{INK, PALETTE, Stroke};
 
 /// Width of the inset of a closest approach, over the distance as it is seen from above.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::moment::{Kind, Moment};
+use super::{Kind, Moment};
 use tautline_audit::Slice;
 
 /// Width and height.
@@ -77,7 +77,7 @@ fn joined(mut all: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::choice::Span;
+    use super::super::Span;
     use super::*;
     use tautline_audit::{Approach, ObjectPair};
     use tautline_core::swarm::Pair;

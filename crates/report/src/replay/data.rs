@@ -1,24 +1,22 @@
 //! A replay as a page holds it.
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::bytes::{base64_bytes, base64_of, doubles, singles};
-use super::cast::{breaks, place_of_weightiest, present, shown};
 use super::chart::Chart;
-use super::choice::{MOST_INSTANTS, Span, around_worst, chosen};
-use super::error::NoReplay;
-use super::extent::Extent;
-use super::film::Film;
-use super::mesh;
-use super::moment::{Kind, Moment};
-use super::motion::Motion;
-use super::nearest::{self, Said, Words};
-use super::stage::Stage;
+use super::decimate::{MOST_INSTANTS, Span, around_worst, chosen};
+use super::motion::PackedMotion;
+use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
+use super::stage::Extent;
+use super::statements::{self, Statement, Words};
 use super::targets::{self, Targets};
-use super::things::{POINT_BYTES, Thing};
-use super::verdict;
-use super::words::{LONGEST_NAME, LONGEST_SENTENCE, cut};
+use super::visible::{breaks, place_of_weightiest, present, shown};
+use super::{
+    Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
+};
+use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
+use tautline_core::swarm::{Rows, row};
 
 /// Most findings.
 const MOST_MOMENTS: usize = 200;
@@ -36,17 +34,28 @@ const VERSION: u32 = 2;
 
 /// A flight as data of a page.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Replay {
-    json: String,
-    chart: Chart,
-    rounding_m: f64,
-    instants: [usize; 2],
-    vehicles: [usize; 2],
-    moments: [usize; 2],
-    holds: bool,
-    inexact: usize,
-    unknown_radius: Option<(usize, f64)>,
-    obstacles_off_m: f64,
+    /// The data as JSON without any `<`, so that it may stand in a page's script element.
+    pub json: String,
+    /// Smallest distance of any two over time.
+    pub chart: Chart,
+    /// Largest error of a drawn coordinate \[m\].
+    pub rounding_m: f64,
+    /// Number of instants that are kept, and number of samples.
+    pub instants: [usize; 2],
+    /// Number of vehicles that are drawn, and number of all that are ever there.
+    pub vehicles: [usize; 2],
+    /// Number of findings that can be jumped to, and number of all.
+    pub moments: [usize; 2],
+    /// Whether vehicles are drawn at rest between two instants.
+    pub holds: bool,
+    /// Number of findings whose very instant, or one of whose vehicles, is not drawn.
+    pub inexact: usize,
+    /// Number of vehicles without a known radius, where there are any, and the radius that they are drawn with \[m\].
+    pub unknown_radius: Option<(usize, f64)>,
+    /// Largest distance of a drawn moving obstacle from its way \[m\].
+    pub obstacles_off_m: f64,
 }
 
 /// What the script reads. Lists of numbers are base64 of their bytes, the least first.
@@ -86,7 +95,7 @@ struct Data<'a> {
     near_s: String,
     near_who: String,
     /// What is said from when on \[s\]: of the nearest so far, and of the verdict.
-    nearest: Vec<Said>,
+    nearest: Vec<Statement>,
     verdicts: Vec<Verdict>,
     /// In order of time.
     moments: Vec<MomentData<'a>>,
@@ -134,31 +143,33 @@ impl Replay {
     /// [`NoReplay`] where nobody is ever there, somebody is beyond 1e9 m, or there is no room for two instants.
     pub fn new(
         stage: &Stage,
-        film: &Film,
+        log: &FlightLog,
         moments: &[Moment],
         judged: Judged,
         room_bytes: usize,
     ) -> Result<Self, NoReplay> {
-        let present = present(stage, film)?;
-        let [begin_s, end_s] = [film.times_s.first(), film.times_s.last()].map(|time_s| time_s.copied().unwrap_or(0.0));
+        let present = present(stage, log)?;
+        let [begin_s, end_s] = log.range_s();
+        let times_s: Vec<_> = log.keyframes().iter().map(|keyframe| keyframe.time_s).collect();
         let moments: Vec<_> = moments.iter().map(|moment| moment.within(begin_s, end_s)).collect();
         let listed = &moments[..moments.len().min(MOST_MOMENTS)];
-        let shown = shown(film, &present, listed, room_bytes);
+        let shown = shown(&times_s, &present, listed, room_bytes);
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
-        let plan = film.noted(stage.plan.clone());
+        let plan = stage.plan_of(log);
         let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
-        let near = film.nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
-        let [near_s, near_who] = nearest::pairs(&near, end_s, place);
-        let extent = Extent::of(stage, film, &shown);
-        let origin_m = place_of_weightiest(film, listed).unwrap_or(extent.middle_m());
+        let (nearest, holds) = (log.nearest(), log.holds);
+        let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
+        let [near_s, near_who] = statements::pairs(&near, end_s, place);
+        let extent = Extent::of(stage, log, &shown);
+        let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
-        let (square_m, lines) = mesh::ground(extent.low_m, extent.high_m, level_m);
+        let (square_m, lines) = ground(extent.low_m, extent.high_m, level_m);
         let most_said = MOST_SAID.map(|most| (room_bytes / 10 / SAID_BYTES).clamp(8, most));
         let has_gaps =
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, has_gaps, name };
-        let things = things(stage, &extent, listed, room_bytes);
+        let things = obstacle_meshes(stage, &extent, listed, room_bytes);
         let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {
             version: VERSION,
@@ -167,7 +178,7 @@ impl Replay {
             shell_m: stage.shell_m,
             times_s: String::new(),
             decimals: decimals(end_s - begin_s),
-            holds: film.holds,
+            holds,
             origin_m: origin_m.into(),
             look_m: (extent.middle_m() - origin_m).into(),
             half_m: extent.half_m().into(),
@@ -182,7 +193,7 @@ impl Replay {
             breaks: String::new(),
             near_s,
             near_who,
-            nearest: nearest::so_far(&film.nearest, &words, most_said[0]),
+            nearest: statements::so_far(&nearest, &words, most_said[0]),
             verdicts: verdicts(&moments, judged.is_else_known, begin_s, most_said[1], &place),
             moments: in_order(listed).map(|moment| moment.data(&place)).collect(),
             things,
@@ -190,7 +201,7 @@ impl Replay {
         };
         let no_room = NoReplay::NoRoom { room_bytes };
         // Beyond a share of the room who was away in between is drawn at neither end.
-        let most_breaks = film.gaps.len().min(room_bytes / 10 / BREAK_BYTES);
+        let most_breaks = log.gaps.len().min(room_bytes / 10 / BREAK_BYTES);
         let fixed = written(&data).len() + base64_bytes(12 * data.points) + BREAK_BYTES * most_breaks + NUMBERS;
         let of_an_instant = base64_bytes(8 + 6 * data.points);
         let most = room_bytes.saturating_sub(fixed) / of_an_instant.max(1);
@@ -198,106 +209,41 @@ impl Replay {
             return Err(no_room);
         }
         let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
-        let even = film.even();
-        let times_s: Vec<_> = even.iter().map(|&k| film.times_s[k]).collect();
-        let kept: Vec<_> = chosen(&times_s, &spans, most.min(MOST_INSTANTS)).into_iter().map(|k| even[k]).collect();
-        let place_at = |&k: &usize| {
-            let guides = guides.at(plan.as_ref(), film.times_s[k], &film.positions_m[k]);
-            film.places(k, &shown).chain(guides).collect::<Vec<_>>()
-        };
-        let mut instants: Vec<_> = kept.iter().map(place_at).collect();
-        let times_s: Vec<_> = kept.iter().map(|&k| film.times_s[k]).collect();
-        let mut breaks = breaks(film, &times_s, place);
+        let kept = chosen(&times_s, &spans, most.min(MOST_INSTANTS));
+        let mut instants = instants(log, &kept, &shown, |time_s, at_m| guides.at(plan.as_ref(), time_s, at_m));
+        let kept_s: Vec<_> = kept.iter().map(|&k| times_s[k]).collect();
+        let mut breaks = breaks(log, &kept_s, place);
         for [instant, vehicle] in breaks.split_off(breaks.len().min(most_breaks)) {
             instants[instant][vehicle] = None;
         }
-        let motion = Motion::new(&instants);
+        let motion = PackedMotion::new(&instants);
         let single_m = SINGLE * (extent.low_m - origin_m).amax().max((extent.high_m - origin_m).amax());
         let rounding_m = motion.rounding_m() + single_m;
-        data.times_s = doubles(times_s.into_iter());
+        data.times_s = doubles(kept_s.into_iter());
         data.breaks =
             base64_of(breaks.iter().flatten().flat_map(|&at| u16::try_from(at).unwrap_or(u16::MAX).to_le_bytes()));
-        (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m(), motion.cell_m(), rounding_m);
+        (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m, motion.cell_m, rounding_m);
         data.starts = base64_of(motion.start_bytes().into_iter());
         data.steps = base64_of(motion.step_bytes().into_iter());
         let json = written(&data);
         if json.len() > room_bytes {
             return Err(no_room);
         }
-        let is_drawn = |of: &Moment| is_kept(film, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
+        let is_drawn =
+            |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
         let is_exact = |of: &&Moment| of.kind == Kind::Unseen || is_drawn(of);
         Ok(Self {
             chart: Chart::of(&near, &moments, judged.limit, [begin_s, end_s]),
             json,
             rounding_m,
-            instants: [kept.len(), film.samples],
+            instants: [kept.len(), log.samples()],
             vehicles: [shown.len(), present.len()],
             moments: [listed.len(), moments.len()],
-            holds: film.holds,
+            holds,
             inexact: moments.len() - moments.iter().filter(is_exact).count(),
             unknown_radius: stage.unknown_radii(&shown),
             obstacles_off_m,
         })
-    }
-
-    /// The data as JSON without any `<`, so that it may stand in a page's script element.
-    #[must_use]
-    pub fn json(&self) -> &str {
-        &self.json
-    }
-
-    /// How near any two were over time.
-    #[must_use]
-    pub fn chart(&self) -> &Chart {
-        &self.chart
-    }
-
-    /// Most that a drawn coordinate is off from what was recorded \[m\].
-    #[must_use]
-    pub fn rounding_m(&self) -> f64 {
-        self.rounding_m
-    }
-
-    /// Instants that are kept, and samples that there were.
-    #[must_use]
-    pub fn instants(&self) -> [usize; 2] {
-        self.instants
-    }
-
-    /// Vehicles that are drawn, and all that are ever there.
-    #[must_use]
-    pub fn vehicles(&self) -> [usize; 2] {
-        self.vehicles
-    }
-
-    /// Findings that are there to jump to, and all.
-    #[must_use]
-    pub fn moments(&self) -> [usize; 2] {
-        self.moments
-    }
-
-    /// Whether vehicles are drawn at rest between two instants.
-    #[must_use]
-    pub fn holds(&self) -> bool {
-        self.holds
-    }
-
-    /// Findings of which the very instant is not drawn, or not all of whom they are on.
-    #[must_use]
-    pub fn inexact(&self) -> usize {
-        self.inexact
-    }
-
-    /// How many vehicles have no known radius, where there are any, and what they are drawn with \[m\].
-    #[must_use]
-    pub fn unknown_radius(&self) -> Option<(usize, f64)> {
-        self.unknown_radius
-    }
-
-    /// Most that a moving obstacle is drawn off its way \[m\].
-    #[must_use]
-    pub fn obstacles_off_m(&self) -> f64 {
-        self.obstacles_off_m
     }
 }
 
@@ -337,13 +283,13 @@ fn verdicts(
     most: usize,
     place: &impl Fn(usize) -> Option<usize>,
 ) -> Vec<Verdict> {
-    let told = verdict::over_time(moments, is_else_known, begin_s, most).into_iter();
-    let with_unlisted = |(from_s, alarm, said, of): verdict::Told| {
+    let all = statements::over_time(moments, is_else_known, begin_s, most).into_iter();
+    let with_unlisted = |(from_s, alarm, said, of): statements::VerdictStatement| {
         let unlisted = of.filter(|&k| k >= MOST_MOMENTS).map(|k| moments[k].data(place));
         let thing = unlisted.as_ref().and_then(|of| of.thing);
         (from_s, alarm, said, unlisted.map_or_else(Vec::new, |of| of.who), thing)
     };
-    told.map(with_unlisted).collect()
+    all.map(with_unlisted).collect()
 }
 
 fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
@@ -353,7 +299,7 @@ fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
 }
 
 /// Obstacles, with where they were at the moments that they have a part in.
-fn things(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
+fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
     let most = (room_bytes / 4 / POINT_BYTES / stage.obstacles.len().max(1)).clamp(4, MOST_POINTS);
     let thing = |(k, obstacle): (usize, &Obstacle)| {
         let own = moments.iter().filter(|moment| moment.obstacle == Some(k));
@@ -363,10 +309,26 @@ fn things(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize)
     stage.obstacles.iter().enumerate().map(thing).collect()
 }
 
+/// Places of the vehicles that are drawn, and of guides, at the instants that are kept \[m\]; none where one is not there.
+fn instants<G: IntoIterator<Item = Option<Vector3<f64>>>>(
+    log: &FlightLog,
+    kept: &[usize],
+    shown: &[usize],
+    guides: impl Fn(f64, &Rows) -> G,
+) -> Vec<Vec<Option<Vector3<f64>>>> {
+    let there = |at: Vector3<f64>| at.iter().all(|x| x.is_finite()).then_some(at);
+    let instant = |&k: &usize| {
+        let keyframe = &log.keyframes()[k];
+        let vehicles = shown.iter().map(|&vehicle| there(row(&keyframe.positions_m, vehicle)));
+        vehicles.chain(guides(keyframe.time_s, &keyframe.positions_m)).collect()
+    };
+    kept.iter().map(instant).collect()
+}
+
 /// Whether the instant at which a span is at its worst is kept, or the two samples on either side.
-fn is_kept(film: &Film, kept: &[usize], span: &Span) -> bool {
-    let around = around_worst(&film.times_s, span);
-    let follow = around.clone().zip(around.clone().skip(1)).all(|(a, b)| film.numbers[b] - film.numbers[a] == 1);
+fn is_kept(log: &FlightLog, times_s: &[f64], kept: &[usize], span: &Span) -> bool {
+    let (around, number) = (around_worst(times_s, span), |k: usize| log.keyframes()[k].number);
+    let follow = around.clone().zip(around.clone().skip(1)).all(|(a, b)| number(b) - number(a) == 1);
     follow && around.into_iter().all(|k| kept.binary_search(&k).is_ok())
 }
 

@@ -1,43 +1,132 @@
 //! A flight packed into a page, where a script replays it.
 //!
-//! A [`Film`] takes a flight as it is flown, or as it is read again, in bounded memory. A [`Stage`] says what stands still: who
-//! flies, what must stay empty, what is in the way, where the slots are. [`Moment`]s are what the judge found. [`Replay::new`]
-//! packs the three into JSON of at most so many bytes, which the page holds as data; `assets/replay.js` draws it.
+//! A [`FlightLog`](crate::flight_log::FlightLog) holds the motion. A [`Stage`] holds what does not move: vehicles, shells,
+//! obstacles, slots. [`Moment`]s are the findings of the judge. [`Replay::new`] packs the three into JSON of a bounded number
+//! of bytes, which the page holds as data; `assets/replay.js` draws it.
 //!
 //! Packed positions are for the eye. They are rounded to a grid ([`Replay::rounding_m`]) and thinned; every distance, time and
 //! verdict that is shown is the judge's own. The same flight gives the same bytes.
 
-mod bytes;
-mod cast;
 mod chart;
-mod choice;
 mod data;
-mod error;
-mod extent;
-mod film;
-mod mesh;
-mod moment;
+mod decimate;
 mod motion;
-mod nearest;
+mod obstacle_meshes;
 mod stage;
+mod statements;
 mod targets;
-mod things;
-mod verdict;
-mod words;
+mod visible;
 
-pub use cast::MOST_VEHICLES;
 pub use chart::Chart;
-pub use choice::{MOST_INSTANTS, Span, chosen};
 pub use data::{Judged, Replay};
-pub use error::NoReplay;
-pub use film::Film;
-pub use moment::{Kind, Moment};
-pub use motion::Motion;
+pub use decimate::{MOST_INSTANTS, Span, chosen};
 pub use stage::Stage;
-pub use words::{LONGEST_NAME, cut};
+pub use visible::MOST_VEHICLES;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use nalgebra::Vector3;
 
 /// Room for the replays of a page \[bytes\].
 pub const PAGE_BYTES: usize = 1_000_000;
+/// Most letters of a name.
+pub const LONGEST_NAME: usize = 40;
+/// Most letters of a sentence.
+const LONGEST_SENTENCE: usize = 240;
+
+/// Kind of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The closest approach of all.
+    Closest,
+    /// Two vehicles were too close, or a vehicle too near to an obstacle.
+    Violation,
+    /// The judge cannot decide.
+    Undecided,
+    /// A vehicle was not seen, so that the judge cannot decide.
+    Unseen,
+}
+
+impl Kind {
+    /// Its name in the data of a page.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Closest => "closest",
+            Self::Violation => "violation",
+            Self::Undecided | Self::Unseen => "undecided",
+        }
+    }
+}
+
+/// A finding of the judge, to which a replay jumps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moment {
+    /// Its kind.
+    pub kind: Kind,
+    /// The vehicles, from 0.
+    pub vehicles: Vec<usize>,
+    /// The obstacle, from 0, where there is one.
+    pub obstacle: Option<usize>,
+    /// When it began and ended, and when it was at its worst \[s\].
+    pub span: Span,
+    /// The finding in a few words, while it lasts.
+    pub brief: String,
+    /// The finding in a sentence, with the judge's distance and time.
+    pub said: String,
+}
+
+/// Why a flight has no replay.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoReplay {
+    /// No vehicle is ever there.
+    #[error("nothing is there to be drawn")]
+    Empty,
+    /// A place is too far away for single precision.
+    #[error("vehicle {name} is beyond {farthest_m:e} m at {time_s} s")]
+    TooFar {
+        /// Name of the vehicle.
+        name: String,
+        /// When \[s\].
+        time_s: f64,
+        /// The farthest that is drawn \[m\].
+        farthest_m: f64,
+    },
+    /// Two instants would not fit.
+    #[error("it does not fit into {room_bytes} bytes")]
+    NoRoom {
+        /// The room \[bytes\].
+        room_bytes: usize,
+    },
+}
+
+/// Cuts a text after so many letters.
+#[must_use]
+pub fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{}…", &text[..end]),
+    }
+}
+
+/// Doubles as base64 of their bytes, the least first.
+fn doubles(numbers: impl Iterator<Item = f64>) -> String {
+    base64_of(numbers.flat_map(f64::to_le_bytes))
+}
+
+/// Places in single precision as base64 of their bytes, the least first.
+#[expect(clippy::cast_possible_truncation, reason = "drawn in single precision")]
+fn singles<'a>(places: impl IntoIterator<Item = &'a Vector3<f64>>) -> String {
+    base64_of(places.into_iter().flatten().flat_map(|&x| (x as f32).to_le_bytes()))
+}
+
+fn base64_of(bytes: impl Iterator<Item = u8>) -> String {
+    BASE64.encode(bytes.collect::<Vec<_>>())
+}
+
+/// Length of the base64 of so many bytes.
+fn base64_bytes(bytes: usize) -> usize {
+    4 * bytes.div_ceil(3)
+}
 
 #[cfg(test)]
 mod tests;

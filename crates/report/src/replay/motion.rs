@@ -17,25 +17,23 @@ const MOST_WHOLE: f64 = 2_251_799_813_685_248.0;
 ///
 /// A point is rounded to the nearest place of the grid, and steps lead from place to place: rounding does not add up.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Motion {
-    points: usize,
-    instants: usize,
-    /// Cells from zero to the middle, along each axis.
-    middle: [f64; 3],
-    cell_m: f64,
+pub(super) struct PackedMotion {
+    /// Middle of all points \[m\], from which places are counted.
+    pub(super) middle_m: [f64; 3],
+    /// Edge of a cell \[m\].
+    pub(super) cell_m: f64,
     /// Cells from the middle to where each point is first seen; 0 where it never is.
     starts: Vec<[i32; 3]>,
     /// Steps of every point at every instant, one instant after the other; the first is none.
     steps: Vec<[i16; 3]>,
 }
 
-impl Motion {
+impl PackedMotion {
     /// Packs points at instants: the same number of points at each, none where one is not there. A point with a coordinate that is
     /// no finite number is not there.
     ///
     /// Coordinates of more than 1e9 m make cells of more than 1e-6 m.
-    #[must_use]
-    pub fn new(instants: &[Vec<Option<Vector3<f64>>>]) -> Self {
+    pub(super) fn new(instants: &[Vec<Option<Vector3<f64>>>]) -> Self {
         let points = instants.first().map_or(0, Vec::len);
         let there = |k: usize, point: usize| instants[k].get(point).copied().flatten().filter(is_finite);
         let all = || (0..instants.len()).flat_map(|k| (0..points).filter_map(move |point| there(k, point)));
@@ -83,55 +81,23 @@ impl Motion {
                 last[point] = Some(at);
             }
         }
-        Self { points, instants: instants.len(), middle: middle.into(), cell_m, starts, steps }
+        Self { middle_m: (middle * cell_m).into(), cell_m, starts, steps }
     }
 
     /// Most that a coordinate is rounded by \[m\]: half of a cell.
-    #[must_use]
-    pub fn rounding_m(&self) -> f64 {
+    pub(super) fn rounding_m(&self) -> f64 {
         0.5 * self.cell_m
     }
 
-    /// Edge of a cell \[m\].
-    #[must_use]
-    pub fn cell_m(&self) -> f64 {
-        self.cell_m
-    }
-
-    /// The middle of all points \[m\], from which places are counted.
-    #[must_use]
-    pub fn middle_m(&self) -> [f64; 3] {
-        self.middle.map(|cells| cells * self.cell_m)
-    }
-
     /// Starts in cells from the middle: 32-bit whole numbers, least byte first, x, y, z of one point after the other.
-    #[must_use]
-    pub fn start_bytes(&self) -> Vec<u8> {
+    pub(super) fn start_bytes(&self) -> Vec<u8> {
         self.starts.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
     }
 
     /// Steps in cells from where the point was last seen: 16-bit whole numbers, least byte first, x, y, z of one point after the
     /// other, one instant after the other. A step of -32768 along x stands for a point that is not there.
-    #[must_use]
-    pub fn step_bytes(&self) -> Vec<u8> {
+    pub(super) fn step_bytes(&self) -> Vec<u8> {
         self.steps.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
-    }
-
-    /// The points at every instant, as they are drawn \[m\].
-    #[must_use]
-    pub fn unpacked(&self) -> Vec<Vec<Option<Vector3<f64>>>> {
-        let mut cells: Vec<_> = self.starts.iter().map(|start| Vector3::from(start.map(f64::from))).collect();
-        let middle = Vector3::from(self.middle);
-        let of_instant = |k: usize| &self.steps[k * self.points..(k + 1) * self.points];
-        let mut unpacked = Vec::new();
-        for k in 0..self.instants {
-            let at = std::iter::zip(&mut cells, of_instant(k)).map(|(at, step)| {
-                *at += if step[0] == ABSENT { Vector3::zeros() } else { Vector3::from(step.map(f64::from)) };
-                (step[0] != ABSENT).then(|| (*at + middle) * self.cell_m)
-            });
-            unpacked.push(at.collect());
-        }
-        unpacked
     }
 }
 
@@ -179,6 +145,19 @@ mod tests {
         prop_oneof![6 => at, 1 => Just(None)]
     }
 
+    /// The points at every instant as a page draws them \[m\].
+    fn unpacked(motion: &PackedMotion) -> Vec<Vec<Option<Vector3<f64>>>> {
+        let mut cells: Vec<_> = motion.starts.iter().map(|start| Vector3::from(start.map(f64::from))).collect();
+        let instants = motion.steps.chunks(motion.starts.len().max(1)).map(|steps| {
+            let at = std::iter::zip(&mut cells, steps).map(|(at, step)| {
+                *at += if step[0] == ABSENT { Vector3::zeros() } else { Vector3::from(step.map(f64::from)) };
+                (step[0] != ABSENT).then(|| *at * motion.cell_m + Vector3::from(motion.middle_m))
+            });
+            at.collect()
+        });
+        instants.collect()
+    }
+
     proptest! {
         #[test]
         fn what_is_unpacked_is_within_half_a_cell_and_who_is_not_there_stays_away(
@@ -186,8 +165,8 @@ mod tests {
                 prop::collection::vec(prop::collection::vec(point(), points), 1..30)
             }),
         ) {
-            let motion = Motion::new(&instants);
-            let unpacked = motion.unpacked();
+            let motion = PackedMotion::new(&instants);
+            let unpacked = unpacked(&motion);
             prop_assert_eq!(unpacked.len(), instants.len());
             for (is, was) in std::iter::zip(unpacked.iter().flatten(), instants.iter().flatten()) {
                 let was = was.filter(is_finite);
@@ -203,13 +182,13 @@ mod tests {
     fn cells_are_as_small_as_steps_allow_and_half_as_large_ones_would_not_do() {
         let at = |x: f64| vec![Some(Vector3::new(x, 0.0, 0.0))];
         let instants: Vec<_> = (0..1000).map(|k| at(0.1 * f64::from(k))).collect();
-        let motion = Motion::new(&instants);
-        assert!((0.1 / LARGEST..0.2 / LARGEST * 1.01).contains(&motion.cell_m()), "{}", motion.cell_m());
+        let motion = PackedMotion::new(&instants);
+        assert!((0.1 / LARGEST..0.2 / LARGEST * 1.01).contains(&motion.cell_m), "{}", motion.cell_m);
         let largest = motion.steps.iter().map(|step| i32::from(step[0])).max().expect("a step");
         assert!(2 * largest > 32_767, "twice as many cells would not fit: {largest}");
         // One that never moves is where it is.
-        let still = Motion::new(&vec![at(3.25); 5]);
-        assert_eq!(still.unpacked()[4][0], Some(Vector3::new(3.25, 0.0, 0.0)));
-        assert_eq!(Motion::new(&[]).unpacked().len(), 0);
+        let still = PackedMotion::new(&vec![at(3.25); 5]);
+        assert_eq!(unpacked(&still)[4][0], Some(Vector3::new(3.25, 0.0, 0.0)));
+        assert_eq!(unpacked(&PackedMotion::new(&[])).len(), 0);
     }
 }

@@ -1,10 +1,9 @@
 //! Links and slots.
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD as BASE64;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::{base64_of, singles};
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::formation::Formation;
 use tautline_sim::plan::Plan;
@@ -12,7 +11,7 @@ use tautline_sim::plan::Plan;
 /// Most links that are drawn: more hide what they join.
 const MOST_LINKS: usize = 2100;
 
-/// Who is joined to whom, and where vehicles are to be.
+/// Links of the graph, and the slots of the vehicles.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Targets {
     /// Places in the list of vehicles, two 16-bit numbers for a link.
@@ -65,7 +64,7 @@ pub(super) fn of(plan: Option<&Plan>, shown: &[usize], begin_s: f64, room_bytes:
     let axis_m = axis_m.map(|axis_m| if axis_m > 0.0 { axis_m } else { 1.0 });
     let guides = Guides { axis_m, reference: plan.reference_at(begin_s).is_some() };
     let targets = Targets {
-        links: BASE64.encode(links.iter().flat_map(|at| at.to_le_bytes()).collect::<Vec<_>>()),
+        links: base64_of(links.iter().flat_map(|at| at.to_le_bytes())),
         tension: plan.has_tension(),
         delta_m: plan.delta_m(),
         formations: formations
@@ -80,13 +79,10 @@ pub(super) fn of(plan: Option<&Plan>, shown: &[usize], begin_s: f64, room_bytes:
 }
 
 impl Target {
-    #[expect(clippy::cast_possible_truncation, reason = "drawn in single precision")]
     fn of(formation: &Formation, from_s: f64, shown: &[usize]) -> Self {
         let middle = mean_row(&formation.slots_m);
         let slots = shown.iter().filter(|&&k| k < formation.count()).map(|&k| row(&formation.slots_m, k) - middle);
-        let bytes: Vec<_> =
-            slots.flat_map(|slot| <[f64; 3]>::from(slot).map(|x| (x as f32).to_le_bytes())).flatten().collect();
-        Self { from_s, slots: BASE64.encode(bytes) }
+        Self { from_s, slots: singles(&slots.collect::<Vec<_>>()) }
     }
 }
 

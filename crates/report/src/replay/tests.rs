@@ -6,8 +6,9 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use super::*;
+use crate::flight_log::FlightLog;
 use tautline_audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
-use tautline_core::record::{OwnedSample, Sink as _};
+use tautline_core::record::Sample;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
 use tautline_sim::scenario::{Scenario, Source};
 
@@ -24,16 +25,21 @@ fn stage(vehicles: usize) -> Stage {
 }
 
 /// Vehicles on a line, 2 m apart, that fly 1 m/s, at 10 Hz.
-fn film(vehicles: usize, samples: usize) -> Film {
-    let mut film = Film::new();
+fn log(vehicles: usize, samples: usize) -> FlightLog {
+    let mut log = FlightLog::default().within(usize::MAX);
     for k in 0..samples {
         let time_s = 0.1 * k as f64;
         let mut positions_m = Rows::zeros(vehicles);
         (0..vehicles).for_each(|i| set_row(&mut positions_m, i, Vector3::new(time_s, 2.0 * i as f64, 1.0)));
         let pair = (vehicles > 1).then(|| Pair::new(0, 1));
-        film.take(time_s, &positions_m, pair.map(|pair| ClosestApproach { pair, separation_m: 2.0, time_s }));
+        let separation = pair.map(|pair| ClosestApproach { pair, separation_m: 2.0, time_s });
+        take(&mut log, time_s, positions_m, separation);
     }
-    film
+    log
+}
+
+fn take(log: &mut FlightLog, time_s: f64, positions_m: Rows, separation: Option<ClosestApproach>) {
+    log.take(&Sample { separation, ..Sample::new(time_s, 0, &Swarm::at_rest(positions_m), &Rows::zeros(0)) });
 }
 
 fn violation(vehicle: usize, from_s: f64, to_s: f64) -> Moment {
@@ -48,10 +54,10 @@ fn violation(vehicle: usize, from_s: f64, to_s: f64) -> Moment {
     }
 }
 
-fn packed(stage: &Stage, film: &Film, moments: &[Moment], room_bytes: usize) -> (Replay, Value) {
-    let replay = Replay::new(stage, film, moments, JUDGED, room_bytes).expect("a replay");
-    assert!(replay.json().len() <= room_bytes, "{} of {room_bytes} bytes", replay.json().len());
-    let data = serde_json::from_str(replay.json()).expect("JSON");
+fn packed(stage: &Stage, log: &FlightLog, moments: &[Moment], room_bytes: usize) -> (Replay, Value) {
+    let replay = Replay::new(stage, log, moments, JUDGED, room_bytes).expect("a replay");
+    assert!(replay.json.len() <= room_bytes, "{} of {room_bytes} bytes", replay.json.len());
+    let data = serde_json::from_str(&replay.json).expect("JSON");
     (replay, data)
 }
 
@@ -62,8 +68,8 @@ fn doubles(data: &Value) -> Vec<f64> {
 
 #[test]
 fn a_short_flight_is_there_whole() {
-    let (replay, data) = packed(&stage(3), &film(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES);
-    assert_eq!((replay.instants(), replay.vehicles(), replay.moments()), ([100, 100], [3, 3], [1, 1]));
+    let (replay, data) = packed(&stage(3), &log(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES);
+    assert_eq!((replay.instants, replay.vehicles, replay.moments), ([100, 100], [3, 3], [1, 1]));
     let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
     assert_eq!(doubles(&data["times_s"]), times);
     // The first slice is the first instant alone.
@@ -79,33 +85,34 @@ fn a_short_flight_is_there_whole() {
             (&Value::from(false), "1 violation so far")
         ]
     );
-    assert_eq!((replay.inexact(), replay.unknown_radius(), replay.obstacles_off_m()), (0, None, 0.0));
+    assert_eq!((replay.inexact, replay.unknown_radius, replay.obstacles_off_m), (0, None, 0.0));
     assert_eq!(data["moments"][0]["who"], serde_json::json!([2]));
-    assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m()) && replay.rounding_m() < 1e-5);
-    assert_eq!(packed(&stage(3), &film(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES).0, replay, "the same bytes");
+    assert!(data["rounding_m"].as_f64() == Some(replay.rounding_m) && replay.rounding_m < 1e-5);
+    assert_eq!(packed(&stage(3), &log(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES).0, replay, "the same bytes");
 }
 
 #[test]
 fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
-    let film = film(5, 40_000);
+    let log = log(5, 40_000);
     for room_bytes in [PAGE_BYTES, 60_000, 30_000] {
-        let (replay, data) = packed(&stage(5), &film, &[violation(3, 1234.5, 1236.0)], room_bytes);
-        let [kept, samples] = replay.instants();
+        let (replay, data) = packed(&stage(5), &log, &[violation(3, 1234.5, 1236.0)], room_bytes);
+        let [kept, samples] = replay.instants;
         assert!(samples == 40_000 && kept <= MOST_INSTANTS && kept > 150, "{kept} in {room_bytes}");
         let times = doubles(&data["times_s"]);
-        let within = film.times_s.iter().filter(|&&time_s| (1234.4..1236.1).contains(&time_s));
-        assert!(within.clone().count() >= 16 && within.clone().all(|time_s| times.contains(time_s)));
-        assert_eq!((times.first(), times.last()), (film.times_s.first(), film.times_s.last()));
+        let all_s = log.keyframes().iter().map(|keyframe| keyframe.time_s);
+        let within = all_s.filter(|time_s| (1234.4..1236.1).contains(time_s));
+        assert!(within.clone().count() >= 16 && within.clone().all(|time_s| times.contains(&time_s)));
+        assert_eq!([times.first(), times.last()].map(Option::<&f64>::copied), log.range_s().map(Some));
     }
-    let none = Replay::new(&stage(5), &film, &[], JUDGED, 1000);
+    let none = Replay::new(&stage(5), &log, &[], JUDGED, 1000);
     assert_eq!(none, Err(NoReplay::NoRoom { room_bytes: 1000 }));
 }
 
 #[test]
 fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
     let vehicles = 100_000;
-    let (replay, data) = packed(&stage(vehicles), &film(vehicles, 3), &[violation(77_777, 0.1, 0.1)], PAGE_BYTES);
-    assert_eq!(replay.vehicles(), [MOST_VEHICLES, vehicles]);
+    let (replay, data) = packed(&stage(vehicles), &log(vehicles, 3), &[violation(77_777, 0.1, 0.1)], PAGE_BYTES);
+    assert_eq!(replay.vehicles, [MOST_VEHICLES, vehicles]);
     let names = data["vehicles"].as_array().expect("names");
     let at = names.iter().position(|name| name == "77778").expect("the one that violated");
     assert_eq!(data["moments"][0]["who"], serde_json::json!([at]));
@@ -115,12 +122,12 @@ fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
 
 #[test]
 fn one_vehicle_one_sample_and_nobody() {
-    let (replay, data) = packed(&stage(1), &film(1, 1), &[], PAGE_BYTES);
-    assert_eq!((replay.instants(), doubles(&data["near_s"]).len()), ([1, 1], 0));
-    assert_eq!(Replay::new(&stage(2), &Film::new(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
-    let nowhere = Film::of(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Slices::default(), 1);
+    let (replay, data) = packed(&stage(1), &log(1, 1), &[], PAGE_BYTES);
+    assert_eq!((replay.instants, doubles(&data["near_s"]).len()), ([1, 1], 0));
+    assert_eq!(Replay::new(&stage(2), &FlightLog::default(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
+    let nowhere = FlightLog::recorded(vec![0.0], vec![Rows::repeat(2, f64::NAN)], Slices::default(), 1);
     assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
-    let far = Film::of(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
+    let far = FlightLog::recorded(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
     let refused = Replay::new(&stage(1), &far, &[], JUDGED, PAGE_BYTES).expect_err("too far");
     assert_eq!(refused.to_string(), "vehicle 1 is beyond 1e9 m at 0.5 s");
 }
@@ -130,8 +137,8 @@ fn who_is_not_there_for_a_time_is_not_packed() {
     let at = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0, x, 5.0, 0.0]);
     let mut gone = at(1.0);
     gone.row_mut(1).fill(f64::NAN);
-    let film = Film::of(vec![0.0, 1.0, 2.0], vec![at(0.0), gone, at(2.0)], Slices::default(), 3);
-    let (_, data) = packed(&stage(2), &film, &[], PAGE_BYTES);
+    let log = FlightLog::recorded(vec![0.0, 1.0, 2.0], vec![at(0.0), gone, at(2.0)], Slices::default(), 3);
+    let (_, data) = packed(&stage(2), &log, &[], PAGE_BYTES);
     let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
     let along_x: Vec<_> = steps.chunks_exact(6).map(|step| i16::from_le_bytes([step[0], step[1]])).collect();
     assert_eq!(along_x.iter().map(|&x| x == i16::MIN).collect::<Vec<_>>(), [false, false, false, true, false, false]);
@@ -150,43 +157,16 @@ fn foreign_text_neither_ends_the_script_nor_fills_the_page() {
     }];
     let said = "</SCRIPT>".repeat(100_000);
     let moment = Moment { said, ..violation(0, 0.0, 0.1) };
-    let (replay, data) = packed(&hostile, &film(2, 10), &[moment], PAGE_BYTES);
-    assert!(!replay.json().contains('<') && replay.json().len() < 20_000);
+    let (replay, data) = packed(&hostile, &log(2, 10), &[moment], PAGE_BYTES);
+    assert!(!replay.json.contains('<') && replay.json.len() < 20_000);
     assert_eq!(data["vehicles"][0], "</script><script>alert(1)</script>");
     assert_eq!(data["vehicles"][1].as_str().map(|name| name.chars().count()), Some(41));
 }
 
 #[test]
-fn memory_is_bounded_while_a_flight_is_taken_and_its_violations_stay() {
-    let mut film = Film::new().within(200_000);
-    let control = Rows::zeros(0);
-    let pair = Pair::new(0, 1);
-    let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]));
-    for k in 0..50_000_u32 {
-        let time_s = f64::from(k) / 100.0;
-        if k == 20_000 {
-            film.event(&tautline_core::record::Event::ViolationBegan { pair, time_s }).expect("taken");
-        }
-        if k == 20_050 {
-            film.event(&tautline_core::record::Event::ViolationEnded { pair, time_s, min_m: 0.5 }).expect("taken");
-        }
-        swarm.positions_m[(0, 1)] = time_s;
-        let sample = tautline_core::record::Sample::new(time_s, k.into(), &swarm, &control);
-        film.sample(&OwnedSample::from(&sample).as_sample()).expect("taken");
-    }
-    assert!(film.times_s.len() * 48 <= 200_000 && film.samples == 50_000, "{}", film.times_s.len());
-    let even = film.even();
-    let widest_s = even.windows(2).map(|two| film.times_s[two[1]] - film.times_s[two[0]]).fold(0.0, f64::max);
-    assert!(even.len() > 1000 && widest_s < 500.0 / 1000.0, "as dense everywhere: {} and {widest_s} s", even.len());
-    for k in 19_998..=20_052_u32 {
-        assert!(film.times_s.contains(&(f64::from(k) / 100.0)), "{k}");
-    }
-}
-
-#[test]
 fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
     let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
-    let mut film = Film::new();
+    let mut log = FlightLog::default();
     // Every vehicle in its slot, turned by a quarter and moved.
     let slots_m = &scenario.legs[0].formation.slots_m;
     let turned = Rows::from_fn(slots_m.nrows(), |i, axis| match axis {
@@ -194,8 +174,8 @@ fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
         1 => slots_m[(i, 0)],
         _ => slots_m[(i, 2)],
     });
-    film.take(0.0, &turned, None);
-    let (_, data) = packed(&Stage::of(&scenario, Vec::new()), &film, &[], PAGE_BYTES);
+    take(&mut log, 0.0, turned, None);
+    let (_, data) = packed(&Stage::of(&scenario, Vec::new()), &log, &[], PAGE_BYTES);
     assert_eq!(
         (data["axes"].as_u64(), data["points"].as_u64(), data["tension"].as_bool()),
         (Some(5), Some(9), Some(true))
@@ -220,21 +200,26 @@ fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
 }
 
 /// Two instants of vehicles on a line, 2 m apart.
-fn two_instants(vehicles: usize) -> Film {
+fn two_instants(vehicles: usize) -> FlightLog {
     let at = |x: f64| Rows::from_fn(vehicles, |i, axis| if axis == 0 { x + 2.0 * i as f64 } else { 0.0 });
-    Film::of(vec![0.0, 10.0], vec![at(0.0), at(1.0)], Slices::default(), 2)
+    FlightLog::recorded(vec![0.0, 10.0], vec![at(0.0), at(1.0)], Slices::default(), 2)
+}
+
+fn with_gaps(mut log: FlightLog, gaps: Vec<(usize, [f64; 2])>) -> FlightLog {
+    log.gaps = gaps;
+    log
 }
 
 #[test]
 fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
     let gaps = vec![(1, [3.0, 5.0]), (1, [6.0, 7.0]), (7, [1.0, 2.0]), (2, [4.0, 11.0])];
-    let (_, data) = packed(&stage(3), &two_instants(3).with_gaps(gaps), &[], PAGE_BYTES);
+    let (_, data) = packed(&stage(3), &with_gaps(two_instants(3), gaps), &[], PAGE_BYTES);
     let bytes = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64");
     assert_eq!(bytes, [1, 0, 1, 0], "at instant 1 vehicle 1");
     assert_eq!(data["holds"], false);
     // Where there is no room for that, it is not there.
     let many = (0..200).map(|vehicle| (vehicle, [3.0, 5.0])).collect();
-    let (_, data) = packed(&stage(200), &two_instants(200).with_gaps(many), &[], 15_000);
+    let (_, data) = packed(&stage(200), &with_gaps(two_instants(200), many), &[], 15_000);
     let breaks = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64").len() / 4;
     let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
     let absent = steps.chunks_exact(6).filter(|step| step[..2] == i16::MIN.to_le_bytes()).count();
@@ -244,27 +229,27 @@ fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
 #[test]
 fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
     let vehicles = 1000;
-    let mut film = Film::new();
+    let mut log = FlightLog::default();
     for k in 0..600_u32 {
         let at = Rows::from_fn(vehicles, |i, axis| if axis == 0 { f64::from(k) * 0.01 } else { 3.0 * i as f64 });
-        film.take(f64::from(k), &at, None);
+        take(&mut log, f64::from(k), at, None);
     }
     let moments: Vec<_> = (0..150).map(|k| violation(k, 4.0 * k as f64 - 3.0, 4.0 * k as f64 + 3.0)).collect();
-    let (replay, data) = packed(&stage(vehicles), &film, &moments, PAGE_BYTES);
+    let (replay, data) = packed(&stage(vehicles), &log, &moments, PAGE_BYTES);
     let times = doubles(&data["times_s"]);
     let missing = moments.iter().filter(|of| !times.contains(&of.span.at_s.max(0.0))).count();
-    assert_eq!((missing, replay.inexact()), (0, 0), "{:?} and {:?}", replay.instants(), replay.vehicles());
+    assert_eq!((missing, replay.inexact), (0, 0), "{:?} and {:?}", replay.instants, replay.vehicles);
     // Those that are not listed have theirs as long as there is room, and where there is none it is said.
     let at = |k: u32| 0.2 * f64::from(k);
     let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
-    let longer = self::film(2, 4000);
+    let longer = self::log(2, 4000);
     let (replay, data) = packed(&stage(2), &longer, &moments, PAGE_BYTES);
-    assert_eq!((replay.moments(), replay.inexact()), ([200, 300], 0), "{:?}", replay.instants());
+    assert_eq!((replay.moments, replay.inexact), ([200, 300], 0), "{:?}", replay.instants);
     let alarms = data["verdicts"].as_array().expect("verdicts").iter().filter(|told| told[1] == true);
     let named: Vec<_> = alarms.map(|told| told[3].as_array().map_or(0, Vec::len)).collect();
     assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "those that are not listed are said with who they are");
     let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
-    assert!(replay.inexact() > 0, "{:?}", replay.instants());
+    assert!(replay.inexact > 0, "{:?}", replay.instants);
 }
 
 #[test]
@@ -273,20 +258,20 @@ fn of_those_that_were_not_asked_for_nobody_is_drawn() {
     for k in [7, 4321] {
         set_row(&mut at, k, Vector3::zeros());
     }
-    let film = Film::of(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
-    let (replay, data) = packed(&stage(5000), &film, &[], PAGE_BYTES);
-    assert_eq!((replay.vehicles(), &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
+    let log = FlightLog::recorded(vec![0.0, 1.0], vec![at.clone(), at], Slices::default(), 2);
+    let (replay, data) = packed(&stage(5000), &log, &[], PAGE_BYTES);
+    assert_eq!((replay.vehicles, &data["vehicles"]), ([2, 2], &serde_json::json!(["8", "4322"])));
 }
 
 #[test]
 fn far_from_others_drawing_is_precise_where_the_weightiest_finding_is() {
     let at = |x: f64| Rows::from_row_slice(&[5e5 + x, 4e6, 0.0, 5e5, 4e6, 0.0, 0.0, 0.0, 0.0]);
-    let film = Film::of(vec![0.0, 1.0], vec![at(1.0), at(0.35)], Slices::default(), 2);
-    let (replay, data) = packed(&stage(3), &film, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
+    let log = FlightLog::recorded(vec![0.0, 1.0], vec![at(1.0), at(0.35)], Slices::default(), 2);
+    let (replay, data) = packed(&stage(3), &log, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
     let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(data[key].clone()).expect("numbers");
     assert_eq!(numbers("origin_m"), [5e5 + 0.35, 4e6, 0.0]);
-    assert!(replay.rounding_m() > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m());
-    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m() < 1e-3);
+    assert!(replay.rounding_m > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m);
+    assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m < 1e-3);
 }
 
 #[test]
@@ -295,7 +280,7 @@ fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
     for (half_m, drawn_m) in [(0.025, 0.025), (1.0, 0.1)] {
         let (replay, data) = packed(&unknown(half_m), &two_instants(2), &[], PAGE_BYTES);
         assert_eq!(data["radius_m"], serde_json::json!([drawn_m, 0.3]));
-        assert_eq!(replay.unknown_radius(), Some((1, drawn_m)));
+        assert_eq!(replay.unknown_radius, Some((1, drawn_m)));
     }
 }
 
@@ -310,9 +295,9 @@ fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
     for slice in [slice(0.0, 3.0), slice(5.0, 10.0)] {
         near.take(slice);
     }
-    let mut film = two_instants(2);
-    film.nearest = near;
-    let (_, data) = packed(&stage(2), &film, &[violation(0, -5.0, 50.0)], PAGE_BYTES);
+    let at = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0, x + 2.0, 0.0, 0.0]);
+    let log = FlightLog::recorded(vec![0.0, 10.0], vec![at(0.0), at(1.0)], near, 2);
+    let (_, data) = packed(&stage(2), &log, &[violation(0, -5.0, 50.0)], PAGE_BYTES);
     let moment = &data["moments"][0];
     assert_eq!((&moment["from_s"], &moment["to_s"]), (&Value::from(0.0), &Value::from(10.0)));
     assert_eq!(doubles(&data["near_s"]), [0.0, 3.0_f64.next_up(), 5.0]);

@@ -5,19 +5,19 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::artefact::{ArtefactError, write_atomically};
-use super::ellipsoid::Ellipsoid;
-use super::failures::FailedVehicle;
-use super::findings::{Findings, Performance, Run, finite};
 use super::hulls::Hulls;
-use super::legs::{self, LegNumbers};
-use super::network::Network;
+use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
-use super::strain::VehicleNumbers;
 use super::verdict::{Fails, Verdict, at_rest, rises};
-use super::verification::Verification;
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{Breath, Reassignment};
-use tautline_core::swarm::Pair;
+use tautline_core::swarm::{ClosestApproach, Pair};
+use tautline_laws::law::{Certificate, Void};
+use tautline_sim::link::Traffic;
+use tautline_sim::metrics::{LegSummary, Strain, Summary};
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::{Failure, FailureKind, Scenario};
+use tautline_sim::sim::{Breakdown, Ending, Flight};
 
 /// Version of the keys: raised when one is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -42,7 +42,7 @@ pub struct Report {
     pub vehicle: Option<VehicleNumbers>,
     /// What became of messages, where they were sent one by one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub network: Option<Network>,
+    pub network: Option<Traffic>,
     /// Vehicles of which a part failed, in the scenario's order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<FailedVehicle>,
@@ -121,6 +121,14 @@ pub struct Separation<Delta = f64> {
 }
 
 impl<Delta> Separation<Delta> {
+    /// The closest approach of two vehicles over the whole run.
+    #[must_use]
+    pub fn closest(&self) -> Option<ClosestApproach> {
+        let (separation_m, time_s, [first, second]) = (self.min_m?, self.min_at_s?, self.min_pair?);
+        let (first, second) = (first.checked_sub(1)?, second.checked_sub(1)?);
+        (first != second).then(|| ClosestApproach { pair: Pair::new(first, second), separation_m, time_s })
+    }
+
     /// Whether what was promised was promised of the time at which two came closest.
     pub(super) fn is_promised(&self) -> bool {
         self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)
@@ -253,68 +261,292 @@ pub struct Velocity {
     pub common_m_s: Option<f64>,
 }
 
+/// What must stay empty around a vehicle, and how close vehicles came in metres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ellipsoid {
+    /// Its half axes \[m\]: a scaled length is a level one in metres, and a height divided by the third over the first.
+    pub half_axes_m: [f64; 3],
+    /// Smallest distance of two centres over the whole run \[m\], unscaled.
+    pub min_distance_m: Option<f64>,
+    /// When it occurred \[s\].
+    pub min_distance_at_s: Option<f64>,
+    /// Which pair.
+    pub min_distance_pair: Option<[usize; 2]>,
+}
+
+/// Numbers of quadrotors, over all samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VehicleNumbers {
+    /// Name of their model.
+    pub model: String,
+    /// Largest angle between a vehicle's thrust and the vertical \[deg\].
+    pub max_tilt_deg: f64,
+    /// Largest thrust of a rotor over the most that it has.
+    pub thrust_share: f64,
+}
+
+/// A vehicle of which a part failed, for the rest of the flight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FailedVehicle {
+    /// The vehicle, from 1.
+    pub vehicle: u64,
+    /// From when on \[s\].
+    pub at_s: f64,
+    /// What failed, as the scenario names it: `dead`, `rotor`, `silent` or `frozen`.
+    pub kind: String,
+}
+
+impl From<&Failure> for FailedVehicle {
+    fn from(failure: &Failure) -> Self {
+        let kind = match failure.kind {
+            FailureKind::Dead {} => "dead",
+            FailureKind::Rotor { .. } => "rotor",
+            FailureKind::Silent {} => "silent",
+            FailureKind::Frozen {} => "frozen",
+        };
+        Self { vehicle: failure.vehicle, at_s: failure.at_s, kind: kind.to_owned() }
+    }
+}
+
+/// Why a run ended that its user stopped.
+pub const INTERRUPTED: &str = "interrupted";
+
+/// Facts of the run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// Control and physics step \[s\].
+    pub dt_s: f64,
+    /// Steps flown.
+    pub steps: u64,
+    /// Those of them that were flown in parts, for a law too fast for them or vehicles too near each other.
+    #[serde(default)]
+    pub refined_steps: u64,
+    /// Those of which even the shortest part was longer than the law allows: what was flown is not the law's motion.
+    #[serde(default)]
+    pub overlong_steps: u64,
+    /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
+    pub ended_early: Option<String>,
+    /// Number of vehicles N.
+    pub vehicles: usize,
+    /// [`tautline_core::record::StateHash`] of the recorded states.
+    pub state_hash: String,
+}
+
+/// Wall-clock times. Work done side by side counts in each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Performance {
+    /// From first to last step \[s\].
+    pub wall_s: f64,
+    /// Time flown over `wall_s`; null where that took no time.
+    pub real_time_factor: Option<f64>,
+    /// In the law \[s\].
+    pub law_s: f64,
+    /// In the law's energy \[s\].
+    #[serde(default)]
+    pub energy_s: f64,
+    /// In the plant \[s\].
+    pub physics_s: f64,
+    /// Of that, in the forces, rotors and attitude loops of vehicles that have them \[s\].
+    #[serde(default)]
+    pub airframe_s: f64,
+    /// In the judge \[s\].
+    pub audit_s: f64,
+    /// In the recorders \[s\].
+    pub record_s: f64,
+}
+
+/// The same flight with every step half as long, and what that changed.
+///
+/// What bounces hard off a barrier is chaotic: 10 to 20 of a hundred such flights end elsewhere however fine the step is. A
+/// verdict that two steps agree on is called firm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verification {
+    /// Longest step of the second flight \[s\].
+    pub dt_s: f64,
+    /// Whether the second flight passed.
+    pub pass: bool,
+    /// Smallest separation of the second flight \[m\].
+    pub min_m: Option<f64>,
+    /// When the second flight reached its formation \[s\].
+    pub reached_at_s: Option<f64>,
+    /// Whether both flights have the same verdict, and smallest separations that differ by at most 1 % of delta.
+    pub firm: bool,
+}
+
+/// A flight and everything else that its report is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct FlightResult<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Findings before the first step, under the law that was flown.
+    pub preflight: &'a Preflight,
+    /// The flight.
+    pub flight: &'a Flight,
+    /// Numbers of the samples.
+    pub summary: &'a Summary,
+    /// Legs that another one followed.
+    pub ended_legs: &'a [LegSummary],
+    /// Strain of bodies that turn.
+    pub strain: Option<Strain>,
+    /// [`tautline_core::record::StateHash`] of the recorded states.
+    pub state_hash: &'a str,
+}
+
+impl FlightResult<'_> {
+    /// Returns when the last formation was reached \[s\], where it was kept to the end of a flight that was flown to its end.
+    pub(super) fn reached_at_s(&self) -> Option<f64> {
+        self.summary.reached_at_s.filter(|_| self.flight.ending == Ending::Completed)
+    }
+
+    /// Whether a disturbance or a body may keep vehicles at rest that are commanded to move.
+    pub(super) fn is_disturbed(&self) -> bool {
+        !self.scenario.wind.is_still() || !self.scenario.is_exact() || !self.scenario.airframe.is_point()
+    }
+
+    /// Whether the energy is proved never to grow: relative velocities are damped in still air, and nothing voids the proof
+    /// but that it certifies no distance.
+    pub(super) fn energy_falls(&self) -> bool {
+        let holds = |void: &Void| {
+            matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::StepsTooLong | Void::Unresolved)
+        };
+        self.scenario.wind.is_still()
+            && self.preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)
+            && self.flight.certificate.void.iter().all(holds)
+    }
+
+    /// Why the run ended before its time, with a remedy.
+    fn ended_early(&self) -> Option<String> {
+        match &self.flight.ending {
+            Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
+                Some(format!("{why}; shorten time.duration_s, or reduce what drives the mean velocity"))
+            }
+            Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
+            ending => ending.reason(),
+        }
+    }
+
+    fn run(&self) -> Run {
+        let Flight { duration_s, steps, refined_steps, overlong_steps, .. } = *self.flight;
+        Run {
+            duration_s,
+            dt_s: self.scenario.time.dt_s,
+            steps,
+            refined_steps,
+            overlong_steps,
+            ended_early: self.ended_early(),
+            vehicles: self.scenario.count(),
+            state_hash: self.state_hash.to_owned(),
+        }
+    }
+
+    fn performance(&self) -> Performance {
+        let times = &self.flight.performance;
+        let wall_s = times.wall.as_secs_f64();
+        Performance {
+            wall_s,
+            real_time_factor: finite(self.flight.duration_s / wall_s),
+            law_s: times.law.as_secs_f64(),
+            energy_s: times.energy.as_secs_f64(),
+            physics_s: times.physics.as_secs_f64(),
+            airframe_s: times.airframe.as_secs_f64(),
+            audit_s: times.audit.as_secs_f64(),
+            record_s: times.record.as_secs_f64(),
+        }
+    }
+
+    fn separation(&self) -> Separation {
+        let Certificate { certified_m, certified_until_s, void, .. } = &self.flight.certificate;
+        let closest = self.flight.audit.closest;
+        let in_metres = self.flight.in_metres.as_ref().and_then(|in_metres| in_metres.closest);
+        let [min_m, min_distance_m] = [closest, in_metres].map(|of| finite(of?.separation_m));
+        let [min_at_s, min_distance_at_s] = [closest, in_metres].map(|of| finite(of?.time_s));
+        let [min_pair, min_distance_pair] = [closest, in_metres].map(|of| of.map(|of| of.pair.numbers()));
+        let half_axes_m = self.scenario.half_axes_m();
+        Separation {
+            delta_m: self.scenario.delta_m,
+            min_m,
+            min_at_s,
+            min_pair,
+            certified_m: certified_m.and_then(finite),
+            certified_until_s: certified_until_s.and_then(finite),
+            certificate_void: void.iter().map(ToString::to_string).collect(),
+            ellipsoid: half_axes_m.map(|half_axes_m| Ellipsoid {
+                half_axes_m,
+                min_distance_m,
+                min_distance_at_s,
+                min_distance_pair,
+            }),
+        }
+    }
+
+    fn audit(&self) -> Audit {
+        let (flight, audit) = (self.flight, &self.flight.audit);
+        let contact_pairs = self.scenario.has_engine().then_some(flight.engine_contacts.len() as u64);
+        Audit {
+            status: flight.status(),
+            violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
+            undecided: audit.unresolved + audit.refused,
+            steps: audit.steps,
+            pairs_checked: audit.pairs_checked,
+            closed_form: ClosedForm { min_m: audit.closest.and_then(|closest| finite(closest.separation_m)) },
+            parry: Parry {
+                min_toi_s: audit.parry.min_toi_s.and_then(finite),
+                disagreements: audit.parry.disagreements,
+            },
+            rapier: Rapier { contact_pairs },
+        }
+    }
+
+    fn vehicle(&self) -> Option<VehicleNumbers> {
+        let model = &self.scenario.airframe.quadrotor()?.model;
+        let Strain { max_tilt_rad, max_thrust_n } = self.strain?;
+        Some(VehicleNumbers {
+            model: model.name.clone(),
+            max_tilt_deg: max_tilt_rad.to_degrees(),
+            thrust_share: max_thrust_n / model.max_thrust_n,
+        })
+    }
+}
+
 impl Report {
-    /// The report on what was found.
+    /// The report on a flight.
     #[must_use]
-    pub fn new(findings: &Findings<'_>) -> Self {
-        let Findings { audit, summary, certificate, .. } = findings;
-        let closest = audit.closest;
-        let min_m = closest.and_then(|closest| finite(closest.separation_m));
-        Self {
+    pub fn new(result: &FlightResult<'_>) -> Self {
+        let FlightResult { scenario, flight, summary, .. } = *result;
+        let failed = scenario.failures.iter().filter(|failure| failure.at_s <= flight.duration_s);
+        let mut report = Self {
             schema_version: SCHEMA_VERSION,
-            scenario: ScenarioIdentity {
-                name: findings.scenario_name.to_owned(),
-                sha256: findings.scenario_sha256.to_owned(),
-            },
+            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
-            verdict: Verdict::of(findings),
-            separation: Separation {
-                delta_m: findings.delta_m,
-                min_m,
-                min_at_s: closest.and_then(|closest| finite(closest.time_s)),
-                min_pair: closest.map(|closest| closest.pair.numbers()),
-                certified_m: certificate.certified_m.and_then(finite),
-                certified_until_s: certificate.certified_until_s.and_then(finite),
-                certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
-                ellipsoid: Ellipsoid::of(findings),
-            },
-            audit: Audit {
-                status: findings.status(),
-                violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
-                undecided: audit.unresolved + audit.refused,
-                steps: audit.steps,
-                pairs_checked: audit.pairs_checked,
-                closed_form: ClosedForm { min_m },
-                parry: Parry {
-                    min_toi_s: audit.parry.min_toi_s.and_then(finite),
-                    disagreements: audit.parry.disagreements,
-                },
-                rapier: Rapier { contact_pairs: findings.engine_contact_pairs },
-            },
-            vehicle: findings.vehicle.cloned(),
-            network: findings.network,
-            failures: findings.failures.to_vec(),
-            obstacles: Obstacles::of(findings),
-            hulls: findings.hulls.clone(),
+            verdict: Verdict { pass: false, refused: Vec::new(), reasons: Vec::new() },
+            separation: result.separation(),
+            audit: result.audit(),
+            vehicle: result.vehicle(),
+            network: flight.traffic,
+            failures: failed.map(FailedVehicle::from).collect(),
+            obstacles: Obstacles::of(result),
+            hulls: Hulls::of(result),
             formation: FormationNumbers {
-                reached: findings.reached_at_s().is_some(),
-                reached_at_s: findings.reached_at_s().and_then(finite),
+                reached: result.reached_at_s().is_some(),
+                reached_at_s: result.reached_at_s().and_then(finite),
                 held_s: summary.held_s.and_then(finite),
-                fails: Fails::of(findings),
-                at_rest: at_rest(findings),
+                fails: Fails::of(result),
+                at_rest: at_rest(result),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),
                 max_position_error_m: finite(summary.max_position_error_m),
             },
-            legs: legs::legs(findings),
-            breaths: findings.breaths.to_vec(),
-            assignments: findings.assignments.to_vec(),
+            legs: LegNumbers::of(result),
+            breaths: flight.breaths.clone(),
+            assignments: flight.assignments.clone(),
             energy: Energy {
                 initial: summary.energy_initial.and_then(finite),
                 at_end: summary.energy_final.and_then(finite),
                 max_over_initial: summary.energy_max_over_initial.and_then(finite),
-                max_over_leg_start: findings.energy_rise.and_then(|rise| finite(rise.to / rise.from)),
-                rose: rises(findings),
+                max_over_leg_start: flight.energy_rise.and_then(|rise| finite(rise.to / rise.from)),
+                rose: rises(result),
             },
             control: Control {
                 peak_m_s2: finite(summary.peak_control_m_s2),
@@ -324,10 +556,12 @@ impl Report {
                 disagreement_m_s: finite(summary.disagreement_m_s),
                 common_m_s: finite(summary.common_m_s),
             },
-            run: findings.run.clone(),
+            run: result.run(),
             verification: None,
-            performance: Some(findings.performance),
-        }
+            performance: Some(result.performance()),
+        };
+        report.verdict = Verdict::of(&report, result);
+        report
     }
 
     /// The report as indented JSON with a line end.
@@ -346,4 +580,9 @@ impl Report {
         let json = self.to_json().map_err(|error| ArtefactError::new(path, error.into()))?;
         write_atomically(path, json.as_bytes())
     }
+}
+
+/// None for a number that is not finite.
+pub(super) fn finite(number: f64) -> Option<f64> {
+    Some(number).filter(|number| number.is_finite())
 }

@@ -2,19 +2,18 @@
 
 use maud::{Markup, html};
 
-use super::findings::Performance;
-use super::flight::{Report, Violation};
+use super::flight::{Performance, Report, Violation};
 use super::page::{self, Badge, Page, Picture, Start, noted, section};
-use super::vehicles::plant;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
 use tautline_core::text::{at_least, seconds, significant};
 use tautline_laws::formation::Freedom;
-use tautline_sim::scenario::Scenario;
+use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::vehicle::Airframe;
 
 /// Most violations, or hits of hulls, that are listed one by one.
-const LISTED: usize = 50;
+pub(super) const LISTED: usize = 50;
 
 /// Most bytes of a scenario on a page.
 const LONGEST_SCENARIO: usize = 100_000;
@@ -290,12 +289,59 @@ fn hits(bounces: &[Bounce]) -> Markup {
     }
 }
 
-/// How many of a list are not on the page.
-fn more(all: usize) -> Markup {
+/// The number of entries of a list that are not on the page.
+pub(super) fn more(all: usize) -> Markup {
     html! {
         @if let Some(more @ 1..) = all.checked_sub(LISTED) {
             p { (more) " more are in report.json." }
         }
+    }
+}
+
+/// The model of the vehicles, and the use of a command within a step.
+fn plant(scenario: &Scenario) -> (String, &'static str) {
+    match (&scenario.airframe, scenario.plant) {
+        (Airframe::Unicycle(_), _) => (
+            "The vehicles are unicycles: they go where they look, turn no faster than they can, and never stop. Their way within a \
+             step is an arc in closed form, which the audit takes for straight: they leave it by less than 1e-5 m. Mass and hull \
+             play no part."
+                .to_owned(),
+            "held over it",
+        ),
+        (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier) => (
+            format!(
+                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom that four rotors lift, under \
+                 gravity, with the lag of their motors, drag and an attitude loop at {} Hz; within a step each moves on a straight \
+                 line at constant speed, and hulls that touch push each other. Everything is computed \
+                 in double precision.",
+                quadrotor.model.name,
+                quadrotor.attitude_hz
+            ),
+            "held until the next one",
+        ),
+        (Airframe::Point, PlantSpec::Rapier) => (
+            "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
+             at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
+             so close that they touch. Everything is computed in double precision."
+                .to_owned(),
+            "held over it",
+        ),
+        (Airframe::Quadrotor(quadrotor), PlantSpec::Ideal) => (
+            format!(
+                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an integrator of 8th \
+                 order in double precision (64 bits); hulls play no part, and there is no engine to see contacts. The audit takes \
+                 them to move on straight lines within a step.",
+                quadrotor.model.name
+            ),
+            "held until the next one",
+        ),
+        (Airframe::Point, PlantSpec::Ideal) => (
+            "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
+             8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
+             contacts. The audit takes them to move on straight lines within a step."
+                .to_owned(),
+            "recorded; the motion between follows the law in continuous time",
+        ),
     }
 }
 

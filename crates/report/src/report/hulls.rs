@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::flight::FlightResult;
 use tautline_audit::AuditOutcome;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{metres, metres_below, seconds};
@@ -31,34 +32,27 @@ pub struct PassedThrough {
 }
 
 impl Hulls {
-    /// Of solid hulls of these radii \[m\] that hit so, in steps of `dt_s`.
-    #[must_use]
-    pub fn solid(bounces: &[Bounce], audit: &AuditOutcome, hull_radius_m: &[f64], dt_s: f64) -> Self {
-        let hit = |through: &PassedThrough, from_s: f64, to_s: f64| {
-            bounces.iter().any(|b| b.pair == through.pair && from_s - dt_s <= b.time_s && b.time_s <= to_s + dt_s)
-        };
-        Self { bounces: Some(bounces.to_vec()), passed_through: Self::through(audit, hull_radius_m, hit) }
+    /// The hulls of a flight: solid in the engine, else those that points do not have.
+    pub(super) fn of(result: &FlightResult<'_>) -> Self {
+        let FlightResult { scenario, flight, .. } = *result;
+        let audit = flight.in_metres.as_ref().unwrap_or(&flight.audit);
+        let bounces = scenario.has_engine().then(|| flight.bounces.clone());
+        Self::new(bounces, audit, &scenario.hull_radius_m, scenario.time.dt_s)
     }
 
-    /// Of points, with the radius of each hull that they do not have \[m\].
-    #[must_use]
-    pub fn of_points(audit: &AuditOutcome, hull_radius_m: &[f64]) -> Self {
-        Self { bounces: None, passed_through: Self::through(audit, hull_radius_m, |_, _, _| false) }
-    }
-
-    /// The first pair that came closer than its hulls are wide in a violation in which they did not hit.
-    fn through(
-        audit: &AuditOutcome,
-        hull_radius_m: &[f64],
-        hit: impl Fn(&PassedThrough, f64, f64) -> bool,
-    ) -> Option<PassedThrough> {
+    /// Hulls of these radii \[m\] with their hits in steps of `dt_s`, or of points without hits. The first pair that came closer
+    /// than its hulls are wide in a violation without a hit passed through each other.
+    fn new(bounces: Option<Vec<Bounce>>, audit: &AuditOutcome, hull_radius_m: &[f64], dt_s: f64) -> Self {
         let through = audit.violations.iter().filter_map(|found| {
             let touching_m = hull_radius_m[found.pair.first()] + hull_radius_m[found.pair.second()];
             let (pair, min_at_s, min_m) = (found.pair, found.min_at_s, found.min_m);
-            let through = PassedThrough { pair, min_at_s, min_m, touching_m };
-            (min_m < touching_m && !hit(&through, found.from_s, found.to_s)).then_some(through)
+            let is_hit = bounces.iter().flatten().any(|bounce| {
+                bounce.pair == pair && (found.from_s - dt_s..=found.to_s + dt_s).contains(&bounce.time_s)
+            });
+            (min_m < touching_m && !is_hit).then_some(PassedThrough { pair, min_at_s, min_m, touching_m })
         });
-        through.min_by(|a, b| a.min_at_s.total_cmp(&b.min_at_s))
+        let passed_through = through.min_by(|a, b| a.min_at_s.total_cmp(&b.min_at_s));
+        Self { bounces, passed_through }
     }
 
     /// In a few words, where there is something to say.
@@ -132,7 +126,7 @@ mod tests {
     }
 
     fn of_points(distances_m: &[f64]) -> Hulls {
-        Hulls::of_points(&audit(distances_m), &[0.25, 0.5])
+        Hulls::new(None, &audit(distances_m), &[0.25, 0.5], 0.004)
     }
 
     #[test]
@@ -159,12 +153,12 @@ mod tests {
     #[test]
     fn solid_hulls_that_a_step_leapt_over_are_not_said_to_have_missed() {
         let points = audit(&[0.1]);
-        let leapt = Hulls::solid(&[], &points, &[0.25, 0.5], 0.004);
+        let leapt = Hulls::new(Some(Vec::new()), &points, &[0.25, 0.5], 0.004);
         assert_eq!(leapt.brief().as_deref(), Some("vehicles 1-2 passed through each other in one step"));
         assert!(leapt.reason().is_some_and(|reason| reason.contains("A step leapt over the hit: shorten time.dt_s")));
         // They hit in that violation, or another pair did.
         let hit = |pair, time_s| [Bounce { pair, time_s, closing_m_s: 1.0 }];
-        let of = |bounces: &[Bounce]| Hulls::solid(bounces, &points, &[0.25, 0.5], 0.004).passed_through;
+        let of = |bounces: &[Bounce]| Hulls::new(Some(bounces.to_vec()), &points, &[0.25, 0.5], 0.004).passed_through;
         assert_eq!(of(&hit(Pair::new(0, 1), 0.2)), None);
         assert!(of(&hit(Pair::new(0, 2), 0.2)).is_some() && of(&hit(Pair::new(0, 1), 2.0)).is_some());
     }

@@ -3,7 +3,7 @@
 use maud::Markup;
 use serde::{Deserialize, Serialize};
 
-use super::findings::{Findings, finite};
+use super::flight::{FlightResult, finite};
 use super::page;
 use tautline_core::text::{at_least, seconds};
 use tautline_sim::metrics::LegSummary;
@@ -25,29 +25,31 @@ pub struct LegNumbers {
     pub energy_bound: Option<f64>,
 }
 
-/// Of a flight of several legs; none for a flight of one.
-pub(super) fn legs(findings: &Findings<'_>) -> Vec<LegNumbers> {
-    let (ended, last) = (findings.ended_legs, findings.ended_legs.len());
-    if findings.legs < 2 {
-        return Vec::new();
-    }
-    let number = |leg: usize| {
-        let began = |leg: usize| leg.checked_sub(1).map_or(Some(0.0), |before| Some(ended.get(before)?.ended_at_s));
-        let LegSummary { ended_at_s, reached_at_s } = ended.get(leg).copied().unwrap_or(LegSummary {
-            ended_at_s: findings.run.duration_s,
-            reached_at_s: findings.reached_at_s().filter(|_| leg == last),
-        });
-        let bound = findings.certificate.legs.get(leg);
-        LegNumbers {
-            leg: leg + 1,
-            from_s: began(leg).filter(|_| leg <= last),
-            to_s: Some(ended_at_s).filter(|_| leg <= last),
-            reached_at_s,
-            certified_m: bound.and_then(|bound| bound.certified_m).and_then(finite),
-            energy_bound: bound.and_then(|bound| finite(bound.energy)),
+impl LegNumbers {
+    /// The legs of a flight of several; none for a flight of one.
+    pub(super) fn of(result: &FlightResult<'_>) -> Vec<Self> {
+        let (ended, last, count) = (result.ended_legs, result.ended_legs.len(), result.scenario.legs.len());
+        if count < 2 {
+            return Vec::new();
         }
-    };
-    (0..findings.legs).map(number).collect()
+        let number = |leg: usize| {
+            let began = |leg: usize| leg.checked_sub(1).map_or(Some(0.0), |before| Some(ended.get(before)?.ended_at_s));
+            let LegSummary { ended_at_s, reached_at_s } = ended.get(leg).copied().unwrap_or(LegSummary {
+                ended_at_s: result.flight.duration_s,
+                reached_at_s: result.reached_at_s().filter(|_| leg == last),
+            });
+            let bound = result.flight.certificate.legs.get(leg);
+            Self {
+                leg: leg + 1,
+                from_s: began(leg).filter(|_| leg <= last),
+                to_s: Some(ended_at_s).filter(|_| leg <= last),
+                reached_at_s,
+                certified_m: bound.and_then(|bound| bound.certified_m).and_then(finite),
+                energy_bound: bound.and_then(|bound| finite(bound.energy)),
+            }
+        };
+        (0..count).map(number).collect()
+    }
 }
 
 /// Legs before the last that were not reached, or that never began.

@@ -6,46 +6,29 @@
 //! null.
 
 mod artefact;
-mod ellipsoid;
-mod energy;
-mod failures;
-mod findings;
 mod flight;
 mod html;
 mod hulls;
 mod legs;
 mod moments;
-mod network;
 mod obstacles;
 pub mod page;
 pub mod recorded;
-mod strain;
-mod vehicles;
 mod verdict;
-mod verification;
 mod words;
 
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
-pub use ellipsoid::Ellipsoid;
-pub use failures::FailedVehicle;
-pub use findings::{Findings, INTERRUPTED, Performance, Run};
 pub use flight::{
-    Audit, ClosedForm, Control, Energy, FormationNumbers, Parry, Rapier, Report, SCHEMA_VERSION, ScenarioIdentity,
-    Separation, Tool, Velocity, Violation,
+    Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, INTERRUPTED, Parry,
+    Performance, Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity,
+    Verification, Violation,
 };
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
-pub use network::Network;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
-pub use strain::VehicleNumbers;
 pub use tautline_audit::Status;
 pub use verdict::{Fails, Verdict};
-pub use verification::Verification;
 
-#[cfg(test)]
-mod early_end_tests;
-#[cfg(test)]
-mod promise_tests;
 #[cfg(test)]
 mod tests;

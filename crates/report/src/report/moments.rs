@@ -4,6 +4,7 @@ use super::flight::{Report, Violation};
 use super::obstacles::{ObstacleApproach, ObstacleViolation};
 use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::Status;
+use tautline_core::swarm::ClosestApproach;
 use tautline_core::text::{at_least, exact, metres_below, seconds};
 
 impl Report {
@@ -34,16 +35,15 @@ impl Report {
     }
 
     fn closest_moment(&self) -> Option<Moment> {
-        let of = &self.separation;
-        let (min_m, at_s, [first, second]) = (of.min_m?, of.min_at_s?, of.min_pair?);
-        let (least, unit, at) = (at_least(min_m, 6), self.judgement().unit, seconds(at_s));
+        let ClosestApproach { pair, separation_m, time_s: at_s } = self.separation.closest()?;
+        let (least, unit, at) = (at_least(separation_m, 6), self.judgement().unit, seconds(at_s));
         Some(Moment {
             kind: Kind::Closest,
-            vehicles: vec![first - 1, second - 1],
+            vehicles: vec![pair.first(), pair.second()],
             obstacle: None,
             span: Span { from_s: at_s, to_s: at_s, at_s },
             brief: String::new(),
-            said: format!("Closest approach: {least} {unit}, vehicles {first}-{second} at {at}"),
+            said: format!("Closest approach: {least} {unit}, vehicles {pair} at {at}"),
         })
     }
 

@@ -3,14 +3,13 @@
 use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 
-use super::energy::INTEGRATION;
-use super::findings::{Findings, finite};
+use super::flight::{FlightResult, finite};
+use super::html::{LISTED, more};
 use super::page;
+use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
-
-/// Violations that a page lists.
-const LISTED: usize = 50;
+use tautline_sim::sim::Ending;
 
 /// The judge's findings on a flight past obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,12 +56,12 @@ pub struct ObstacleViolation {
 }
 
 impl Obstacles {
-    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
-        let (outcome, names) = (findings.clearance?, findings.obstacles);
+    pub(super) fn of(result: &FlightResult<'_>) -> Option<Self> {
+        let (outcome, obstacles) = (result.flight.clearance.as_ref()?, &result.scenario.obstacles);
         let approach = |pair: ObjectPair, clearance_m: f64, min_m: f64, min_at_s: f64| match pair {
             ObjectPair::Obstacle { vehicle, obstacle } => Some(ObstacleApproach {
                 vehicle: vehicle + 1,
-                obstacle: names.get(obstacle).cloned().unwrap_or_default(),
+                obstacle: obstacles.get(obstacle).map(|obstacle| obstacle.name.clone()).unwrap_or_default(),
                 clearance_m,
                 min_m,
                 min_at_s,
@@ -76,8 +75,8 @@ impl Obstacles {
         };
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
-            status: if findings.run.ended_early.is_some() { status.and(Status::Undecided) } else { *status },
-            certified_room_m: findings.certificate.certified_room_m.and_then(finite),
+            status: if result.flight.ending == Ending::Completed { *status } else { status.and(Status::Undecided) },
+            certified_room_m: result.flight.certificate.certified_room_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
             undecided: undecided.len() as u64 + unresolved + refused,
@@ -170,9 +169,7 @@ impl Obstacles {
                         [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
                     }),
                 ))
-                @if let Some(more @ 1..) = self.violations.len().checked_sub(LISTED) {
-                    p { (more) " more are in report.json." }
-                }
+                (more(self.violations.len()))
             }
         }
     }

@@ -1,25 +1,33 @@
-//! Tests of the report as a whole: keys, null for what is no number, reasons, headlines.
+//! Keys, null for numbers that are not finite, reasons, headlines, certificates, early ends.
+
+use std::time::Duration;
+
+use nalgebra::Vector3;
 
 use super::*;
-use tautline_audit::{self as audit, AuditOutcome, Auditor};
+use tautline_audit::{AuditOutcome, Auditor, ClearanceAuditor, ClearanceOutcome, Obstacle, Shape};
 use tautline_core::record::EnergyRise;
 use tautline_core::swarm::{Pair, Rows};
-use tautline_laws::law::{Certificate, Void};
+use tautline_laws::law::{Certificate, LawError, LegBound, Void};
+use tautline_laws::space;
 use tautline_laws::target::Arrival;
 use tautline_sim::metrics::{LegSummary, Summary};
+use tautline_sim::preflight::{Code, Preflight, Warning};
+use tautline_sim::scenario::{Safety, Scenario, Source};
+use tautline_sim::sim::{self, Ending, Flight};
 
 const DELTA_M: f64 = 2.0;
 const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
 
 /// Two vehicles that pass each other at `miss_m` between 0 and 1 s, as the judge sees it.
-pub(super) fn passing(miss_m: f64) -> AuditOutcome {
+fn passing(miss_m: f64) -> AuditOutcome {
     let mut auditor = Auditor::new(2, DELTA_M).expect("a judge");
     auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, miss_m, 0.0])).expect("judged");
     auditor.step(1.0, &Rows::from_row_slice(&[5.0, 0.0, 0.0, -5.0, miss_m, 0.0])).expect("judged");
     auditor.finish()
 }
 
-pub(super) const REACHED: Summary = Summary {
+const REACHED: Summary = Summary {
     extent_m: 6.0,
     fastest_m_s: 1.0,
     samples: 7201,
@@ -39,27 +47,27 @@ pub(super) const REACHED: Summary = Summary {
     energy_max_over_initial: Some(1.0),
 };
 
-pub(super) const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
+const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
 
 /// What a test changes about an otherwise good run.
-pub(super) struct Case {
-    pub(super) audit: AuditOutcome,
-    /// Half axes of ellipsoids, and what the judge saw in metres.
-    pub(super) in_metres: Option<([f64; 3], AuditOutcome)>,
-    pub(super) summary: Summary,
-    pub(super) trap_dimension: Option<usize>,
-    pub(super) ended_early: Option<&'static str>,
-    pub(super) refused: &'static [&'static str],
-    pub(super) certificate: Certificate,
-    pub(super) clearance: Option<tautline_audit::ClearanceOutcome>,
-    pub(super) energy_falls: bool,
-    pub(super) energy_rise: Option<EnergyRise>,
-    pub(super) legs: usize,
-    pub(super) ended_legs: Vec<LegSummary>,
+struct Case {
+    audit: AuditOutcome,
+    /// What the judge saw in metres, where ellipsoids stay empty.
+    in_metres: Option<AuditOutcome>,
+    summary: Summary,
+    trap_dimension: Option<usize>,
+    ending: Ending,
+    refused: &'static [Code],
+    certificate: Certificate,
+    clearance: Option<ClearanceOutcome>,
+    energy_falls: bool,
+    energy_rise: Option<EnergyRise>,
+    legs: usize,
+    ended_legs: Vec<LegSummary>,
 }
 
 impl Case {
-    pub(super) fn good() -> Self {
+    fn good() -> Self {
         let certificate = Certificate {
             certified_m: Some(2.055_307),
             energy_initial: Some(3.656),
@@ -71,7 +79,7 @@ impl Case {
             in_metres: None,
             summary: REACHED,
             trap_dimension: None,
-            ended_early: None,
+            ending: Ending::Completed,
             refused: &[],
             certificate,
             clearance: None,
@@ -82,45 +90,53 @@ impl Case {
         }
     }
 
-    pub(super) fn report(&self) -> Report {
-        Report::new(&Findings {
-            scenario_name: "pentagon",
-            scenario_sha256: "00ff",
-            delta_m: DELTA_M,
-            half_axes_m: self.in_metres.as_ref().map(|(axes, _)| *axes),
-            judge: JUDGE,
-            trap_dimension: self.trap_dimension,
-            formation_dimension: 2,
-            refused: self.refused,
-            certificate: &self.certificate,
-            audit: &self.audit,
-            in_metres: self.in_metres.as_ref().map(|(_, audit)| audit),
-            clearance: self.clearance.as_ref(),
-            obstacles: &["tower".to_owned()],
-            vehicle: None,
-            engine_contact_pairs: Some(0),
-            hulls: &Hulls { bounces: Some(Vec::new()), passed_through: None },
-            summary: &self.summary,
-            legs: self.legs,
-            ended_legs: &self.ended_legs,
-            breaths: &[],
-            assignments: &[],
-            network: None,
-            failures: &[],
-            is_disturbed: false,
+    fn report(&self) -> Report {
+        let mut scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
+        scenario.arrival = JUDGE;
+        let mut preflight = Preflight::of(&scenario).expect("a law");
+        let message = String::new();
+        preflight.warnings = self.refused.iter().map(|&code| Warning { code, message: message.clone() }).collect();
+        preflight.start_dimension = self.trap_dimension.unwrap_or(preflight.formation_dimension);
+        preflight.velocity_margin_per_s = self.energy_falls.then_some(1.0);
+        scenario.legs = vec![scenario.legs[0].clone(); self.legs];
+        scenario.obstacles = vec![space::Obstacle {
+            name: "tower".to_owned(),
+            place_m: Vector3::zeros(),
+            shape: space::Shape::Ball { radius_m: 1.0 },
+            clearance_m: 0.5,
+        }];
+        if self.in_metres.is_some() {
+            scenario.safety = Safety::Ellipsoid { half_axes_m: [1.0, 1.0, 3.0] };
+        }
+        let wall = Duration::from_millis(500);
+        let flight = Flight {
+            law: "edge-tension".to_owned(),
+            ending: self.ending.clone(),
+            duration_s: 120.0,
+            steps: 28_800,
+            refined_steps: 0,
+            overlong_steps: 0,
+            certificate: self.certificate.clone(),
+            audit: self.audit.clone(),
+            in_metres: self.in_metres.clone(),
+            clearance: self.clearance.clone(),
+            engine_contacts: Vec::new(),
+            bounces: Vec::new(),
             energy_rise: self.energy_rise,
-            energy_falls: self.energy_falls,
-            run: &Run {
-                duration_s: 120.0,
-                dt_s: 1.0 / 240.0,
-                steps: 28_800,
-                refined_steps: 0,
-                overlong_steps: 0,
-                ended_early: self.ended_early.map(str::to_owned),
-                vehicles: 5,
-                state_hash: "0123456789abcdef".to_owned(),
-            },
-            performance: Performance { wall_s: 0.5, real_time_factor: Some(240.0), ..Performance::default() },
+            breaths: Vec::new(),
+            assignments: Vec::new(),
+            traffic: None,
+            last: scenario.start.clone(),
+            performance: sim::Performance { wall, ..sim::Performance::default() },
+        };
+        Report::new(&FlightResult {
+            scenario: &scenario,
+            preflight: &preflight,
+            flight: &flight,
+            summary: &self.summary,
+            ended_legs: &self.ended_legs,
+            strain: None,
+            state_hash: "0123456789abcdef",
         })
     }
 
@@ -365,7 +381,7 @@ fn the_headline_names_the_number_that_fails() {
 
 #[test]
 fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
-    let case = Case { refused: &["start-on-line", "drift-unresolved"], ..Case::good() };
+    let case = Case { refused: &[Code::StartOnLine, Code::DriftUnresolved], ..Case::good() };
     assert_eq!(case.reason(), "The flight was refused before its first step: start-on-line, drift-unresolved.");
     let headline = case.report().headline();
     assert!(
@@ -396,7 +412,7 @@ fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
 fn detectors_that_disagree_never_pass() {
     let mut case = Case::good();
     case.audit.parry.disagreements = 3;
-    case.audit.status = audit::Status::Undecided;
+    case.audit.status = Status::Undecided;
     assert!(case.reason().starts_with("The two detectors of the audit disagree 3 times"));
     assert!(case.report().headline().starts_with("UNDECIDED: the two detectors disagree"));
 }
@@ -404,15 +420,17 @@ fn detectors_that_disagree_never_pass() {
 #[test]
 fn what_was_not_judged_whole_never_passes() {
     let mut case = Case::good();
-    case.audit.status = audit::Status::Undecided;
+    case.audit.status = Status::Undecided;
     assert!(case.reason().starts_with("The audit could not judge everything"));
     assert!(case.report().headline().starts_with("UNDECIDED: not everything could be judged"));
 }
 
 #[test]
 fn a_run_that_ended_early_never_passes_and_says_why() {
-    let ended_early = Some("interrupted");
-    assert_eq!(Case { ended_early, ..Case::good() }.reason(), "The run ended early, at 120.00 s: interrupted.");
+    assert_eq!(
+        Case { ending: Ending::Interrupted, ..Case::good() }.reason(),
+        "The run ended early, at 120.00 s: interrupted."
+    );
 }
 
 #[test]
@@ -446,4 +464,186 @@ fn a_report_on_disk_is_the_report() {
     assert!(text.ends_with("}\n"));
     assert_eq!(serde_json::from_str::<Report>(&text).expect("reads back"), report);
     assert!(report.write(&folder.path().join("missing/report.json")).is_err());
+}
+
+#[test]
+fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
+    let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
+    let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
+        let bound =
+            |energy: f64, certified_m: f64| LegBound { energy, certified_m: Some(certified_m), certified_room_m: None };
+        let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
+        Case { summary, certificate, legs, ended_legs, ..Case::good() }.report()
+    };
+    assert!(report(1, Vec::new(), REACHED).legs.is_empty());
+    let good = report(2, vec![ended(20.0, Some(12.0))], REACHED);
+    assert!(good.verdict.pass && good.headline().contains("; 2 of 2 legs reached"), "{}", good.headline());
+    let numbers = |leg: usize| {
+        let LegNumbers { from_s, to_s, reached_at_s, certified_m, .. } = good.legs[leg];
+        [from_s, to_s, reached_at_s, certified_m]
+    };
+    assert_eq!(numbers(0), [Some(0.0), Some(20.0), Some(12.0), Some(2.1)]);
+    assert_eq!(numbers(1), [Some(20.0), Some(120.0), Some(36.5), Some(2.06)]);
+    assert!(
+        good.text().contains("leg 2        from 20.00 s, reached at 36.50 s, certified 2.060000 m\n"),
+        "{}",
+        good.text()
+    );
+
+    let hurried = report(2, vec![ended(20.0, None)], REACHED);
+    assert!(!hurried.verdict.pass && hurried.headline().contains("1 of 2 legs reached"));
+    assert_eq!(hurried.verdict.reasons, ["Leg 1 was not reached before leg 2 began at 20.00 s."]);
+    let stuck = report(3, vec![ended(20.0, Some(12.0))], NOT_REACHED);
+    assert_eq!(stuck.verdict.reasons.last().map(String::as_str), Some("Leg 3 never began: leg 2 was not reached."));
+    assert_eq!((stuck.legs[2].from_s, stuck.legs[1].reached_at_s), (None, None));
+}
+
+#[test]
+fn a_certificate_is_broken_by_a_share_of_its_clearance() {
+    let report = |certified_m: f64, closest_m: f64| {
+        let certificate = Certificate {
+            certified_m: Some(certified_m),
+            certified_until_s: None,
+            certified_room_m: None,
+            energy_initial: Some(3.656),
+            linked_m: None,
+            void: vec![],
+            legs: vec![],
+        };
+        Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
+    };
+    // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.
+    assert!(!report(2.001_451, 2.001_314).pass);
+    assert!(report(2.001_451, 2.001_450_5).pass);
+}
+
+#[test]
+fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
+    let risen = |share: f64, energy_falls: bool| {
+        let energy_rise = Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 * (1.0 + share) });
+        let case = Case { energy_falls, energy_rise, ..Case::good() };
+        case.report().verdict
+    };
+    assert!(risen(0.9e-3, true).pass, "the error of integration");
+    let verdict = risen(0.77, true);
+    assert!(!verdict.pass && verdict.reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{verdict:?}");
+    assert!(risen(0.77, false).pass, "nothing is proved there");
+}
+
+/// A vehicle passes a ball of 1 m, whose clearance is 0.5 m, at this distance from its middle.
+fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
+    let ball = Obstacle {
+        name: "tower".to_owned(),
+        shape: Shape::Ball { radius_m: 1.0 },
+        clearance_m: Some(0.5),
+        path: vec![(0.0, Vector3::zeros())],
+    };
+    let mut auditor = ClearanceAuditor::new(2, &[ball]).expect("a judge");
+    for (time_s, x) in [(0.0, -9.0), (1.0, 9.0)] {
+        auditor.step(time_s, &Rows::from_row_slice(&[x, miss_m, 0.0, x, 50.0, 0.0])).expect("judged");
+    }
+    auditor.finish()
+}
+
+#[test]
+fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
+    let report = |miss_m: f64, certified_room_m: Option<f64>| {
+        let certificate = Certificate { certified_room_m, ..Case::good().certificate };
+        Case { clearance: Some(passing_a_ball(miss_m)), certificate, ..Case::good() }.report()
+    };
+    let clear = report(2.0, Some(0.4));
+    assert!(clear.verdict.pass, "{:?}", clear.verdict);
+    assert!(clear.headline().contains("0.500 m beyond every obstacle's clearance"), "{}", clear.headline());
+    let broken = report(2.0, Some(0.6));
+    assert!(!broken.verdict.pass && broken.verdict.reasons[0].contains("certifies 0.600 m beyond every clearance"));
+    let violated = report(1.25, None);
+    assert_eq!((violated.audit.status, violated.audit.violations.len()), (Status::Violation, 0));
+    assert_eq!(violated.headline(), "VIOLATION: vehicle 1 came to 0.250 m from `tower` at 0.50 s (clearance 0.500 m)");
+    assert!(report(0.25, None).headline().contains("0.750 m inside `tower`"));
+}
+
+#[test]
+fn beside_a_violation_it_counts_what_could_not_be_told() {
+    let is_all_known = |change: fn(&mut AuditOutcome, &mut ClearanceOutcome)| {
+        let (mut audit, mut clearance) = (passing(1.5), passing_a_ball(1.25));
+        change(&mut audit, &mut clearance);
+        let report = Case { audit, clearance: Some(clearance), ..Case::good() }.report();
+        assert_eq!(report.audit.status, Status::Violation);
+        report.judgement().is_else_known
+    };
+    assert!(is_all_known(|_, _| {}));
+    assert!(!is_all_known(|audit, _| audit.unresolved = 1));
+    assert!(!is_all_known(|audit, _| audit.refused = 1));
+    assert!(!is_all_known(|_, clearance| clearance.unresolved = 1));
+    assert!(!is_all_known(|_, clearance| clearance.refused = 1));
+}
+
+#[test]
+fn around_ellipsoids_both_lengths_are_told_and_the_scaled_one_is_judged() {
+    let case = Case { in_metres: Some(passing(1.25)), ..Case::good() };
+    let report = case.report();
+    assert!(report.headline().starts_with("CLEAR: never closer than 2.460 m scaled to ellipsoids (delta 2.000 m)"));
+    let ellipsoid = report.separation.ellipsoid.as_ref().expect("an ellipsoid");
+    assert_eq!((report.separation.min_m, ellipsoid.min_distance_m), (Some(2.4607), Some(1.25)));
+    assert!(report.text().contains(
+        "ellipsoids   half axes 1.000, 1.000, 3.000 m; unscaled, centres never closer than 1.250000 m at 0.50 s, vehicles 1-2\n"
+    ));
+    let read: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("a report");
+    assert_eq!(read, report);
+    assert_eq!(Case::good().report().separation.ellipsoid, None);
+}
+
+fn early() -> Case {
+    Case { ending: Ending::LawUndefined(LawError::Failed), summary: NOT_REACHED, ..Case::good() }
+}
+
+#[test]
+fn a_flight_that_ended_early_is_undecided_however_clear_it_was_up_to_there() {
+    let report = early().report();
+    assert_eq!((report.audit.status, report.audit.undecided), (Status::Undecided, 0));
+    assert!(!report.verdict.pass);
+    let headline = report.headline();
+    let expected = "UNDECIDED from 120.00 s on: never closer than 2.460 m (delta 2.000 m), formation NOT reached";
+    assert!(headline.starts_with(expected) && headline.ends_with("; ended early at 120.00 s"), "{headline}");
+    assert!(report.judgement().is_else_known, "what was flown was judged");
+    assert_eq!(report.formation.at_rest, None, "more time may help");
+    // The same flight, flown to its end.
+    let whole = Case { ending: Ending::Completed, ..early() }.report();
+    assert_eq!(whole.formation.at_rest, Some(true));
+    assert_eq!(whole.audit.status, Status::Clear);
+    assert!(whole.headline().starts_with("CLEAR: never closer than 2.460 m"), "{}", whole.headline());
+}
+
+#[test]
+fn a_violation_stays_one_and_a_doubt_of_the_judge_is_not_laid_on_the_end() {
+    let violated = Case { audit: passing(1.5), ..early() }.report();
+    assert_eq!(violated.audit.status, Status::Violation);
+    assert!(violated.headline().starts_with("VIOLATION: "), "{}", violated.headline());
+    let mut doubtful = early();
+    doubtful.audit.status = Status::Undecided;
+    doubtful.audit.unresolved = 1;
+    let doubtful = doubtful.report();
+    assert!(doubtful.headline().starts_with("UNDECIDED: not everything could be judged"), "{}", doubtful.headline());
+    assert!(!doubtful.judgement().is_else_known);
+}
+
+#[test]
+fn a_formation_that_was_kept_up_to_an_early_end_is_not_reached() {
+    let report = Case { summary: REACHED, ..early() }.report();
+    let formation = &report.formation;
+    assert_eq!((formation.reached, formation.reached_at_s), (false, None));
+    assert_eq!(formation.fails, Some(Fails::EndedEarly));
+    assert!(report.headline().contains("formation NOT reached (the flight ended early)"), "{}", report.headline());
+    assert_eq!(report.verdict.reasons.len(), 1, "the early end: {:?}", report.verdict.reasons);
+    let whole = Case { ending: Ending::Completed, summary: REACHED, ..early() }.report();
+    assert_eq!((whole.formation.reached, whole.formation.fails), (true, None));
+}
+
+#[test]
+fn a_report_without_wall_clock_times_reads_back_without() {
+    let report = Report { performance: None, ..early().report() };
+    let json = report.to_json().expect("JSON");
+    assert!(!json.contains("performance") && !report.text().contains("wall"), "{json}");
+    assert_eq!(serde_json::from_str::<Report>(&json).expect("reads back"), report);
+    assert!(early().report().to_json().expect("JSON").contains("\"performance\""));
 }

@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::energy::{INTEGRATION, highest_honest};
-use super::failures::FailedVehicle;
-use super::findings::Findings;
+use super::flight::{FailedVehicle, FlightResult, Report};
 use super::legs;
 use super::obstacles::Obstacles;
 use tautline_audit::Status;
 use tautline_core::record::EnergyRise;
 use tautline_core::text::{counted, metres, metres_below, seconds};
+use tautline_sim::metrics::Summary;
 use tautline_sim::scenario::TimeSpec;
+use tautline_sim::sim::Ending;
 
 /// The judgement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,27 +26,27 @@ pub struct Verdict {
 impl Verdict {
     /// Passes where nothing refused the flight, the audit is clear, both detectors agree, the formation is reached and the
     /// run was flown to its end.
-    pub(super) fn of(findings: &Findings<'_>) -> Self {
+    pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
         let reasons: Vec<_> = [
-            refused(findings),
-            violation(findings),
-            unresolved_by_step(findings),
-            Obstacles::of(findings).and_then(|obstacles| obstacles.reason()),
-            findings.hulls.reason(),
-            disagreement(findings),
-            undecided(findings),
-            broken_certificate(findings),
-            steps_too_long(findings),
-            risen_energy(findings),
-            ended_early(findings),
-            not_reached(findings),
-            legs::reason(&legs::legs(findings)),
-            too_flat(findings),
+            refused(result),
+            violation(result),
+            unresolved_by_step(result),
+            report.obstacles.as_ref().and_then(Obstacles::reason),
+            report.hulls.reason(),
+            disagreement(result),
+            undecided(result),
+            broken_certificate(result),
+            steps_too_long(result),
+            risen_energy(result),
+            ended_early(report),
+            not_reached(report, result),
+            legs::reason(&report.legs),
+            too_flat(result),
         ]
         .into_iter()
         .flatten()
         .collect();
-        let refused = findings.refused.iter().map(|&code| code.to_owned()).collect();
+        let refused = result.preflight.refusing().into_iter().map(str::to_owned).collect();
         Self { pass: reasons.is_empty(), refused, reasons }
     }
 }
@@ -72,10 +72,10 @@ pub enum Fails {
 }
 
 impl Fails {
-    pub(super) fn of(findings: &Findings<'_>) -> Option<Self> {
-        let Findings { summary, judge, .. } = findings;
+    pub(super) fn of(result: &FlightResult<'_>) -> Option<Self> {
+        let (summary, judge) = (result.summary, result.scenario.arrival);
         if summary.reached_at_s.is_some() {
-            findings.run.ended_early.as_ref().map(|_| Self::EndedEarly)
+            (result.flight.ending != Ending::Completed).then_some(Self::EndedEarly)
         } else if summary.held_s.is_some() {
             Some(Self::HeldS)
         } else if !summary.max_edge_error_m.is_finite() {
@@ -106,31 +106,31 @@ const COMMANDED_S: f64 = 1.0;
 ///
 /// Returns `None` if this is unknown: the flight ended early, or a disturbance may hold vehicles that stand while they are
 /// commanded.
-pub(super) fn at_rest(findings: &Findings<'_>) -> Option<bool> {
-    let Findings { summary, judge, is_disturbed, run, .. } = findings;
+pub(super) fn at_rest(result: &FlightResult<'_>) -> Option<bool> {
+    let (summary, judge) = (result.summary, result.scenario.arrival);
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
     let lacking_m = summary.max_edge_error_m.max(summary.max_position_error_m) - judge.edge_error_m;
-    let is_void = findings.reached_at_s().is_some() || run.ended_early.is_some();
+    let is_void = result.reached_at_s().is_some() || result.flight.ending != Ending::Completed;
     if is_void || ![speed_m_s, command_m_s2, lacking_m].iter().all(|x| x.is_finite()) {
         return None;
     }
     let horizon_s = REST_DURATIONS * summary.end_s;
     let stands = speed_m_s * horizon_s < lacking_m;
     let is_left_alone = (speed_m_s + command_m_s2 * COMMANDED_S) * horizon_s < lacking_m;
-    if stands && !is_left_alone && *is_disturbed { None } else { Some(is_left_alone) }
+    if stands && !is_left_alone && result.is_disturbed() { None } else { Some(is_left_alone) }
 }
 
-fn refused(findings: &Findings<'_>) -> Option<String> {
-    let codes = findings.refused.join(", ");
+fn refused(result: &FlightResult<'_>) -> Option<String> {
+    let codes = result.preflight.refusing().join(", ");
     (!codes.is_empty()).then(|| format!("The flight was refused before its first step: {codes}."))
 }
 
-fn violation(findings: &Findings<'_>) -> Option<String> {
-    if findings.audit.status != Status::Violation {
+fn violation(result: &FlightResult<'_>) -> Option<String> {
+    if result.flight.audit.status != Status::Violation {
         return None;
     }
-    let delta_m = findings.delta_m;
-    let violations = &findings.audit.violations;
+    let delta_m = result.scenario.delta_m;
+    let violations = &result.flight.audit.violations;
     let Some(deepest) = violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) else {
         return Some(format!("Two vehicles came closer than {} m.", metres(delta_m)));
     };
@@ -153,9 +153,9 @@ pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violati
     status == Status::Undecided && overlong_steps > 0 && violations > 0
 }
 
-fn unresolved_by_step(findings: &Findings<'_>) -> Option<String> {
-    let audit = findings.audit;
-    if !is_unresolved_by_step(audit.status, findings.run.overlong_steps, audit.violations.len()) {
+fn unresolved_by_step(result: &FlightResult<'_>) -> Option<String> {
+    let audit = &result.flight.audit;
+    if !is_unresolved_by_step(audit.status, result.flight.overlong_steps, audit.violations.len()) {
         return None;
     }
     let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
@@ -163,40 +163,40 @@ fn unresolved_by_step(findings: &Findings<'_>) -> Option<String> {
     Some(format!(
         "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m of each \
          other at {} as flown, and after steps that are too long for the law integration may err by more than that.",
-        metres(findings.delta_m),
-        metres_below(deepest.min_m, findings.delta_m),
+        metres(result.scenario.delta_m),
+        metres_below(deepest.min_m, result.scenario.delta_m),
         seconds(deepest.min_at_s),
     ))
 }
 
-fn disagreement(findings: &Findings<'_>) -> Option<String> {
-    let parry = &findings.audit.parry;
+fn disagreement(result: &FlightResult<'_>) -> Option<String> {
+    let parry = &result.flight.audit.parry;
     let first = parry.first_disagreement.as_ref().map(|first| format!(" First: {first}.")).unwrap_or_default();
     let count = parry.disagreements;
     let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
     (count > 0).then(|| format!("The two detectors of the audit disagree {times}, so one of them is wrong.{first}"))
 }
 
-fn undecided(findings: &Findings<'_>) -> Option<String> {
-    if !findings.audit.violations.is_empty() {
+fn undecided(result: &FlightResult<'_>) -> Option<String> {
+    if !result.flight.audit.violations.is_empty() {
         return None;
     }
-    if findings.audit.status == Status::Undecided && findings.audit.unresolved > 0 {
+    if result.flight.audit.status == Status::Undecided && result.flight.audit.unresolved > 0 {
         return Some(
             "Two vehicles came so near to delta that the audit cannot tell whether they kept it: paths that bend within a \
              step leave more room than there was."
                 .to_owned(),
         );
     }
-    (findings.audit.status == Status::Undecided && findings.audit.parry.disagreements == 0).then(|| {
+    (result.flight.audit.status == Status::Undecided && result.flight.audit.parry.disagreements == 0).then(|| {
         "The audit could not judge everything it was shown, so it cannot say that no two vehicles came too close."
             .to_owned()
     })
 }
 
-fn ended_early(findings: &Findings<'_>) -> Option<String> {
-    let why = findings.run.ended_early.as_deref()?.trim_end_matches('.');
-    Some(format!("The run ended early, at {}: {why}.", seconds(findings.run.duration_s)))
+fn ended_early(report: &Report) -> Option<String> {
+    let why = report.run.ended_early.as_deref()?.trim_end_matches('.');
+    Some(format!("The run ended early, at {}: {why}.", seconds(report.run.duration_s)))
 }
 
 /// Whether a separation is below what was certified, by more of the certified clearance above delta than integration may
@@ -207,15 +207,15 @@ pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f
 
 /// The proof says that the energy never grows: one that did was not flown by the law, but by a step too long for it or by
 /// numbers that ran out of digits.
-pub(super) fn rises(findings: &Findings<'_>) -> bool {
-    risen_energy(findings).is_some()
+pub(super) fn rises(result: &FlightResult<'_>) -> bool {
+    risen_energy(result).is_some()
 }
 
-fn risen_energy(findings: &Findings<'_>) -> Option<String> {
-    let (summary, vehicles) = (findings.summary, findings.run.vehicles);
-    let EnergyRise { from: initial, to: most } = findings.energy_rise?;
+fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
+    let (summary, vehicles) = (result.summary, result.scenario.count());
+    let EnergyRise { from: initial, to: most } = result.flight.energy_rise?;
     let allowed = highest_honest(initial, summary, vehicles);
-    (findings.energy_falls && most > allowed).then(|| {
+    (result.energy_falls() && most > allowed).then(|| {
         format!(
             "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \
              where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten \
@@ -226,10 +226,10 @@ fn risen_energy(findings: &Findings<'_>) -> Option<String> {
 
 /// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
 /// numbers that ran out of digits.
-fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
-    let (certified_m, closest) = (findings.certificate.certified_m?, findings.audit.closest?);
-    let holds = findings.certificate.certified_until_s.is_none_or(|until_s| closest.time_s <= until_s);
-    let breaks = holds && breaks_certificate(closest.separation_m, certified_m, findings.delta_m);
+fn broken_certificate(result: &FlightResult<'_>) -> Option<String> {
+    let (certified_m, closest) = (result.flight.certificate.certified_m?, result.flight.audit.closest?);
+    let holds = result.flight.certificate.certified_until_s.is_none_or(|until_s| closest.time_s <= until_s);
+    let breaks = holds && breaks_certificate(closest.separation_m, certified_m, result.scenario.delta_m);
     breaks.then(|| {
         format!(
             "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
@@ -242,8 +242,8 @@ fn broken_certificate(findings: &Findings<'_>) -> Option<String> {
 }
 
 /// Where even the shortest part of a step is too long for the law, nothing that is flown from there on is its motion.
-fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
-    let overlong = findings.run.overlong_steps;
+fn steps_too_long(result: &FlightResult<'_>) -> Option<String> {
+    let overlong = result.flight.overlong_steps;
     (overlong > 0).then(|| {
         format!(
             "{} longer than the law allows in the state that it was in, and halved no further: what was flown is not the motion of \
@@ -254,9 +254,9 @@ fn steps_too_long(findings: &Findings<'_>) -> Option<String> {
     })
 }
 
-fn not_reached(findings: &Findings<'_>) -> Option<String> {
-    let (summary, judge) = (findings.summary, findings.judge);
-    let why = match Fails::of(findings)? {
+fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
+    let (summary, judge) = (result.summary, result.scenario.arrival);
+    let why = match report.formation.fails? {
         // The reason is that of the early end.
         Fails::EndedEarly => return None,
         Fails::HeldS => format!(
@@ -283,14 +283,13 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
             judge.disagreement_m_s
         ),
     };
-    let failed =
-        (!findings.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(findings.failures)));
-    let then = match at_rest(findings) {
+    let failed = (!report.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(&report.failures)));
+    let then = match report.formation.at_rest {
         _ if failed.is_some() => "",
         Some(true) if summary.held_s.is_none() => {
             " The vehicles have come to rest elsewhere: ten times the duration would not be enough."
         }
-        Some(false) if summary.held_s.is_none() && findings.refused.is_empty() => {
+        Some(false) if summary.held_s.is_none() && !result.preflight.refuses() => {
             " The vehicles are still moving: more time may help."
         }
         Some(false) if summary.held_s.is_none() => " The vehicles are still moving.",
@@ -300,16 +299,16 @@ fn not_reached(findings: &Findings<'_>) -> Option<String> {
 }
 
 /// A start flatter than the formation: forces along the lines between vehicles never leave it.
-fn too_flat(findings: &Findings<'_>) -> Option<String> {
-    if findings.reached_at_s().is_some() {
+fn too_flat(result: &FlightResult<'_>) -> Option<String> {
+    if result.reached_at_s().is_some() {
         return None;
     }
-    let (start, trap) = match findings.trap_dimension? {
+    let (start, trap) = match result.preflight.trap_dimension()? {
         0 => ("at one point", "point"),
         1 => ("on a line", "line"),
         _ => ("in a plane", "plane"),
     };
-    let formation = match findings.formation_dimension {
+    let formation = match result.preflight.formation_dimension {
         1 => "a line",
         2 => "a plane",
         _ => "space",
@@ -318,4 +317,21 @@ fn too_flat(findings: &Findings<'_>) -> Option<String> {
         "The start lies {start} and the formation needs {formation}: a law that acts along the lines between vehicles \
          never leaves that {trap}."
     ))
+}
+
+/// Part of an energy, and of what it keeps apart, that the error of integration stays below.
+pub(super) const INTEGRATION: f64 = EnergyRise::INTEGRATION;
+
+/// The largest energy \[m^2/s^2\] that a motion without gain may show, from an energy `initial` on:
+///
+/// ```text
+/// (1 + 1e-3) E(0) + N [ u r + (epsilon v)^2 ],    r = epsilon x,    epsilon = 2^-52
+/// ```
+///
+/// with the largest command u, the fastest vehicle v and the largest distance x from where the swarm began. Rounding moves a
+/// vehicle by r against a force of u, and changes its velocity by epsilon v.
+pub(super) fn highest_honest(initial: f64, summary: &Summary, vehicles: usize) -> f64 {
+    let resolution_m = f64::EPSILON * summary.extent_m;
+    let rounding = summary.peak_control_m_s2 * resolution_m + (f64::EPSILON * summary.fastest_m_s).powi(2);
+    (1.0 + INTEGRATION) * initial + vehicles as f64 * rounding
 }

@@ -1,11 +1,10 @@
 //! A report in words: one line, and a table.
 
-use super::failures::FailedVehicle;
-use super::findings::Performance;
-use super::flight::Report;
+use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds, table};
+use tautline_sim::link::Traffic;
 
 impl Report {
     /// The verdict in one line, with what refused the flight before its first step behind it.
@@ -188,7 +187,7 @@ impl Report {
         let ellipsoid = self.separation.ellipsoid.iter();
         rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
         rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
-        rows.extend(self.network.iter().map(|network| ("network".to_owned(), network.line())));
+        rows.extend(self.network.iter().map(|network| ("network".to_owned(), network_line(network))));
         let failed = (!self.failures.is_empty()).then(|| FailedVehicle::line(&self.failures));
         rows.extend(failed.map(|line| ("failed".to_owned(), line)));
         rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
@@ -294,6 +293,59 @@ impl Performance {
              {physics_s:.3}{airframe}, audit {audit_s:.3}, record {record_s:.3} s)"
         )
     }
+}
+
+impl Ellipsoid {
+    /// In words, without the name of the line.
+    pub(super) fn line(&self) -> String {
+        let axes = self.half_axes_m.map(metres).join(", ");
+        let closest = self.min_distance_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
+        let pair = self.min_distance_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
+        let at = self.min_distance_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
+        format!(
+            "half axes {axes} m; unscaled, centres never closer than {closest} m{}{}",
+            at.unwrap_or_default(),
+            pair.unwrap_or_default()
+        )
+    }
+}
+
+impl FailedVehicle {
+    /// Those that failed within so many seconds, in one line.
+    pub(super) fn line(failed: &[Self]) -> String {
+        let one = |failed: &Self| format!("vehicle {} ({}) at {} s", failed.vehicle, failed.kind, failed.at_s);
+        failed.iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl VehicleNumbers {
+    pub(super) fn line(&self) -> String {
+        let Self { model, max_tilt_deg, thrust_share } = self;
+        format!(
+            "{model}, tilted by {max_tilt_deg:.1} degrees at most, rotors at {:.0} % of their most",
+            100.0 * thrust_share
+        )
+    }
+}
+
+impl Verification {
+    /// In one line.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let firm = if self.firm { "firm" } else { "NOT FIRM, what happens depends on the step" };
+        let pass = if self.pass { "passes" } else { "does not pass" };
+        let min_m = self.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
+        let reached =
+            self.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
+        format!("{firm}: at half the step it {pass}, never closer than {min_m} m, formation {reached}")
+    }
+}
+
+fn network_line(&Traffic { sent, lost, age_p95_s }: &Traffic) -> String {
+    let share = 100.0 * lost as f64 / sent.max(1) as f64;
+    let age =
+        age_p95_s.map_or_else(String::new, |age_s| format!("; 95 % of what was held was no older than {age_s:.3} s"));
+    format!("{lost} of {sent} messages lost ({share:.1} %){age}")
 }
 
 /// A length with two decimals, or in powers of ten where that would show little.

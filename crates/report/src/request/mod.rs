@@ -26,7 +26,7 @@ pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
 pub use folder::{OutFolder, try_to_write_in};
 pub use monitor::{Monitor, Quiet, Silent};
-pub use pictures::{FlightPictures, NamedPicture, PICTURES_BYTES, Pictures};
+pub use pictures::{NamedPicture, PICTURES_BYTES, Pictures};
 pub use run::{RECORDING, RunFiles, RunRequest, flight_page, replay_of_run, run_into, svg_files, threads, write_files};
 pub use scenario::{ScenarioRequest, command_line};
 pub use tautline_recordings::read::ReadOptions;

@@ -1,12 +1,13 @@
 //! Pictures of flights, which are drawn by a crate that this one does not depend on.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use tautline_core::record::Sink;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_sim::scenario::Scenario;
 
 use super::{Failure, Monitor};
+use crate::flight_log::FlightLog;
 use crate::report::page::Picture;
 
 /// Room for the pictures of a page \[bytes\].
@@ -17,8 +18,18 @@ pub type NamedPicture = (String, Picture);
 
 /// Draws flights. `()` draws nothing.
 pub trait Pictures: Sync {
-    /// Returns an observer of a flight of the scenario, which draws it afterwards.
-    fn observe(&self, scenario: &Scenario) -> Box<dyn FlightPictures>;
+    /// Writes pictures of a flight of the scenario into the folder of its run and returns them for its page. A machine that
+    /// cannot draw writes none and warns.
+    ///
+    /// # Errors
+    /// [`Failure`] where a file cannot be written.
+    fn draw(
+        &self,
+        scenario: &Scenario,
+        log: &Arc<FlightLog>,
+        folder: &Path,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<NamedPicture>, Failure>;
 
     /// Flies the scenario and draws the instant `at_s` \[s\]: an image as a data URI of about `room_bytes`.
     ///
@@ -32,28 +43,18 @@ pub trait Pictures: Sync {
     }
 }
 
-/// Observes one flight and draws it.
-pub trait FlightPictures: Sink + Send {
-    /// Writes pictures into the folder of a run and returns them for its page. A machine
-    /// that cannot draw writes none and warns.
-    ///
-    /// # Errors
-    /// [`Failure`] where a file cannot be written.
-    fn write(&self, folder: &Path, monitor: &dyn Monitor) -> Result<Vec<NamedPicture>, Failure>;
-}
-
 impl Pictures for () {
-    fn observe(&self, _scenario: &Scenario) -> Box<dyn FlightPictures> {
-        Box::new(())
+    fn draw(
+        &self,
+        _scenario: &Scenario,
+        _log: &Arc<FlightLog>,
+        _folder: &Path,
+        _monitor: &dyn Monitor,
+    ) -> Result<Vec<NamedPicture>, Failure> {
+        Ok(Vec::new())
     }
 
     fn shot(&self, _scenario: &Scenario, _at_s: f64, _room_bytes: usize) -> Result<String, Failure> {
         Err(Failure::machine("pictures/none", "this build draws nothing"))
-    }
-}
-
-impl FlightPictures for () {
-    fn write(&self, _folder: &Path, _monitor: &dyn Monitor) -> Result<Vec<NamedPicture>, Failure> {
-        Ok(Vec::new())
     }
 }

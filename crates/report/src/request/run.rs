@@ -4,16 +4,17 @@ use std::fs;
 use std::io;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rayon::ThreadPool;
 
 use super::audit::run_audit;
 use super::{Failure, Monitor, NamedPicture, OutFolder, Pictures};
-use crate::figures::{self, Criteria, Figure, RunHistory};
-use crate::replay::{Film, NoReplay, PAGE_BYTES, Replay, Stage};
+use crate::figures::{self, Criteria, Figure};
+use crate::flight_log::FlightLog;
+use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{INTERRUPTED, Report, RunPage, write_atomically};
 use crate::run::{run_while, verify};
-use tautline_core::record::Sink;
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
@@ -66,8 +67,8 @@ impl<'a> RunRequest<'a> {
 pub struct RunFiles {
     /// The report, as in `report.json`.
     pub report: Report,
-    /// The motion.
-    pub film: Film,
+    /// The history of the flight.
+    pub log: Arc<FlightLog>,
     /// Pictures by their names, such as `closest`.
     pub pictures: Vec<NamedPicture>,
 }
@@ -93,18 +94,19 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let path = request.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;
-    let mut history = RunHistory::new().scaled_by(scenario.metric());
-    let mut observer = pictures.observe(scenario);
-    let mut film = Film::new();
-    let mut watchers = (&mut history, (&mut film, &mut *observer));
-    let mut report = threads.install(|| fly(scenario, &preflight, &folder, pictures, monitor, &mut watchers))?;
+    let mut log = FlightLog::of(scenario);
+    let mut report = threads.install(|| fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
+    if let Some(closest) = report.separation.closest() {
+        log.conclude(closest.separation_m, closest.time_s);
+    }
+    let log = Arc::new(log);
     report.performance = report.performance.filter(|_| request.is_timed);
     if request.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
         report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }
-    let pictures = observer.write(folder.path(), monitor)?;
-    let figures = if request.figures { figures(scenario, &history, &report) } else { Vec::new() };
-    let replay = replay_of_run(scenario, &film, &report, PAGE_BYTES);
+    let pictures = pictures.draw(scenario, &log, folder.path(), monitor)?;
+    let figures = if request.figures { figures(scenario, &log, &report) } else { Vec::new() };
+    let replay = replay_of_run(scenario, &log, &report, PAGE_BYTES);
     let page = RunPage {
         scenario,
         warnings: &warnings(&preflight),
@@ -129,7 +131,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         folder.report().display(),
         page.display()
     ));
-    Ok(RunFiles { report, film, pictures })
+    Ok(RunFiles { report, log, pictures })
 }
 
 /// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
@@ -139,7 +141,7 @@ fn fly(
     folder: &OutFolder,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-    watchers: &mut (dyn Sink + Send),
+    log: &mut FlightLog,
 ) -> Result<Report, Failure> {
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
@@ -153,7 +155,7 @@ fn fly(
         }
         if monitor.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let flown = run_while(scenario, preflight, &mut (&mut recording, watchers), &mut carry_on);
+    let flown = run_while(scenario, preflight, &mut (&mut recording, log), &mut carry_on);
     monitor.finish();
     let closed = match &flown {
         Ok(report) => recording.close(run_audit(scenario, report)),
@@ -177,14 +179,19 @@ pub fn threads(number: usize) -> Result<ThreadPool, Failure> {
 ///
 /// # Errors
 /// [`NoReplay`] where it does not fit, or nothing was flown.
-pub fn replay_of_run(scenario: &Scenario, film: &Film, report: &Report, room_bytes: usize) -> Result<Replay, NoReplay> {
+pub fn replay_of_run(
+    scenario: &Scenario,
+    log: &FlightLog,
+    report: &Report,
+    room_bytes: usize,
+) -> Result<Replay, NoReplay> {
     let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
     let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
-    Replay::new(&stage, film, &report.moments(&names), report.judgement(), room_bytes)
+    Replay::new(&stage, log, &report.moments(&names), report.judgement(), room_bytes)
 }
 
 /// A run as charts.
-fn figures(scenario: &Scenario, history: &RunHistory, report: &Report) -> Vec<Figure> {
+fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure> {
     let criteria = Criteria {
         delta_m: scenario.delta_m,
         certified_m: report.separation.certified_m,
@@ -193,7 +200,7 @@ fn figures(scenario: &Scenario, history: &RunHistory, report: &Report) -> Vec<Fi
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
         most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
     };
-    figures::of_run(history, &criteria)
+    figures::of_run(log, &criteria)
 }
 
 /// Codes and messages of the warnings before the first step.
@@ -206,12 +213,15 @@ fn warnings(preflight: &Preflight) -> Vec<(String, String)> {
 pub fn flight_page(
     scenario: &Scenario,
     preflight: &Preflight,
-    (history, film): &(RunHistory, Film),
+    mut log: FlightLog,
     report: &Report,
     command: &str,
 ) -> String {
-    let figures = figures(scenario, history, report);
-    let replay = replay_of_run(scenario, film, report, PAGE_BYTES);
+    if let Some(closest) = report.separation.closest() {
+        log.conclude(closest.separation_m, closest.time_s);
+    }
+    let figures = figures(scenario, &log, report);
+    let replay = replay_of_run(scenario, &log, report, PAGE_BYTES);
     let warnings = warnings(preflight);
     let page = RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &[], command };
     report.to_html(&page)

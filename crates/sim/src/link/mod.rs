@@ -18,6 +18,7 @@ mod sensing;
 mod world;
 
 use dyn_clone::DynClone;
+use serde::{Deserialize, Serialize};
 
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
@@ -148,8 +149,8 @@ pub struct Sensed<'a> {
     pub others: Others<'a>,
 }
 
-/// What was sent over a network up to now.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Messages of a network up to now.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Traffic {
     /// Messages, one for each who may hear it.
     pub sent: u64,

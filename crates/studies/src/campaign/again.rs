@@ -67,7 +67,7 @@ pub(super) fn flown_again(
         let run = RunRequest::reproducible(&scenario, command(campaign, worst.run, law), path);
         let left = run_into(&run, pictures, &Quiet::new(monitor))?;
         check(&left, worst.run, law, &worst.state_hash)?;
-        let replay = replay_of_run(&scenario, &left.film, &left.report, PAGE_BYTES / most.max(1));
+        let replay = replay_of_run(&scenario, &left.log, &left.report, PAGE_BYTES / most.max(1));
         again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
     Ok(again)

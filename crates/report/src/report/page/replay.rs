@@ -59,9 +59,9 @@ pub fn replay(label: &str, replay: &Replay, start: Start) -> Markup {
     let on_demand = start == Start::OnDemand;
     html! {
         div.replay data-label=(label) data-start=[on_demand.then_some("later")] {
-            script type="application/json" { (PreEscaped(replay.json())) }
+            script type="application/json" { (PreEscaped(&replay.json)) }
             noscript { p { "The replay needs JavaScript, which is switched off. Pictures and figures are below." } }
-            (chart(replay.chart()))
+            (chart(&replay.chart))
             p.replay-note { (note(replay)) }
         }
     }
@@ -98,9 +98,9 @@ pub fn no_replay(why: &str) -> Markup {
 
 /// What of it is true and what is for the eye.
 fn note(replay: &Replay) -> String {
-    let [kept, samples] = replay.instants();
+    let [kept, samples] = replay.instants;
     let of_all = if kept < samples { format!(" of {samples}") } else { String::new() };
-    let motion = match (replay.holds(), samples) {
+    let motion = match (replay.holds, samples) {
         (_, 0 | 1) => "of one instant".to_owned(),
         (true, _) => format!("at rest between {kept} instants{of_all}"),
         (false, _) => format!("drawn straight between {kept} instants{of_all}"),
@@ -111,22 +111,22 @@ fn note(replay: &Replay) -> String {
     let said = [
         format!(
             "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are the judge's. ",
-            metres(replay.rounding_m())
+            metres(replay.rounding_m)
         ),
-        some(replay.vehicles(), "vehicles"),
-        some(replay.moments(), "findings"),
-        match replay.inexact() {
+        some(replay.vehicles, "vehicles"),
+        some(replay.moments, "findings"),
+        match replay.inexact {
             0 => String::new(),
             count => format!(
                 "The very instant of {} is not drawn, or not all of whom it is on. ",
                 counted(count as u64, "finding", "findings")
             ),
         },
-        replay.unknown_radius().map_or(String::new(), |(count, radius_m)| {
+        replay.unknown_radius.map_or(String::new(), |(count, radius_m)| {
             format!("The size of {} is made up, {} m. ", counted(count as u64, "vehicle", "vehicles"), metres(radius_m))
         }),
-        if replay.obstacles_off_m() > 0.0 {
-            format!("Moving obstacles are drawn at most {} m off their ways. ", metres(replay.obstacles_off_m()))
+        if replay.obstacles_off_m > 0.0 {
+            format!("Moving obstacles are drawn at most {} m off their ways. ", metres(replay.obstacles_off_m))
         } else {
             String::new()
         },

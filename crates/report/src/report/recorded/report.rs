@@ -3,9 +3,7 @@
 use serde::Serialize;
 
 use super::envelope::OfLimit;
-use crate::report::findings::finite;
-use crate::report::flight;
-use crate::report::flight::{Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation};
+use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
 };

@@ -6,7 +6,8 @@ use super::super::{Failure, Monitor};
 use super::Open;
 use crate::figures;
 use crate::figures::{Encounter, Figure};
-use crate::replay::{Film, Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
+use crate::flight_log::FlightLog;
+use crate::replay::{Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::recorded::{RecordedReport, interval};
 use tautline_audit::recorded::{
     Approach, Interpolation, Outcome, PairSeries, PositionLookup, RecordedError, Settings, TOUCHING_ELLIPSOIDS,
@@ -97,8 +98,9 @@ pub(super) fn of_recording(
     let gaps = places.gaps().iter().map(|gap| (gap.vehicle, [gap.from_s, gap.to_s])).collect();
     let (times_s, positions_m) = places.finish();
     let holds = settings.motion == Some(Interpolation::Hold);
-    let film = Film::of(times_s, positions_m, near, seen).with_gaps(gaps).holding(holds);
-    Ok((Replay::new(&stage, &film, &moments, report.judgement(), PAGE_BYTES), figures))
+    let mut log = FlightLog::recorded(times_s, positions_m, near, seen);
+    (log.gaps, log.holds) = (gaps, holds);
+    Ok((Replay::new(&stage, &log, &moments, report.judgement(), PAGE_BYTES), figures))
 }
 
 /// Pairs, and approaches to obstacles, that are drawn.

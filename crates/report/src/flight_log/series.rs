@@ -3,13 +3,13 @@
 use tautline_core::record::{Channel, Sample};
 
 /// What a figure shows of a channel.
-pub(super) struct Series {
+pub(crate) struct Series {
     /// Name and title of the figure.
-    pub(super) name: &'static str,
-    pub(super) title: &'static str,
+    pub(crate) name: &'static str,
+    pub(crate) title: &'static str,
     /// What the number is, and its unit.
-    pub(super) what: &'static str,
-    pub(super) unit: &'static str,
+    pub(crate) what: &'static str,
+    pub(crate) unit: &'static str,
     /// The channel, by its name and its columns.
     channel: &'static str,
     columns: &'static [&'static str],
@@ -18,10 +18,10 @@ pub(super) struct Series {
 }
 
 /// How many there are.
-pub(super) const COUNT: usize = 4;
+pub(crate) const COUNT: usize = 4;
 
 /// All that are drawn, in the order in which they are.
-pub(super) const SERIES: [Series; COUNT] = [
+pub(crate) const SERIES: [Series; COUNT] = [
     Series {
         name: "attitude",
         title: "Tilt",
@@ -61,10 +61,10 @@ pub(super) const SERIES: [Series; COUNT] = [
 ];
 
 /// Name of the figure of rotors.
-pub(super) const ROTORS: &str = "rotors";
+pub(crate) const ROTORS: &str = "rotors";
 
 /// The numbers of every series at an instant, one of each vehicle; none of a channel that the sample does not have.
-pub(super) fn numbers_of(sample: &Sample<'_>) -> [Vec<f64>; COUNT] {
+pub(crate) fn numbers_of(sample: &Sample<'_>) -> [Vec<f64>; COUNT] {
     let vehicles = sample.swarm.count();
     SERIES.map(|series| {
         let is_it = |channel: &&Channel| {

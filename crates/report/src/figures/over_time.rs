@@ -1,0 +1,167 @@
+//! Numbers of a run over time.
+
+use super::Figure;
+use super::axis::Axis;
+use super::chart::{Band, Chart, Mark};
+use super::distances::quantile;
+use super::spans::{Span, Spans};
+use super::svg::{INK, PALETTE, Stroke};
+use crate::flight_log::{FEW_VEHICLES, FlightLog, ROTORS, SERIES};
+use tautline_laws::formation::{edges_looked_at, largest_edge_error_m};
+use tautline_laws::graph::Graph;
+use tautline_laws::target::{Course, Leg};
+
+/// Distances that are computed for the shape error, at most.
+const DISTANCES: usize = 16_000_000;
+/// Fewest instants that its curve is drawn through.
+const FEWEST_INSTANTS: usize = 48;
+
+/// Control effort |u| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; of more vehicles the largest
+/// effort, the median and the band that holds nine tenths of them. The peak over all steps is marked where a sample does not
+/// show it.
+#[must_use]
+pub fn control(log: &FlightLog, title: &str) -> Figure {
+    let spans = Spans::of(log);
+    let count = spans.vehicles();
+    let sampled = || spans.iter().flat_map(|span| &span.extremes.control_m_s2).copied().filter(|x| x.is_finite());
+    let peak = log.peak_control();
+    let y = Axis::linear("control effort |u| [m/s²]", sampled().chain(peak.map(|[peak, _]| peak)).chain([0.0]), true);
+    let mut chart = Chart::new(spans.time_axis(), y);
+    of_each(&mut chart, &spans, |span| &span.extremes.control_m_s2);
+    if let Some([peak, time_s]) = peak.filter(|[peak, _]| *peak > sampled().fold(0.0, f64::max)) {
+        chart.marks.push(Mark::ring((time_s, peak), INK, Some(format!("peak of all steps {peak:.3} m/s²"))));
+    }
+    let peak = peak.map_or(0.0, |[peak, _]| peak);
+    let description = format!("Control effort of {count} vehicles over time; at most {peak:.3} m/s².");
+    chart.figure("control", title, &description)
+}
+
+/// Tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message \[s\] of each vehicle
+/// over time \[s\], as control effort is drawn: a figure for each channel that the run has.
+///
+/// `most_thrust_n` is the most that a rotor gives.
+#[must_use]
+pub fn channels(log: &FlightLog, most_thrust_n: Option<f64>) -> Vec<Figure> {
+    let spans = Spans::of(log);
+    let has = |k: &usize| spans.iter().any(|span| !span.extremes.series[*k].is_empty());
+    (0..SERIES.len()).filter(has).map(|k| channel(&spans, k, most_thrust_n)).collect()
+}
+
+fn channel(spans: &Spans<'_>, k: usize, most_thrust_n: Option<f64>) -> Figure {
+    let series = &SERIES[k];
+    let (what, unit, count) = (series.what, series.unit, spans.vehicles());
+    let most = most_thrust_n.filter(|_| series.name == ROTORS);
+    let numbers =
+        || spans.iter().flat_map(|span| &span.extremes.series[k]).copied().filter(|number| number.is_finite());
+    let peak = numbers().fold(f64::NAN, f64::max);
+    let y = Axis::linear(&format!("{what} [{unit}]"), numbers().chain(most).chain([0.0]), true);
+    let mut chart = Chart::new(spans.time_axis(), y);
+    of_each(&mut chart, spans, |span| &span.extremes.series[k]);
+    let gap = if unit == "°" { "" } else { " " };
+    let mut description = format!("The {what} of {count} vehicles over time; at most {peak:.3}{gap}{unit}.");
+    if let Some(most) = most {
+        chart.level(most, Stroke::dashed(INK, 1.3), format!("most of a rotor {most} N"));
+        description = format!("{description} A rotor gives at most {most} N.");
+    }
+    chart.figure(series.name, series.title, &description)
+}
+
+/// Draws a line for each of up to 12 vehicles; of more vehicles the largest number, the median and the band that holds nine
+/// tenths of them. A span without numbers breaks the lines.
+fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Span<'_>) -> &'b [f64]) {
+    let count = spans.vehicles();
+    if count <= FEW_VEHICLES {
+        for i in 0..count {
+            let number = |span| numbers(span).get(i).copied().unwrap_or(f64::NAN);
+            let points = spans.iter().map(|span| (span.time_s, number(span))).collect();
+            chart.line(points, Stroke::of_line(i), format!("vehicle {}", i + 1));
+        }
+    } else {
+        let ranks = spans.iter().map(|span| {
+            let mut finite: Vec<_> = numbers(span).iter().copied().filter(|number| number.is_finite()).collect();
+            (span.time_s, [0.05, 0.5, 0.95, 1.0].map(|share| quantile(&mut finite, share)))
+        });
+        let ranks: Vec<_> = ranks.collect();
+        let points = |k: usize| ranks.iter().map(|(time_s, ranks)| (*time_s, ranks[k])).collect();
+        chart.line(points(3), Stroke::solid(PALETTE[1], 1.5), "largest");
+        chart.line(points(1), Stroke::solid(PALETTE[0], 1.5), "median");
+        let points = ranks.iter().map(|&(time_s, [low, _, high, _])| (time_s, low, high)).collect();
+        chart.bands.push(Band { points, colour: PALETTE[0], opacity: 0.2, label: Some("5 to 95 %".to_owned()) });
+    }
+}
+
+/// The law's energy \[m^2/s^2\] over time \[s\] with E(0), which on a complete graph it never exceeds.
+#[must_use]
+pub fn energy(log: &FlightLog, title: &str) -> Figure {
+    let spans = Spans::of(log);
+    let points: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.extremes.energy?))).collect();
+    let initial = log.energy_initial();
+    let y = Axis::linear("energy E [m²/s²]", points.iter().map(|&(_, y)| y).chain(initial).chain([0.0]), true);
+    let largest = points.iter().map(|&(_, y)| y).fold(f64::NAN, f64::max);
+    let mut chart = Chart::new(spans.time_axis(), y);
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "E(t)");
+    let mut comparison = String::new();
+    if let Some(initial) = initial {
+        chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
+        let excess = largest / initial - 1.0;
+        comparison = if initial == 0.0 && largest > 0.0 {
+            format!(" It begins at nothing and rises to {largest:.4} m²/s².")
+        } else if excess > 0.0 {
+            format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
+        } else {
+            format!(" It never exceeds E(0), {initial:.4} m²/s².")
+        };
+    }
+    chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))
+}
+
+/// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\]: of the formation
+/// of the leg that was under way.
+///
+/// `allowed_m` is what counts as reached.
+#[must_use]
+pub fn shape_error(log: &FlightLog, legs: &[Leg], graph: &Graph, allowed_m: Option<f64>, title: &str) -> Figure {
+    let spans = Spans::of(log);
+    let count = spans.vehicles();
+    let fits = !legs.is_empty() && legs.iter().all(|leg| leg.formation.count() == count) && graph.count() == count;
+    let instants = spans.spread((DISTANCES / edges_looked_at(graph).max(1)).max(FEWEST_INSTANTS));
+    let mut course = Course::new(legs);
+    log.targets().iter().for_each(|event| course.note(event));
+    let error = |span: &&Span<'_>| {
+        let formation = course.formation_at(span.time_s)?;
+        Some((span.time_s, largest_edge_error_m(span.positions_m, formation, graph)))
+    };
+    let points = if fits { instants.iter().filter_map(error).collect() } else { Vec::new() };
+    decay(&spans, "shape-error", title, "largest edge error", "m", points, allowed_m)
+}
+
+/// Largest speed relative to the swarm's mean velocity \[m/s\], on a logarithmic axis, over time \[s\].
+///
+/// `allowed_m_s` is what counts as reached.
+#[must_use]
+pub fn disagreement(log: &FlightLog, allowed_m_s: Option<f64>, title: &str) -> Figure {
+    let spans = Spans::of(log);
+    let points = spans.iter().map(|span| (span.time_s, span.extremes.disagreement_m_s)).collect();
+    decay(&spans, "disagreement", title, "velocity disagreement", "m/s", points, allowed_m_s)
+}
+
+/// A number that should vanish, on a logarithmic axis, with the largest value that counts as vanished.
+fn decay(
+    spans: &Spans<'_>,
+    name: &str,
+    title: &str,
+    what: &str,
+    unit: &str,
+    points: Vec<(f64, f64)>,
+    allowed: Option<f64>,
+) -> Figure {
+    let y = Axis::log(&format!("{what} [{unit}]"), points.iter().map(|&(_, y)| y).chain(allowed));
+    let at_end = points.last().map_or(f64::NAN, |&(_, y)| y);
+    let mut chart = Chart::new(spans.time_axis(), y);
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), what);
+    if let Some(allowed) = allowed {
+        chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
+    }
+    let description = format!("The {what} over time on a logarithmic axis; {at_end:.2e} {unit} at the end.");
+    chart.figure(name, title, &description)
+}

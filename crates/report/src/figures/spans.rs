@@ -1,0 +1,91 @@
+//! A flight log at the resolution of a figure.
+
+use std::borrow::Cow;
+
+use super::axis::{Axis, extent};
+use crate::flight_log::{Extremes, FlightLog, Keyframe, closer};
+use tautline_core::swarm::{ClosestApproach, Rows};
+
+/// Most spans of time of a figure: some four for each pixel of its width.
+const MOST_SPANS: usize = 2048;
+
+/// A flight in at most [`MOST_SPANS`] spans of time. Neighbouring keyframes are merged where there are more; a span keeps
+/// their extremes.
+pub(super) struct Spans<'a> {
+    pub(super) log: &'a FlightLog,
+    all: Vec<Span<'a>>,
+}
+
+/// A span of time: the state at its end, and the extremes within.
+pub(super) struct Span<'a> {
+    /// Its end \[s\].
+    pub(super) time_s: f64,
+    /// Positions at its end \[m\].
+    pub(super) positions_m: &'a Rows,
+    /// Closest approach within.
+    pub(super) closest: Option<ClosestApproach>,
+    pub(super) extremes: Cow<'a, Extremes>,
+}
+
+impl<'a> Spans<'a> {
+    pub(super) fn of(log: &'a FlightLog) -> Self {
+        let Some((first, rest)) = log.keyframes().split_first() else { return Self { log, all: Vec::new() } };
+        let together = rest.len().div_ceil(MOST_SPANS - 1).max(1);
+        let spans = rest.chunks(together).filter_map(Span::of);
+        Self { log, all: Span::of(std::slice::from_ref(first)).into_iter().chain(spans).collect() }
+    }
+
+    /// All spans in order of time; the first is the first instant alone.
+    pub(super) fn iter(&self) -> std::slice::Iter<'_, Span<'a>> {
+        self.all.iter()
+    }
+
+    /// Number of vehicles N.
+    pub(super) fn vehicles(&self) -> usize {
+        self.log.count()
+    }
+
+    /// Axis of time \[s\].
+    pub(super) fn time_axis(&self) -> Axis {
+        let [from_s, to_s] = self.log.range_s();
+        Axis::time(from_s, to_s)
+    }
+
+    /// At most `most` of the spans (at least two), evenly spread, the first and the last among them.
+    pub(super) fn spread(&self, most: usize) -> Vec<&Span<'a>> {
+        let most = most.max(2);
+        if self.all.len() <= most {
+            return self.all.iter().collect();
+        }
+        (0..most).map(|k| &self.all[k * (self.all.len() - 1) / (most - 1)]).collect()
+    }
+
+    /// Whether every vehicle stays in one plane of constant z, up to rounding.
+    pub(super) fn is_level(&self) -> bool {
+        const FLATNESS: f64 = 1e-6;
+        let [x, y, z] = [0, 1, 2].map(|axis| self.extent(axis).map_or(0.0, |(low, high)| high - low));
+        z <= FLATNESS * x.max(y)
+    }
+
+    /// Smallest and largest coordinate along an axis \[m\]; none without a finite one.
+    pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
+        extent(self.iter().flat_map(|span| span.positions_m.column(axis).iter().copied().collect::<Vec<_>>()))
+    }
+}
+
+impl<'a> Span<'a> {
+    fn of(keyframes: &'a [Keyframe]) -> Option<Self> {
+        let (last, before) = keyframes.split_last()?;
+        let mut span = Self {
+            time_s: last.time_s,
+            positions_m: &last.positions_m,
+            closest: last.closest,
+            extremes: Cow::Borrowed(&last.extremes),
+        };
+        for keyframe in before.iter().rev() {
+            span.closest = closer(keyframe.closest, span.closest);
+            span.extremes.to_mut().absorb(&keyframe.extremes);
+        }
+        Some(span)
+    }
+}
