@@ -1,5 +1,5 @@
 from collections.abc import Sequence
-from typing import Any, final
+from typing import Any, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,6 +249,13 @@ class Question:
         independent: bool,
     ) -> Question: ...
 
+class Outputs(TypedDict):
+    csv: str | None
+    latex: str | None
+    html: str | None
+    force: bool
+    threads: int | None
+
 def attack(
     scenario: Scenario,
     start: float | None,
@@ -257,13 +264,9 @@ def attack(
     vary: Sequence[tuple[str, float, float]],
     flights: int,
     seeds: int,
-    method: str,
     seed: int,
     out: str | None,
-    csv: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def audit_arrays(
     question: Question,
@@ -293,11 +296,7 @@ def compare(
     laws: Sequence[str] | None,
     runs: int,
     seed: int,
-    csv: str | None,
-    latex: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def export(
     paths: Sequence[str],
@@ -322,10 +321,7 @@ def margin(
     scan: int,
     halvings: int,
     logarithmic: bool,
-    csv: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...

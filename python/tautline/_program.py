@@ -94,6 +94,17 @@ def asked(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _nati
     return found._native
 
 
+def outputs(csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None) -> _native.Outputs:
+    """Files and threads of a study."""
+    return {
+        "csv": maybe_path(csv, "csv"),
+        "latex": maybe_path(latex, "latex"),
+        "html": maybe_path(html, "html"),
+        "force": flag(force, "force"),
+        "threads": maybe_count(threads, "threads"),
+    }
+
+
 def compare(
     scenario: Scenario | PathLike,
     laws: Sequence[str] | None = None,
@@ -118,11 +129,7 @@ def compare(
             laws=None if laws is None else listed(laws, "laws"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
-            csv=maybe_path(csv, "csv"),
-            latex=maybe_path(latex, "latex"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 
@@ -141,6 +148,7 @@ def margin(
     log: bool = False,
     set: Mapping[str, Any] | None = None,
     csv: PathLike | None = None,
+    latex: PathLike | None = None,
     html: PathLike | None = None,
     force: bool = False,
     threads: int | None = None,
@@ -159,10 +167,7 @@ def margin(
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
             logarithmic=flag(log, "log"),
-            csv=maybe_path(csv, "csv"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 
@@ -176,11 +181,11 @@ def attack(
     apart: float | None = None,
     flights: int = 1000,
     seeds: int = 1,
-    method: str = "cma-es",
     seed: int = 0,
     set: Mapping[str, Any] | None = None,
     out: PathLike | None = None,
     csv: PathLike | None = None,
+    latex: PathLike | None = None,
     html: PathLike | None = None,
     force: bool = False,
     threads: int | None = None,
@@ -201,13 +206,9 @@ def attack(
             vary=varied,
             flights=count(flights, "flights"),
             seeds=count(seeds, "seeds"),
-            method=str(method),
             seed=count(seed, "seed"),
             out=maybe_path(out, "out"),
-            csv=maybe_path(csv, "csv"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 

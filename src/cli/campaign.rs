@@ -8,6 +8,7 @@ use super::Exit;
 use super::console::{self, Console, Terminal};
 use super::pictures::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
+use tautline_studies::Study as _;
 use tautline_studies::campaign::{
     self as study, CampaignAnswer, CampaignRequest, Folder, Program, ReplayRequest, listed, parse,
 };
@@ -41,9 +42,9 @@ enum What {
     Replay(Replay),
 }
 
-/// A specification, and what is asked beyond it.
+/// A specification, and when to stop.
 #[derive(Debug, Args)]
-struct Asked {
+struct SpecArguments {
     /// The specification.
     #[arg(value_name = "SPEC.toml")]
     spec: PathBuf,
@@ -58,7 +59,7 @@ struct Asked {
 #[derive(Debug, Args)]
 struct RunCampaign {
     #[command(flatten)]
-    asked: Asked,
+    spec: SpecArguments,
     /// Folder for everything; by default out/NAME, where NAME is the specification's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -75,7 +76,7 @@ struct RunCampaign {
 #[derive(Debug, Args)]
 struct PlanCampaign {
     #[command(flatten)]
-    asked: Asked,
+    spec: SpecArguments,
     /// Folder for everything.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -167,12 +168,12 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
                 worst: run.says.looks.worst.into(),
-                ..run.asked.request()
+                ..run.spec.request()
             };
             run.says.answer(|monitor| study::campaign(&request, &*run.says.looks.pictures(), monitor))
         }
         What::Plan(plan) => {
-            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.asked.request() };
+            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
             let console = Console { data_on_stdout: false, quiet: false };
@@ -217,7 +218,7 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
     }
 }
 
-impl Asked {
+impl SpecArguments {
     fn request(&self) -> CampaignRequest {
         CampaignRequest {
             until_width: self.until_width,
@@ -244,7 +245,7 @@ impl Says {
         if self.json {
             console::json(&summary)?;
         }
-        Ok(Exit::good_if(summary.is_clear()))
+        Ok(Exit::good_if(summary.is_good()))
     }
 }
 

@@ -3,13 +3,11 @@
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
-mod attack;
 mod audit_arguments;
 mod audits;
 mod campaign;
 mod check;
 mod command;
-mod compare;
 mod completions;
 mod console;
 mod diagnostic;
@@ -20,7 +18,6 @@ mod driver;
 mod events;
 mod export;
 mod list;
-mod margin;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
@@ -28,6 +25,7 @@ mod render;
 mod run;
 mod scenario;
 mod schema;
+mod studies;
 mod summary;
 mod validate;
 #[cfg(feature = "viewer")]

@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::error::CampaignError;
 use super::vary::Variation;
+use crate::Question;
 use crate::splitting::Settings;
 
 /// Words by which a table of `[vary]` says how it draws; another table holds keys of the scenario.
@@ -92,24 +93,11 @@ impl From<SplittingKeys> for Settings {
 pub struct Stop {
     /// Which share it is about.
     #[serde(default)]
-    pub of: Asked,
+    pub of: Question,
     /// Once the interval of every law's share is no wider than this.
     pub width: Option<f64>,
     /// Once every law's share is known to be above or below this.
     pub decided: Option<f64>,
-}
-
-/// What a flight has to show to count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Asked {
-    /// No two vehicles come closer than delta, proved to the end of the flight.
-    #[default]
-    Clear,
-    /// The formation is reached and kept to the end.
-    Reached,
-    /// Both, as far as the scenario asks.
-    Pass,
 }
 
 impl Spec {
@@ -191,6 +179,61 @@ impl Stop {
     }
 }
 
+/// Refuses keys of which one is the other, or a part of it, and a varied law where laws are named.
+pub(super) fn refuse_overlaps(
+    sets: &BTreeMap<String, toml::Value>,
+    variations: &BTreeMap<String, Variation>,
+    names_laws: bool,
+) -> Result<(), CampaignError> {
+    let place = |key: &String| format!("{}.{key}", if sets.contains_key(key) { "set" } else { "vary" });
+    let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
+    if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
+        let refused = CampaignError::plan(
+            format!("`{key}` is not a key of a scenario"),
+            "write the key as --set takes it: time.dt_s",
+        );
+        return Err(refused.at(&place(key)));
+    }
+    let plain = |key: &String| {
+        let axis = |part: &str| match part {
+            "x" => "1".to_owned(),
+            "y" => "2".to_owned(),
+            "z" => "3".to_owned(),
+            other => other.to_owned(),
+        };
+        key.split('.').map(axis).collect::<Vec<_>>()
+    };
+    let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
+    for (k, key) in all.iter().enumerate() {
+        let varies = |number: usize| number >= sets.len();
+        let clash = |&number: &usize| {
+            let (one, other) = (plain(key), plain(all[number]));
+            (varies(k) || varies(number)) && (one.starts_with(&other) || other.starts_with(&one))
+        };
+        if let Some(other) = (0..k).find(clash) {
+            let places = if varies(k) && varies(other) { "both in [vary]" } else { "in [set] and in [vary]" };
+            let refused = CampaignError::plan(
+                format!("{} and {key} stand {places}, and one is the other or a part of it", all[other]),
+                "a key either has one value or differs from run to run: take one of them out",
+            );
+            return Err(refused.at(&format!("vary.{key}")));
+        }
+    }
+    let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
+    match variations.keys().find(is_law) {
+        Some(key) if names_laws => Err(CampaignError::plan(
+            format!("{key} stands in [vary], and laws are named beside it"),
+            "name laws to fly each of them from the same starts, or vary the law, and not both",
+        )
+        .at(&format!("vary.{key}"))),
+        _ => Ok(()),
+    }
+}
+
+fn is_word(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_' || c == '-'
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,7 +261,7 @@ mod tests {
         let variations = spec.variations().expect("variations");
         assert_eq!(variations.keys().collect::<Vec<_>>(), ["network.loss", "start.jitter_m", "start.seed"]);
         assert_eq!(variations["start.seed"], Variation::Seed {});
-        assert_eq!(spec.stop.map(|stop| stop.of), Some(Asked::Clear));
+        assert_eq!(spec.stop.map(|stop| stop.of), Some(Question::Clear));
         let again = Spec::read("again", &spec.to_toml().expect("TOML")).expect("read");
         assert_eq!(again, spec);
     }
@@ -234,7 +277,7 @@ mod tests {
             Spec::read("s", "scenario = 'p'\n[vary]\nlaw.alpha = { unifrom = [0.0, 1.0] }").expect("TOML").variations();
         assert!(said.expect_err("no variation").to_string().contains("law.alpha.unifrom"));
         for (width, decided) in [(Some(0.0), None), (None, Some(1.0)), (Some(f64::NAN), None), (None, None)] {
-            assert!(Stop { of: Asked::Clear, width, decided }.check().is_err());
+            assert!(Stop { of: Question::Clear, width, decided }.check().is_err());
         }
     }
 }

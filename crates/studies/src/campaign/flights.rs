@@ -6,12 +6,16 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::error::CampaignError;
-use super::manifest::{Manifest, Program, SCHEMA_VERSION};
-use super::overlaps::refuse_overlaps;
-use super::spec::{Method, Spec, Stop};
+use super::manifest::{Manifest, Program};
+use super::row::Row;
+use super::spec::{Method, Spec, Stop, refuse_overlaps};
+use super::summary::{Gathered, Summary};
 use super::vary::Variation;
+use crate::SCHEMA_VERSION;
+use crate::base::BaseScenario;
+use crate::batch::Batch;
 use crate::splitting::{self, Settings};
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
 
 /// Most runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
@@ -27,18 +31,19 @@ const NOISE_SEED: &str = "noise.seed";
 /// Tables that bring chance into a flight.
 const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
 
+/// Flights whose rows are in memory at once.
+const AT_ONCE: u64 = 1024;
+
 /// The flights of every run.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     manifest: Manifest,
-    source: Source,
-    base: Vec<Override>,
+    base: BaseScenario,
     laws: Vec<Law>,
     variations: BTreeMap<String, Variation>,
     seed: u64,
     stop: Option<Stop>,
     splitting: Option<Settings>,
-    own: Scenario,
     argument: String,
 }
 
@@ -141,10 +146,11 @@ impl Campaign {
             .at("splitting"));
         }
         let written = |(key, value): (&String, &toml::Value)| Override::parse(&format!("{key}={value}"));
-        let base = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
-        let base = base.map_err(|error| CampaignError::scenario("[set] ", "set", error))?;
-        let template =
-            Template::read(&source, &base).map_err(|error| CampaignError::scenario("", "scenario", error))?;
+        let written = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
+        let written = written.map_err(|error| CampaignError::scenario("[set] ", "set", error))?;
+        let base = BaseScenario::read(source, written);
+        let base = base.map_err(|error| CampaignError::scenario("", "scenario", error))?;
+        let template = base.template();
         let laws = spec.laws.iter().map(|name| {
             let law = template.law(name).map_err(|error| CampaignError::scenario("", "laws", error))?;
             Ok(Law { name: law.name.clone(), overrides: law.overrides() })
@@ -155,7 +161,6 @@ impl Campaign {
                 CampaignError::plan(format!("the law {} is named twice", twice.name), "name each law once").at("laws")
             );
         }
-        let own = template.own().clone();
         if laws.is_empty() {
             laws.push(Law { name: template.own_law().name, overrides: Vec::new() });
         }
@@ -171,18 +176,7 @@ impl Campaign {
         let builtin = tautline_sim::scenario::builtin::find(&manifest.scenario_name);
         let is_builtin = builtin.is_some_and(|builtin| builtin.toml == manifest.scenario);
         let argument = if is_builtin { manifest.scenario_name.clone() } else { file.display().to_string() };
-        Ok(Self {
-            manifest,
-            source,
-            base,
-            laws,
-            variations,
-            seed: spec.seed,
-            stop: spec.stop,
-            splitting,
-            own,
-            argument,
-        })
+        Ok(Self { manifest, base, laws, variations, seed: spec.seed, stop: spec.stop, splitting, argument })
     }
 
     /// Refuses keys that do not take what may be drawn, and runs that are all the same.
@@ -278,7 +272,7 @@ impl Campaign {
     /// The scenario without any drawn value.
     #[must_use]
     pub fn own(&self) -> &Scenario {
-        &self.own
+        self.base.own()
     }
 
     /// The laws that fly every run, in their order.
@@ -315,7 +309,7 @@ impl Campaign {
     #[must_use]
     pub fn steps(&self, runs: u64) -> u64 {
         let flights = self.splitting.map_or(1, |settings| settings.flights as u64);
-        self.own.time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64).saturating_mul(flights)
+        self.own().time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64).saturating_mul(flights)
     }
 
     /// What `tautline run` takes for its scenario: a built-in one's name, or a path.
@@ -333,8 +327,7 @@ impl Campaign {
     /// What flies a run under a law, each as `--set` takes it.
     #[must_use]
     pub fn sets(&self, run: u64, law: &Law) -> Vec<String> {
-        let base = self.base.iter().map(|set| set.text().to_owned()).chain(law.overrides.iter().cloned());
-        base.chain(written(&self.drawn(run))).collect()
+        self.base.sets().chain(law.overrides.iter().cloned()).chain(written(&self.drawn(run))).collect()
     }
 
     /// The flight of a run under a law.
@@ -345,10 +338,59 @@ impl Campaign {
         self.read_with(law, &self.drawn(run))
     }
 
+    /// Flies a run under one of its laws, counted from 0; none where flying was interrupted before it. A flight that has begun
+    /// comes to its end, an estimate does not.
+    ///
+    /// # Errors
+    /// [`CampaignError::Flight`] for a law or a judge that cannot be built, and a law that is not one of the campaign's.
+    pub fn row(&self, run: u64, law: usize, batch: &Batch<'_>) -> Result<Option<Row>, CampaignError> {
+        let Some(named) = self.laws().get(law) else {
+            return Err(CampaignError::plan(format!("law {law} of {}", self.laws().len()), "laws are counted from 0"));
+        };
+        let mut row = Row { run, law, drawn: self.values(run), not_flown: None, flight: None, splitting: None };
+        let scenario = match self.scenario(run, named) {
+            Ok(scenario) => scenario,
+            Err(error) => {
+                batch.monitor().advance(self.own().time.steps());
+                row.not_flown = Some(error.message().to_owned());
+                return Ok(Some(row));
+            }
+        };
+        let name = || named.name.clone();
+        if let Some(settings) = self.splitting() {
+            let (seeds, mut reported) = ([self.seed(), run], 0);
+            let split = splitting::estimate(&scenario, settings, seeds, &mut batch.carry_on(&mut reported, false));
+            row.splitting =
+                split.map_err(|error| CampaignError::Splitting { run, law: name(), error: Box::new(error) })?;
+        } else {
+            let flown = batch.finishing_flights().fly(&scenario, run);
+            row.flight = flown.map_err(|error| CampaignError::Flight { run, law: name(), error: Box::new(error) })?;
+        }
+        Ok((row.flight.is_some() || row.splitting.is_some()).then_some(row))
+    }
+
+    /// Flies everything and keeps no file: the answer that [`super::Folder::merge`] gives, or none where it was interrupted.
+    ///
+    /// # Errors
+    /// As [`Campaign::row`].
+    pub fn fly(&self, batch: &Batch<'_>) -> Result<Option<Summary>, CampaignError> {
+        let (laws, runs) = (self.laws().len(), self.manifest().runs);
+        let mut gathered = Gathered::new(self);
+        let mut from = 0;
+        while from < runs && !gathered.is_enough() {
+            let to = runs.min(from + AT_ONCE);
+            let places: Vec<_> = (from..to).flat_map(|run| (0..laws).map(move |law| (run, law))).collect();
+            for row in batch.run(places.len(), |number| self.row(places[number].0, places[number].1, batch))? {
+                let Some(row) = row else { return Ok(None) };
+                gathered.take(&row);
+            }
+            from = to;
+        }
+        Ok(Some(gathered.finish(self)))
+    }
+
     fn read_with(&self, law: &Law, drawn: &BTreeMap<&str, toml::Value>) -> Result<Scenario, ScenarioError> {
-        let more = law.overrides.iter().cloned().chain(written(drawn)).map(|set| Override::parse(&set));
-        let more = more.collect::<Result<Vec<_>, _>>()?;
-        Scenario::read(&self.source, &[self.base.as_slice(), &more].concat())
+        self.base.with(&law.overrides.iter().cloned().chain(written(drawn)).collect::<Vec<_>>())
     }
 
     fn drawn(&self, run: u64) -> BTreeMap<&str, toml::Value> {

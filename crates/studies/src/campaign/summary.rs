@@ -5,19 +5,20 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::bins::{KeyColumn, Varied};
-use super::plan::Campaign;
+use super::flights::Campaign;
 use super::row::{Known, Row};
-use super::spec::Asked;
 use super::tally::{Intervals, Tally, UpperBound};
-use super::worst::{WORST, Worst, WorstList};
+use crate::Question;
+use crate::SCHEMA_VERSION;
+use crate::flight::Outcome;
 use crate::splitting::{Repetitions, Splitting};
 use crate::statistics::{Estimate, Paired, Proportion};
 use tautline_report::figures::Histogram;
 
-/// Version of the keys of `campaign.json`: raised when one is renamed, removed or changes its meaning.
-pub const SCHEMA_VERSION: u32 = 1;
 /// Intervals of a histogram.
 const HISTOGRAM_INTERVALS: usize = 30;
+/// Number of worst flights that are kept.
+const WORST: usize = 10;
 
 /// What came of a campaign. What does not apply is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -224,15 +225,15 @@ impl Gathered {
             certificates_broken: counts.certificates_broken,
             violated: counts.violated(intervals),
             violated_below: counts.violated_below(intervals),
-            clear: counts.share(Asked::Clear, intervals),
-            reached: counts.share(Asked::Reached, intervals),
-            pass: counts.share(Asked::Pass, intervals),
+            clear: counts.share(Question::Clear, intervals),
+            reached: counts.share(Question::Reached, intervals),
+            pass: counts.share(Question::Pass, intervals),
             clearance_m: Quantiles::of(&numbers.clearance_m, intervals),
             reached_at_s: Quantiles::of(&numbers.reached_at_s, intervals),
             path_length_m: Quantiles::of(&numbers.path_length_m, intervals),
             clearance_histogram_m: Histogram::of(&numbers.clearance_m, HISTOGRAM_INTERVALS),
             reached_histogram_s: Histogram::of(&numbers.reached_at_s, HISTOGRAM_INTERVALS),
-            worst: worst.finish(),
+            worst: worst.0,
             splitting: campaign.splitting().map(|_| Repetitions::new(&numbers.estimates)),
             bad: numbers.bad,
         });
@@ -324,12 +325,55 @@ impl Summary {
     pub fn not_flown(&self) -> BTreeMap<&str, u64> {
         self.laws.iter().map(|law| (law.name.as_str(), law.not_flown)).filter(|&(_, count)| count > 0).collect()
     }
+}
 
-    /// `campaign.json`.
-    ///
-    /// # Errors
-    /// None in practice: every value has a JSON form.
-    pub fn to_json(&self) -> serde_json::Result<String> {
-        serde_json::to_string_pretty(self).map(|json| json + "\n")
+/// A flight to look at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Worst {
+    /// Number of the run.
+    pub run: u64,
+    /// How it went.
+    pub outcome: Outcome,
+    /// Smallest separation less delta \[m\].
+    pub clearance_m: f64,
+    /// Smallest separation \[m\].
+    pub min_m: f64,
+    /// When that was \[s\].
+    pub min_at_s: Option<f64>,
+    /// Which two.
+    pub min_pair: Option<[usize; 2]>,
+    /// Whether the formation was reached.
+    pub reached: bool,
+    /// Hash over the bits of every recorded state.
+    pub state_hash: String,
+}
+
+/// The worst so far, the worst first; of equal ones the first flown.
+#[derive(Clone, Debug, Default)]
+struct WorstList(Vec<Worst>);
+
+impl WorstList {
+    /// Takes a row, if it is among the worst.
+    fn take(&mut self, row: &Row) {
+        let (Some(flight), Some(clearance_m)) = (&row.flight, row.clearance_m()) else { return };
+        // One that violated, an obstacle's clearance it may be, is worse than any that did not.
+        let rank = |outcome: Outcome| outcome != Outcome::Violated;
+        let own = (rank(flight.outcome), clearance_m);
+        let place = self.0.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
+        if place >= WORST {
+            return;
+        }
+        let worst = Worst {
+            run: row.run,
+            outcome: flight.outcome,
+            clearance_m,
+            min_m: flight.min_m.unwrap_or(f64::NAN),
+            min_at_s: flight.min_at_s,
+            min_pair: flight.min_pair,
+            reached: flight.reached,
+            state_hash: flight.state_hash.clone(),
+        };
+        self.0.insert(place, worst);
+        self.0.truncate(WORST);
     }
 }

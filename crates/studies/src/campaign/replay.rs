@@ -2,16 +2,144 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Campaign, CampaignPage, Folder, Law, Summary, Worst, WorstFlight};
-use crate::compare::Outcome;
+use super::{Campaign, Folder, Law, Summary, Worst};
+use crate::flight::Outcome;
 use crate::splitting::{self, StateAt};
+use crate::study::{Block, Section};
 use tautline_core::text::metres;
 use tautline_recordings::mcap::{Header, McapRecorder};
-use tautline_report::replay::PAGE_BYTES;
-use tautline_report::report::page::Picture;
+use tautline_report::replay::{NoReplay, PAGE_BYTES, Replay};
+use tautline_report::report::page::{self, Picture, Start};
 use tautline_report::request::{
     Failure, Monitor, Pictures, Quiet, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into,
 };
+
+/// Which flight of a campaign is flown again, and where its files go.
+#[derive(Clone, Debug)]
+pub struct ReplayRequest {
+    /// Number of the run, from 0.
+    pub run: u64,
+    /// The law; the first by default.
+    pub law: Option<String>,
+    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    pub bad: Option<usize>,
+    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
+    pub out: Option<PathBuf>,
+}
+
+/// A flight to look at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WorstFlight {
+    /// Number of the run.
+    pub run: u64,
+    /// The law.
+    pub law: String,
+    /// What is to be seen, in a sentence.
+    pub said: String,
+    /// The command that flies it again.
+    pub command: String,
+    /// Where its recording is, from the page.
+    pub recording: Option<String>,
+    /// It at its worst moment.
+    pub picture: Option<Picture>,
+    /// The flight itself, or why it cannot be replayed.
+    pub replay: Option<Result<Replay, NoReplay>>,
+}
+
+impl WorstFlight {
+    /// The section of a page on the worst flights.
+    pub(super) fn section(flights: &[Self]) -> Section {
+        let mut blocks = Vec::new();
+        let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
+        if flights.is_empty() {
+            blocks.push(page::list(&["There are none."]));
+        }
+        if !pictures.is_empty() {
+            blocks.push(page::pictures(&pictures));
+        }
+        for flight in flights {
+            let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
+            blocks.push(page::list(&std::iter::once(flight.said.clone()).chain(recording).collect::<Vec<_>>()));
+            blocks.extend(flight.replay.as_ref().map(|replay| match replay {
+                Ok(replay) => page::replay(&flight.said, replay, Start::OnDemand),
+                Err(why) => page::no_replay(&why.to_string()),
+            }));
+            blocks.push(page::command(&flight.command));
+        }
+        Section::new("The worst flights", blocks.into_iter().map(Block::Page))
+    }
+}
+
+/// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
+/// Returns whether it passes.
+///
+/// # Errors
+/// [`Failure`] where there is no such flight, it has another state hash, or the system refuses.
+pub fn replay(
+    folder: &Folder,
+    request: &ReplayRequest,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<bool, Failure> {
+    let campaign = folder.campaign();
+    let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
+    let law = match &request.law {
+        None => campaign.laws().first(),
+        Some(name) => campaign.laws().iter().find(|law| law.name == *name),
+    };
+    let Some(law) = law else {
+        let said = request.law.as_deref().unwrap_or_default();
+        return Err(Failure::input(
+            "campaign/unknown-law",
+            format!("no law of this campaign is named {said}"),
+            format!("its laws are {}", names.join(", ")),
+        ));
+    };
+    let runs = campaign.manifest().runs;
+    if request.run >= runs {
+        let help = format!("its runs are 0 to {}", runs - 1);
+        return Err(Failure::input("campaign/no-run", format!("the campaign has no run {}", request.run), help));
+    }
+    if campaign.splitting().is_some() {
+        let bad = request.bad.unwrap_or_default();
+        let default = || place_of_bad(folder, &law.name, request.run, bad);
+        let place = request.out.clone().unwrap_or_else(default);
+        let hash = fly_bad(folder, law, [request.run, bad as u64], &place)?;
+        let recording = place.join(RECORDING);
+        monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", recording.display()));
+        return Ok(false);
+    }
+    if let Some(out) = request.out.as_ref().filter(|out| out.join("report.json").exists()) {
+        let message = format!("{} holds a finished run", out.display());
+        return Err(Failure::input("files/finished", message, "give another folder with --out"));
+    }
+    let out = request.out.clone().unwrap_or_else(|| place(folder, &law.name, request.run));
+    replay_run(folder, request.run, law, out, pictures, monitor)
+}
+
+/// Flies a run again and compares it with its row, where there is one. Returns whether it passes.
+fn replay_run(
+    folder: &Folder,
+    run: u64,
+    law: &Law,
+    out: PathBuf,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<bool, Failure> {
+    let campaign = folder.campaign();
+    let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
+    let request = RunRequest::reproducible(&scenario, command(campaign, run, law), out);
+    let left = run_into(&request, pictures, monitor)?;
+    let row = folder.row(run, number_of(campaign, law))?;
+    match row.and_then(|row| row.flight) {
+        Some(flight) => {
+            check(&left, run, law, &flight.state_hash)?;
+            monitor.say(&format!("state hash {}, as in the campaign", flight.state_hash));
+        }
+        None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
+    }
+    Ok(left.report.verdict.pass)
+}
 
 /// What helps where a flight that is flown again is another one.
 const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
@@ -21,31 +149,19 @@ fn number_of(campaign: &Campaign, law: &Law) -> usize {
     campaign.laws().iter().position(|other| other == law).unwrap_or_default()
 }
 
-/// Flights that were flown again.
-pub(super) struct Again {
-    flights: Vec<WorstFlight>,
-}
-
-impl Again {
-    /// What a page shows of them.
-    pub(super) fn page<'a>(&'a self, command: &'a str, spec: &'a str) -> CampaignPage<'a> {
-        CampaignPage { command, spec, worst: &self.flights }
-    }
-}
-
 /// Where a flight that is flown again leaves its files.
 pub(super) fn place(folder: &Folder, law: &str, run: u64) -> PathBuf {
     folder.file("worst").join(format!("{law}-run-{run}"))
 }
 
 /// Flies the worst flights again, the worst of all laws first.
-pub(super) fn flown_again(
+pub(super) fn fly_worst_again(
     folder: &Folder,
     summary: &Summary,
     most: usize,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-) -> Result<Again, Failure> {
+) -> Result<Vec<WorstFlight>, Failure> {
     let campaign = folder.campaign();
     if campaign.splitting().is_some() {
         return bad_again(folder, summary, most, monitor);
@@ -56,7 +172,7 @@ pub(super) fn flown_again(
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     worst.truncate(most);
-    let mut again = Again { flights: Vec::new() };
+    let mut flights = Vec::new();
     for (law, worst) in worst {
         if monitor.is_interrupted() {
             monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
@@ -68,18 +184,23 @@ pub(super) fn flown_again(
         let left = run_into(&run, pictures, &Quiet::new(monitor))?;
         check(&left, worst.run, law, &worst.state_hash)?;
         let replay = replay_of_run(&scenario, &left.film, &left.report, PAGE_BYTES / most.max(1));
-        again.flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
+        flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
     }
-    Ok(again)
+    Ok(flights)
 }
 
 /// Flies flights again that were violated in estimates, those furthest into a violation first.
-fn bad_again(folder: &Folder, summary: &Summary, most: usize, monitor: &dyn Monitor) -> Result<Again, Failure> {
+fn bad_again(
+    folder: &Folder,
+    summary: &Summary,
+    most: usize,
+    monitor: &dyn Monitor,
+) -> Result<Vec<WorstFlight>, Failure> {
     let laws = std::iter::zip(folder.campaign().laws(), &summary.laws);
     let mut worst: Vec<_> = laws.flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
     worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
     worst.truncate(most);
-    let mut again = Again { flights: Vec::new() };
+    let mut flights = Vec::new();
     for (law, bad) in worst {
         if monitor.is_interrupted() {
             break;
@@ -89,7 +210,7 @@ fn bad_again(folder: &Folder, summary: &Summary, most: usize, monitor: &dyn Moni
         let (run, number) = (bad.run.to_string(), bad.bad.to_string());
         // From the folder of the page, so that the page has the same bytes wherever the campaign is.
         let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
-        again.flights.push(WorstFlight {
+        flights.push(WorstFlight {
             run: bad.run,
             law: law.name.clone(),
             said: format!(
@@ -106,7 +227,7 @@ fn bad_again(folder: &Folder, summary: &Summary, most: usize, monitor: &dyn Moni
             replay: None,
         });
     }
-    Ok(again)
+    Ok(flights)
 }
 
 /// Where a bad flight of an estimate leaves its recording.
@@ -201,28 +322,4 @@ fn command(campaign: &Campaign, run: u64, law: &Law) -> String {
     let sets = campaign.sets(run, law);
     let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
     command_line(["run", campaign.scenario_argument()].into_iter().chain(sets).collect::<Vec<_>>().into_iter())
-}
-
-/// Flies a run again and compares it with its row, where there is one. Returns whether it passes.
-pub(super) fn replay(
-    folder: &Folder,
-    run: u64,
-    law: &Law,
-    out: PathBuf,
-    pictures: &dyn Pictures,
-    monitor: &dyn Monitor,
-) -> Result<bool, Failure> {
-    let campaign = folder.campaign();
-    let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
-    let request = RunRequest::reproducible(&scenario, command(campaign, run, law), out);
-    let left = run_into(&request, pictures, monitor)?;
-    let row = folder.row(run, number_of(campaign, law))?;
-    match row.and_then(|row| row.flight) {
-        Some(flight) => {
-            check(&left, run, law, &flight.state_hash)?;
-            monitor.say(&format!("state hash {}, as in the campaign", flight.state_hash));
-        }
-        None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
-    }
-    Ok(left.report.verdict.pass)
 }
