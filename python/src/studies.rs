@@ -10,6 +10,7 @@ use tautline::margin::Range;
 use tautline::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
 use tautline::scenario::builtin;
 use tautline::studies::{Experiment, Question, Study as _, StudyFiles, StudyRequest};
+use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
 use crate::errors::{Raised as _, broken};
@@ -124,6 +125,22 @@ pub(crate) fn margin(
     let range = Range { from: start, to: stop, scan, halvings, logarithmic };
     let options = tautline::margin::Options { key, range, question: question(verdict)?, runs, seed };
     study(py, scenario, options, outputs)
+}
+
+/// Flies a grid over one key or two.
+#[pyfunction]
+pub(crate) fn sweep(
+    py: Python<'_>,
+    scenario: &Scenario,
+    keys: Vec<(String, Vec<f64>)>,
+    runs: u64,
+    seed: u64,
+    verdict: String,
+    outputs: Outputs,
+) -> PyResult<Answer> {
+    let keys = keys.into_iter().map(|(key, values)| SweptKey::new(&key, values)).collect::<Result<_, _>>();
+    let (keys, question) = (keys.map_err(Failure::raised)?, question(verdict)?);
+    study(py, scenario, tautline::sweep::Options { keys, question, runs, seed }, outputs)
 }
 
 /// Searches for the worst flight within bounds.

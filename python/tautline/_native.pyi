@@ -26,6 +26,7 @@ __all__ = [
     "margin",
     "read",
     "scenarios",
+    "sweep",
     "validate",
 ]
 
@@ -325,4 +326,12 @@ def margin(
 ) -> _Answered: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
+def sweep(
+    scenario: Scenario,
+    keys: Sequence[tuple[str, Sequence[float]]],
+    runs: int,
+    seed: int,
+    verdict: str,
+    outputs: Outputs,
+) -> _Answered: ...
 def validate(out: str, force: bool, threads: int | None) -> _Answered: ...

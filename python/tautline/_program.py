@@ -1,4 +1,4 @@
-"""Commands of the command line as functions: exports, laws side by side, margins, attacks, the claims of the paper."""
+"""Commands of the command line as functions: exports, laws side by side, margins, sweeps, attacks, the claims of the paper."""
 
 from __future__ import annotations
 
@@ -167,6 +167,39 @@ def margin(
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
             logarithmic=flag(log, "log"),
+            outputs=outputs(csv, latex, html, force, threads),
+        )
+    )
+
+
+def sweep(
+    scenario: Scenario | PathLike,
+    keys: Mapping[str, Sequence[float]],
+    *,
+    runs: int = 1,
+    seed: int = 0,
+    verdict: str = "pass",
+    set: Mapping[str, Any] | None = None,
+    csv: PathLike | None = None,
+    latex: PathLike | None = None,
+    html: PathLike | None = None,
+    force: bool = False,
+    threads: int | None = None,
+) -> Answer:
+    """Flies the grid of one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``: ``answer.points.to_pandas()`` is a row a
+    point, with the share of runs that show a verdict (``pass``, ``clear``, ``reached``). docs/sweeps.md says more."""
+    swept = []
+    for key, values in by_name(keys, "keys").items():
+        if isinstance(values, (str, bytes)) or not hasattr(values, "__iter__"):
+            raise TypeError(f"keys: {key} needs a list of numbers, not {values!r}")
+        swept.append((str(key), [number(value, key) for value in values]))
+    return Answer(
+        *_native.sweep(
+            asked(scenario, set),
+            keys=swept,
+            runs=count(runs, "runs"),
+            seed=count(seed, "seed"),
+            verdict=str(verdict),
             outputs=outputs(csv, latex, html, force, threads),
         )
     )

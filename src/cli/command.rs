@@ -39,6 +39,8 @@ pub(super) enum Command {
     Compare(studies::CompareArguments),
     /// Find how much of one key a scenario survives: where between two values its verdict turns.
     Margin(studies::MarginArguments),
+    /// Fly a grid over one key or two: how shares and separations depend on them.
+    Sweep(studies::SweepArguments),
     /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
     Campaign(campaign::CampaignArguments),
     /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
@@ -85,6 +87,7 @@ pub(super) fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => arguments.run(),
         Command::Margin(arguments) => arguments.run(),
+        Command::Sweep(arguments) => arguments.run(),
         Command::Campaign(arguments) => campaign::campaign(&arguments),
         Command::Attack(arguments) => arguments.run(),
         Command::Export(arguments) => export::export(&arguments),

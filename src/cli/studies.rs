@@ -1,4 +1,4 @@
-//! Commands that fly many flights of one scenario: `compare`, `margin` and `attack`.
+//! Commands that fly many flights of one scenario: `compare`, `margin`, `sweep` and `attack`.
 
 use std::path::PathBuf;
 
@@ -13,8 +13,10 @@ use super::scenario::ScenarioArguments;
 use tautline_report::request::Failure;
 use tautline_studies::attack::{FLIGHTS, SEEDS_OF_A_CANDIDATE, Variation};
 use tautline_studies::margin::Range;
+use tautline_studies::sweep::SweptKey;
 use tautline_studies::{
     Experiment, MOST_RUNS, Question, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, margin,
+    sweep,
 };
 
 /// The scenario, files and threads of a study.
@@ -25,7 +27,7 @@ pub(super) struct StudyArguments {
     /// Write every number as JSON; - is standard output, for this and the next three.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a table as CSV: a row a law, a value, or a candidate that was worse than all before it.
+    /// Write a table as CSV: a row a law, a value, a point, or a candidate that was worse than all before it.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write the tables as LaTeX.
@@ -156,6 +158,36 @@ impl MarginArguments {
         self.study.answer(margin::Options {
             key: self.key.clone(),
             range: Range { from: self.from, to: self.to, scan, halvings, logarithmic },
+            question: self.verdict,
+            runs: self.runs.runs.unwrap_or(1),
+            seed: self.runs.seed,
+        })
+    }
+}
+
+/// Arguments of `tautline sweep`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 0 once the sweep is made, whatever the flights did; with 1 where it was interrupted. Flown once (--runs 1) everything \
+but the keys is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and where nothing is random the \
+start is moved a little. docs/sweeps.md says more.")]
+pub(super) struct SweepArguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    #[command(flatten)]
+    runs: RunArguments,
+    /// A key and its values, evenly spaced or listed: `network.loss=0:0.5:11`, `law.alpha=0.5,1,2`; given twice, the grid of both.
+    #[arg(long = "key", value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...", required = true)]
+    keys: Vec<String>,
+    /// What a run has to show to count in the share.
+    #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
+    verdict: Question,
+}
+
+impl SweepArguments {
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
+        self.study.answer(sweep::Options {
+            keys: self.keys.iter().map(|text| SweptKey::parse(text)).collect::<Result<_, _>>()?,
             question: self.verdict,
             runs: self.runs.runs.unwrap_or(1),
             seed: self.runs.seed,

@@ -11,6 +11,9 @@ use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template
 /// A start without randomness is moved by up to this part of delta along each axis.
 pub const JITTER: f64 = 0.05;
 
+/// The key of the jitter.
+pub(crate) const JITTER_KEY: &str = "start.jitter_m";
+
 /// A scenario as a study reads it again and again, each time with other keys.
 #[derive(Clone, Debug)]
 pub struct BaseScenario {
@@ -95,14 +98,14 @@ impl Runs {
         self.seed.saturating_add(run)
     }
 
-    /// Overrides of a run, from 0.
+    /// Overrides of a run, from 0. Overrides of keys that are varied follow them.
     #[must_use]
     pub fn sets(&self, run: u64) -> Vec<String> {
         if self.count <= 1 {
             return Vec::new();
         }
         let seed = self.seed(run);
-        let jitter = self.jitter_m.map(|jitter_m| format!("start.jitter_m={jitter_m:?}"));
+        let jitter = self.jitter_m.map(|jitter_m| format!("{JITTER_KEY}={jitter_m:?}"));
         [format!("start.seed={seed}"), format!("noise.seed={seed}")].into_iter().chain(jitter).collect()
     }
 }

@@ -33,6 +33,7 @@ pub mod margin;
 pub mod splitting;
 pub mod statistics;
 pub mod study;
+pub mod sweep;
 pub mod table;
 #[cfg(test)]
 mod testing;

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use crate::base::{BaseScenario, Question, Runs, check_runs, jitter_note};
+use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
 use crate::batch::Batch;
 use crate::flight::FlightSummary;
 use crate::statistics::{CONFIDENCE, Proportion};
@@ -134,7 +134,8 @@ impl Options {
 
     /// The scenario with a value of the key and the overrides of a run.
     fn scenario(&self, base: &BaseScenario, value: f64, sets: Vec<String>) -> Result<Scenario, Failure> {
-        let sets: Vec<_> = std::iter::once(format!("{}={}", self.key, as_toml(value))).chain(sets).collect();
+        let key = format!("{}={}", self.key, as_toml(value));
+        let sets: Vec<_> = sets.into_iter().chain([key]).collect();
         base.with(&sets).map_err(|error| Failure::from(error).under(&self.under(value)))
     }
 
@@ -187,9 +188,9 @@ impl Experiment for Options {
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Margin>, Failure> {
         let (own, range) = (base.own(), self.range);
-        let ends = [range.from, range.to].map(|end| self.scenario(base, end, Vec::new()));
-        let [from, to] = ends;
-        let is_random = from?.is_random_in_flight() | to?.is_random_in_flight();
+        let [from, to] = [range.from, range.to].map(|end| self.scenario(base, end, Vec::new()));
+        let ends = [from?, to?];
+        let is_random = ends.iter().any(Scenario::is_random_in_flight) || self.key == JITTER_KEY;
         let runs = Runs::new(self.runs, self.seed, base, is_random);
         // Where the law cannot be built, the flight says so.
         let predicted = Preflight::of(own).map(|preflight| preflight.margins).unwrap_or_default();
@@ -386,7 +387,7 @@ impl Study for Margin {
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
         let side = |(probe, what): (&Probe, &str)| {
             let key = format!("{}={}", self.key, as_toml(probe.value));
-            let sets: Vec<_> = std::iter::once(key).chain(self.seeds.sets(probe.worst_run(self.question))).collect();
+            let sets: Vec<_> = self.seeds.sets(probe.worst_run(self.question)).into_iter().chain([key]).collect();
             (format!("A flight that {what}:"), scenario.command("run", [], &sets))
         };
         self.sides().into_iter().flat_map(|sides| sides.into_iter().zip(self.question.words())).map(side).collect()

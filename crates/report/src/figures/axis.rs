@@ -126,6 +126,11 @@ impl Axis {
         self.ticks.iter().map(|&tick| text_px(&self.tick_label(tick))).fold(0.0, f64::max)
     }
 
+    /// A number of a linear axis, with a digit more than its ticks.
+    pub(super) fn number(&self, number: f64) -> String {
+        number_label(number, 0.1 * self.step)
+    }
+
     /// What is written at the tick at `place`.
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {

@@ -18,6 +18,8 @@
 //! | [`attack`](attack()) | the smallest separation that a search had found over its flights |
 //! | [`margin`](margin()) | the share of flights that show something over the values of a key |
 //! | [`shares`] | the same of several laws |
+//! | [`separations`] | the smallest separation of flights over the values of a key |
+//! | [`heat_map`](heat_map()) | a number over a grid of two keys |
 //! | [`histograms`] | how often a number of many flights falls where |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`RunHistory`], which watches a run or reads a
@@ -37,6 +39,7 @@ mod convergence;
 mod distances;
 mod each;
 mod figure;
+mod heat_map;
 mod histogram;
 mod history;
 mod margin;
@@ -53,9 +56,10 @@ pub use channels::channels;
 pub use convergence::{Step, convergence};
 pub use distances::distances;
 pub use figure::Figure;
+pub use heat_map::{GridAxis, heat_map};
 pub use histogram::{Histogram, histograms};
 pub use history::RunHistory;
-pub use margin::{Share, margin, shares};
+pub use margin::{Separation, Share, margin, separations, shares};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use run::{Criteria, NAMES_OF_RUN, of_run};
