@@ -33,6 +33,7 @@ mod refuses;
 mod runs;
 mod scenarios;
 mod shapes;
+mod sweep;
 mod told;
 
 impl program::Ran {

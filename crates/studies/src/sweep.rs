@@ -83,6 +83,7 @@ pub struct Sweep {
     /// Safety distance delta \[m\].
     pub delta_m: f64,
     /// The keys that were changed.
+    #[serde(rename = "grid")]
     pub keys: Vec<SweptKey>,
     /// What a flight had to show.
     pub question: Question,

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use tautline_report::request::{Failure, Monitor, ScenarioRequest, Silent};
 use tautline_studies::campaign::{CampaignRequest, campaign};
-use tautline_studies::{Experiment, StudyFiles, StudyRequest, answer, attack, compare, margin};
+use tautline_studies::{Experiment, StudyFiles, StudyRequest, answer, attack, compare, margin, sweep};
 
 fn short() -> ScenarioRequest {
     ScenarioRequest::named("pentagon", &["time.duration_s=1".to_owned()]).expect("a scenario")
@@ -48,6 +48,8 @@ fn an_interruption_leaves_no_answer_and_no_file() {
     assert!(leaves_nothing(compare::Options::default()));
     assert!(leaves_nothing(margin::Options::new("time.control_hz", 5.0, 50.0)));
     assert!(leaves_nothing(options()));
+    let key = sweep::SweptKey::parse("law.alpha=0.5,1").expect("a key");
+    assert!(leaves_nothing(sweep::Options { keys: vec![key], runs: 1, ..sweep::Options::default() }));
 }
 
 /// The code of the failure of a study.
