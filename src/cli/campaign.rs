@@ -115,22 +115,15 @@ struct Answered {
     says: Says,
 }
 
-/// Which flights are flown again for the page.
+/// How an answer is said.
 #[derive(Debug, Args)]
-struct Looks {
+struct Says {
     /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
     /// Take no pictures of them.
     #[arg(long)]
     no_snapshots: bool,
-}
-
-/// How an answer is said.
-#[derive(Debug, Args)]
-struct Says {
-    #[command(flatten)]
-    looks: Looks,
     /// Print the answer as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -167,10 +160,10 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
                 out: run.out.clone(),
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
-                worst: run.says.looks.worst.into(),
+                worst: run.says.worst.into(),
                 ..run.spec.request()
             };
-            run.says.answer(|monitor| study::campaign(&request, &*run.says.looks.pictures(), monitor))
+            run.says.answer(|monitor| study::campaign(&request, &*run.says.pictures(), monitor))
         }
         What::Plan(plan) => {
             let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
@@ -202,11 +195,11 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
         }
         What::Merge(Answered { folder, says }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::merge(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
+            says.answer(|monitor| study::merge(&folder, says.worst.into(), &*says.pictures(), monitor))
         }
         What::Report(Answered { folder, says }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::report(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
+            says.answer(|monitor| study::report(&folder, says.worst.into(), &*says.pictures(), monitor))
         }
         What::Replay(replay) => {
             let request =
@@ -235,6 +228,10 @@ impl InFolder {
 }
 
 impl Says {
+    fn pictures(&self) -> Box<dyn Pictures> {
+        pictures("best", !self.no_snapshots)
+    }
+
     /// Answers a request, and prints the answer as JSON where that is asked for.
     fn answer(
         &self,
@@ -246,11 +243,5 @@ impl Says {
             console::json(&summary)?;
         }
         Ok(Exit::good_if(summary.is_good()))
-    }
-}
-
-impl Looks {
-    fn pictures(&self) -> Box<dyn Pictures> {
-        pictures("best", !self.no_snapshots)
     }
 }

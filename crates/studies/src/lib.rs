@@ -36,7 +36,7 @@ pub mod study;
 pub mod sweep;
 pub mod table;
 #[cfg(test)]
-mod testing;
+mod tests;
 
 /// Most runs of a comparison, and of each value of a margin or point of a sweep.
 pub const MOST_RUNS: u64 = 1_000_000;

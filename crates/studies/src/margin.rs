@@ -306,8 +306,7 @@ impl Study for Margin {
     fn badge(&self) -> Badge {
         let flights: u64 = self.probes.iter().map(|probe| probe.held.of).sum();
         let values = counted(self.probes.len() as u64, "value", "values");
-        let word = format!("{values} of {}, {}", self.key, counted(flights, "flight", "flights"));
-        Badge { tone: Tone::Neutral, word }
+        Badge { tone: Tone::Neutral, word: format!("{values}, {}", counted(flights, "flight", "flights")) }
     }
 
     fn headline(&self) -> String {

@@ -3,6 +3,8 @@
 use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
 use super::figure::Figure;
+use tautline_core::text::at_least;
+
 use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};
 
 /// Space for the numbers and the label below the cells \[px\].
@@ -55,7 +57,7 @@ pub fn heat_map(
     let (width, height) = ((right - left) / columns as f64, HEIGHT / rows as f64);
     let title = format!("{} over two keys", capitalised(label));
     let mut canvas = Canvas::new((WIDTH, bottom + BELOW), &title, f64::midpoint(left, right));
-    let shown = |number: f64| scale.number(number);
+    let shown = |number: f64| scale.rounded_down(number);
     let has_room =
         numbers.iter().flatten().all(|&number| text_px(&shown(number)) + GAP <= width) && height >= TEXT + 2.0;
     for (place, number) in numbers.iter().enumerate() {
@@ -102,7 +104,7 @@ pub fn heat_map(
 fn description(label: &str, [x, y]: [GridAxis<'_>; 2], numbers: &[Option<f64>]) -> String {
     let without = numbers.iter().filter(|number| number.is_none()).count();
     let spanned = match extent(numbers.iter().flatten().copied()) {
-        Some((low, high)) => format!("from {low:.3} to {high:.3}"),
+        Some((low, high)) => format!("from {} to {}", at_least(low, 3), at_least(high, 3)),
         None => "unknown everywhere".to_owned(),
     };
     let crossed = if without > 0 { format!("; {without} crossed cells have none") } else { String::new() };

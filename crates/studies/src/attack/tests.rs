@@ -7,7 +7,7 @@ use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::flight::{Outcome, fly};
 use crate::study::{Experiment as _, Study as _, StudyPage};
-use crate::testing::{InterruptAfter, base, batch};
+use crate::tests::{InterruptAfter, base, batch};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::Source;
 

@@ -4,7 +4,7 @@ use super::{Comparison, Options, by_law};
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _};
-use crate::testing::{InterruptAfter, base, batch};
+use crate::tests::{InterruptAfter, base, batch};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::Source;
 

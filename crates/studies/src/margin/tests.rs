@@ -3,7 +3,7 @@
 use super::{Found, Margin, Options, Range, search};
 use crate::Question;
 use crate::study::{Experiment as _, Study as _};
-use crate::testing::{base, batch};
+use crate::tests::{base, batch};
 use tautline_sim::scenario::Source;
 
 fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {

@@ -4,7 +4,7 @@ use super::{MOST_POINTS, Options, Sweep, SweptKey};
 use crate::Question;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _, StudyPage};
-use crate::testing::{InterruptAfter, base, batch};
+use crate::tests::{InterruptAfter, base, batch};
 use tautline_sim::scenario::Source;
 
 /// Two vehicles that close up.

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-use super::{Path, Rule, split};
+use crate::splitting::{Path, Rule, split};
 
 const STEPS: u32 = 200;
 
