@@ -8,6 +8,26 @@ use crate::batch::Batch;
 use tautline_report::request::{Monitor, Silent};
 use tautline_sim::scenario::{Override, Source};
 
+/// Two vehicles that close up.
+const PAIR: &str = r#"name = "pair"
+[start]
+positions_m = [[0.0, 0.0], [4.0, 0.0]]
+[formation]
+shape = "line"
+spacing_m = 3.0
+[law]
+delta_m = 2.0
+alpha = 0.5
+[time]
+duration_s = 2.0
+record_hz = 10
+"#;
+
+/// The scenario of two vehicles that close up.
+pub(crate) fn pair() -> Source {
+    Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() }
+}
+
 /// A scenario with overrides.
 pub(crate) fn base(source: Source, sets: &[&str]) -> BaseScenario {
     let sets = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();

@@ -3,8 +3,7 @@
 use super::{Found, Margin, Options, Range, search};
 use crate::Question;
 use crate::study::{Experiment as _, Study as _};
-use crate::tests::{base, batch};
-use tautline_sim::scenario::Source;
+use crate::tests::{base, batch, pair};
 
 fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
     Range { from, to, scan, halvings, logarithmic: false }
@@ -81,25 +80,6 @@ fn a_search_that_is_broken_off_says_only_what_it_knows() {
     assert_eq!(broken(1), Ok(None), "one value is no bracket");
     let Ok(Some(Found::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
     assert_eq!((before, after), (0.0, 0.5));
-}
-
-/// A pair that starts too far apart.
-const PAIR: &str = r#"name = "pair"
-[start]
-positions_m = [[0.0, 0.0], [4.0, 0.0]]
-[formation]
-shape = "line"
-spacing_m = 3.0
-[law]
-delta_m = 2.0
-alpha = 0.5
-[time]
-duration_s = 2.0
-record_hz = 10
-"#;
-
-fn pair() -> Source {
-    Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() }
 }
 
 fn options(key: &str, range: Range, question: Question, runs: u64, seed: u64) -> Options {

@@ -4,31 +4,11 @@ use super::{MOST_POINTS, Options, Sweep, SweptKey};
 use crate::Question;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _, StudyPage};
-use crate::tests::{InterruptAfter, base, batch};
-use tautline_sim::scenario::Source;
-
-/// Two vehicles that close up.
-const PAIR: &str = r#"name = "pair"
-[start]
-positions_m = [[0.0, 0.0], [4.0, 0.0]]
-[formation]
-shape = "line"
-spacing_m = 3.0
-[law]
-delta_m = 2.0
-alpha = 0.5
-[time]
-duration_s = 2.0
-record_hz = 10
-"#;
+use crate::tests::{InterruptAfter, base, batch, pair};
 
 fn options(keys: &[&str], runs: u64) -> Options {
     let keys = keys.iter().map(|key| SweptKey::parse(key).expect("a key")).collect();
     Options { keys, question: Question::Clear, runs, seed: 7 }
-}
-
-fn pair() -> Source {
-    Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() }
 }
 
 fn swept(options: &Options) -> Sweep {
