@@ -8,11 +8,10 @@ use crate::base::{BaseScenario, JITTER, check_runs, jitter_note};
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
-use crate::study::{Block, Experiment, SCHEMA_VERSION, Section, Study, identity, tool};
+use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{at_least, counted};
 use tautline_report::report::page::{self, Badge, Picture, Tone};
-use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::{Failure, PICTURES_BYTES, Pictures, ScenarioRequest};
 use tautline_sim::scenario::{Draw, NamedLaw, Scenario, Template};
 
@@ -49,14 +48,9 @@ impl Default for Options {
 /// Laws side by side. Units are in the names; what does not apply is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// [`SCHEMA_VERSION`].
-    pub schema_version: u32,
-    /// The scenario as its file has it.
-    pub scenario: ScenarioIdentity,
-    /// The program.
-    pub tool: Tool,
-    /// Safety distance delta \[m\] that every flight was judged by.
-    pub delta_m: f64,
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
     /// Starts that were flown under every law.
     pub runs: u64,
     /// Starts that were asked for.
@@ -186,10 +180,7 @@ impl Experiment for Options {
         let performance =
             Performance { wall_s: began.elapsed().as_secs_f64(), laws: laws.iter().zip(&flights).map(time).collect() };
         Ok(Some(Comparison {
-            schema_version: SCHEMA_VERSION,
-            scenario: identity(base.own()),
-            tool: tool(),
-            delta_m: base.own().delta_m,
+            about: About::new(base.own()),
             runs,
             runs_asked: self.runs,
             seed: self.seed,
@@ -357,7 +348,7 @@ impl Study for Comparison {
     }
 
     fn title(&self) -> String {
-        self.scenario.name.clone()
+        self.about.scenario.name.clone()
     }
 
     fn badge(&self) -> Badge {
@@ -370,7 +361,7 @@ impl Study for Comparison {
             1 => format!("the same start (start.seed {})", self.seed),
             runs => format!("the same {runs} starts (start.seed {} to {})", self.seed, self.seed + (runs - 1)),
         };
-        format!("{}: {laws} from {starts}, delta {} m", self.scenario.name, self.delta_m)
+        format!("{}: {laws} from {starts}, delta {} m", self.about.scenario.name, self.about.delta_m)
     }
 
     fn notes(&self) -> Vec<String> {

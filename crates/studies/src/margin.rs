@@ -8,12 +8,11 @@ use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_n
 use crate::batch::Batch;
 use crate::flight::FlightSummary;
 use crate::statistics::{CONFIDENCE, Proportion};
-use crate::study::{Block, Experiment, SCHEMA_VERSION, Section, Study, identity, tool};
+use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{as_toml, counted, significant};
 use tautline_report::figures::{Share, margin as figure};
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::preflight::{Bound, Near, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
@@ -88,14 +87,9 @@ pub struct Turn {
 /// How much of a key a verdict survives. What does not apply is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
-    /// [`SCHEMA_VERSION`].
-    pub schema_version: u32,
-    /// The scenario as its file has it.
-    pub scenario: ScenarioIdentity,
-    /// The program.
-    pub tool: Tool,
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
     /// The key that was changed.
     pub key: String,
     /// The first and the last value, as they were asked for.
@@ -224,10 +218,7 @@ impl Experiment for Options {
             }),
         };
         Ok(Some(Margin {
-            schema_version: SCHEMA_VERSION,
-            scenario: identity(own),
-            tool: tool(),
-            delta_m: own.delta_m,
+            about: About::new(own),
             key: self.key.clone(),
             range: [range.from, range.to],
             logarithmic: range.logarithmic,
@@ -300,7 +291,7 @@ impl Study for Margin {
     }
 
     fn title(&self) -> String {
-        format!("{}: {}", self.scenario.name, self.key)
+        format!("{}: {}", self.about.scenario.name, self.key)
     }
 
     fn badge(&self) -> Badge {
@@ -310,7 +301,7 @@ impl Study for Margin {
     }
 
     fn headline(&self) -> String {
-        let (key, name) = (&self.key, &self.scenario.name);
+        let (key, name) = (&self.key, &self.about.scenario.name);
         let [does, does_not] = self.question.words();
         let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
         match (self.turn, self.sides()) {

@@ -346,12 +346,26 @@ pub fn answer<E: Experiment>(
     Ok(Some(study))
 }
 
-/// Name and hash of a scenario, as answers have them.
-pub(crate) fn identity(scenario: &Scenario) -> ScenarioIdentity {
-    ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() }
+/// What every answer says of the flown scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct About {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// The scenario as its file has it.
+    pub scenario: ScenarioIdentity,
+    /// The program.
+    pub tool: Tool,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
 }
 
-/// The program that flew a study.
-pub(crate) fn tool() -> Tool {
-    Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() }
+impl About {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
+            delta_m: scenario.delta_m,
+        }
+    }
 }

@@ -7,12 +7,11 @@ use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_n
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
-use crate::study::{Block, Experiment, SCHEMA_VERSION, Section, Study, identity, tool};
+use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{as_toml, at_least, counted, metres_below};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::{Failure, ScenarioRequest};
 
 /// Most points of a grid.
@@ -74,14 +73,9 @@ pub struct Point {
 /// Flights over a grid of one key or two. What does not apply is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sweep {
-    /// [`SCHEMA_VERSION`].
-    pub schema_version: u32,
-    /// The scenario as its file has it.
-    pub scenario: ScenarioIdentity,
-    /// The program.
-    pub tool: Tool,
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
     /// The keys that were changed.
     #[serde(rename = "grid")]
     pub keys: Vec<SweptKey>,
@@ -261,10 +255,7 @@ impl Experiment for Options {
         let flown: Vec<_> = points.iter().cloned().filter_map(of_point).collect();
         let own = base.own();
         let sweep = Sweep {
-            schema_version: SCHEMA_VERSION,
-            scenario: identity(own),
-            tool: tool(),
-            delta_m: own.delta_m,
+            about: About::new(own),
             keys: self.keys.clone(),
             question: self.question,
             runs: self.runs,
@@ -332,7 +323,7 @@ impl Sweep {
                 let lengths: Vec<_> = points.iter().filter_map(|point| separation(point)).collect();
                 vec![
                     shares("share", &key.key, does, &series, false),
-                    separations("separation", &key.key, &lengths, self.delta_m),
+                    separations("separation", &key.key, &lengths, self.about.delta_m),
                 ]
             }
             [y, x] => {
@@ -359,7 +350,7 @@ impl Study for Sweep {
 
     fn title(&self) -> String {
         let keys: Vec<_> = self.keys.iter().map(|of| of.key.as_str()).collect();
-        format!("{}: {}", self.scenario.name, keys.join(" and "))
+        format!("{}: {}", self.about.scenario.name, keys.join(" and "))
     }
 
     fn badge(&self) -> Badge {
@@ -372,12 +363,13 @@ impl Study for Sweep {
         let holds = |point: &&Point| point.held.of == self.runs && point.held.count == self.runs;
         let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
-            let shown = if min_m < self.delta_m { metres_below(min_m, self.delta_m) } else { at_least(min_m, 3) };
+            let shown =
+                if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
             format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
         });
         format!(
             "{} {}{every} at {} of {}{}",
-            self.scenario.name,
+            self.about.scenario.name,
             self.question.words()[0],
             self.points.iter().filter(holds).count(),
             counted(self.points.len() as u64, "point", "points"),

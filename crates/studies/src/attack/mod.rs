@@ -18,13 +18,12 @@ pub use space::{Bound, SearchSpace, Variation};
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
-use crate::study::{Block, Experiment, SCHEMA_VERSION, Section, Study, identity, tool};
+use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use cma_es::{Optimiser, folded};
 use tautline_core::text::{at_least, counted, exact, metres_below, seconds};
 use tautline_report::figures::attack as figure;
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::{
     Failure, Monitor, OutFolder, Pictures, Quiet, RECORDING, RunRequest, ScenarioRequest, in_range, run_into,
 };
@@ -106,14 +105,9 @@ pub struct Candidate {
 /// The worst that a search found. What does not apply is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Attack {
-    /// [`SCHEMA_VERSION`].
-    pub schema_version: u32,
-    /// The scenario as its file has it.
-    pub scenario: ScenarioIdentity,
-    /// The program.
-    pub tool: Tool,
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
     /// Seed of the search.
     pub seed: u64,
     /// Flights of each candidate, of which the worst counts.
@@ -184,10 +178,7 @@ impl Experiment for Options {
             batch,
             optimiser: Optimiser::new(space.bounds().len(), delta_m, self.seed),
             found: Attack {
-                schema_version: SCHEMA_VERSION,
-                scenario: identity(base.own()),
-                tool: tool(),
-                delta_m,
+                about: About::new(base.own()),
                 seed: self.seed,
                 seeds: self.seeds,
                 flights_asked: self.flights,
@@ -371,7 +362,7 @@ impl Attack {
     /// What was found, in a sentence without its end.
     fn result(&self) -> String {
         let flights = counted(self.flights, "flight", "flights");
-        let delta = exact(self.delta_m);
+        let delta = exact(self.about.delta_m);
         let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
         let closest = self.closest(worst);
         if self.violated > 0 {
@@ -392,7 +383,8 @@ impl Attack {
     fn closest(&self, worst: &Candidate) -> String {
         let FlightSummary { min_m, min_at_s, min_pair, .. } = &worst.flown;
         let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
-        let shown = if min_m < self.delta_m { metres_below(min_m, self.delta_m) } else { at_least(min_m, 3) };
+        let shown =
+            if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
         let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
         let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a}-{b}"));
         format!("{shown} m{at}{pair}")
@@ -405,7 +397,7 @@ impl Study for Attack {
     }
 
     fn title(&self) -> String {
-        self.scenario.name.clone()
+        self.about.scenario.name.clone()
     }
 
     fn badge(&self) -> Badge {
@@ -481,7 +473,7 @@ impl Study for Attack {
 
     fn sections(&self) -> Vec<Section> {
         let found = self.progress.iter().filter_map(|worst| Some((worst.flight, worst.flown.min_m?)));
-        let chart = figure(&found.collect::<Vec<_>>(), self.flights, self.delta_m, self.own.min_m);
+        let chart = figure(&found.collect::<Vec<_>>(), self.flights, self.about.delta_m, self.own.min_m);
         let own = ("as the scenario is", &self.own);
         let worst = self.worst().map(|worst| ("the worst found", &worst.flown));
         let flights: Vec<_> = std::iter::once(own).chain(worst).collect();

@@ -15,27 +15,13 @@ use tautline_sim::sim::SimError;
 /// Why a campaign cannot be planned, flown or put together.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// A specification that is not TOML, or has keys that it should not have.
-    #[error("{name}: {why}")]
-    Spec {
-        /// What the text is called.
-        name: String,
-        /// What is wrong, with its place.
-        why: String,
-    },
-    /// A variation that draws nothing.
-    #[error("vary.\"{key}\": {why}")]
-    Vary {
-        /// The key of the scenario.
-        key: String,
+    /// A specification that cannot be read, or that makes no campaign.
+    #[error("{message}")]
+    Input {
+        /// The stable name of the problem.
+        code: &'static str,
         /// What is wrong.
-        why: String,
-    },
-    /// Numbers that make no campaign.
-    #[error("{why}")]
-    Plan {
-        /// What is wrong.
-        why: String,
+        message: String,
         /// What to do about it.
         help: String,
         /// The key of the specification, with its tables before it; empty where it is about none.
@@ -135,9 +121,7 @@ impl CampaignError {
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Spec { .. } => "campaign/specification",
-            Self::Vary { .. } => "campaign/variation",
-            Self::Plan { .. } => "campaign/plan",
+            Self::Input { code, .. } => code,
             Self::Scenario { error, .. } => error.code(),
             Self::Flight { .. } => "campaign/flight",
             Self::Splitting { .. } => "campaign/splitting",
@@ -148,17 +132,33 @@ impl CampaignError {
         }
     }
 
+    /// Numbers or keys that make no campaign.
     pub(super) fn plan(why: impl Into<String>, help: impl Into<String>) -> Self {
-        Self::Plan { why: why.into(), help: help.into(), key: String::new() }
+        Self::Input { code: "campaign/plan", message: why.into(), help: help.into(), key: String::new() }
+    }
+
+    /// A text that is no specification.
+    pub(super) fn specification(name: &str, why: &str) -> Self {
+        let (message, help) =
+            (format!("{name}: {why}"), "docs/campaigns.md shows every key of a specification".to_owned());
+        Self::Input { code: "campaign/specification", message, help, key: String::new() }
+    }
+
+    /// A variation that draws nothing.
+    pub(super) fn variation(key: &str, why: &str) -> Self {
+        let help = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, { normal = [mean, deviation] }, \
+                    { integer = [low, high] }, { list = [...] }, { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
+        let (message, key) = (format!("vary.\"{key}\": {why}"), format!("vary.{key}"));
+        Self::Input { code: "campaign/variation", message, help: help.to_owned(), key }
     }
 
     pub(super) fn scenario(under: &str, key: &str, error: ScenarioError) -> Self {
         Self::Scenario { under: under.to_owned(), key: key.to_owned(), error: Box::new(error) }
     }
 
-    /// Names the key of the specification that a [`CampaignError::Plan`] is about.
+    /// Names the key of the specification that a [`CampaignError::Input`] is about.
     pub(super) fn at(mut self, place: &str) -> Self {
-        if let Self::Plan { key, .. } = &mut self {
+        if let Self::Input { key, .. } = &mut self {
             place.clone_into(key);
         }
         self
@@ -182,25 +182,26 @@ impl CampaignError {
     #[must_use]
     pub fn help(&self) -> Option<String> {
         Some(match self {
-            Self::Spec { .. } => "docs/campaigns.md shows every key of a specification".to_owned(),
-            Self::Vary { .. } => "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, { normal = [mean, \
-                                  deviation] }, { integer = [low, high] }, { list = [...] }, { grid = [...] }, { grid = { from = \
-                                  0.0, to = 1.0, count = 11 } }"
-                .to_owned(),
-            Self::Plan { help, .. } | Self::Foreign { help, .. } => help.clone(),
+            Self::Input { help, .. } | Self::Foreign { help, .. } => help.clone(),
             Self::Scenario { error, .. } => return error.help().map(str::to_owned),
             Self::Flight { .. } => return None,
-            Self::Splitting { .. } => "let chance have a part in every step (wind, noise of sensing, loss on the network), and split \
+            Self::Splitting { .. } => {
+                "let chance have a part in every step (wind, noise of sensing, loss on the network), and split \
                                        into 2 flights at least, with fewer to end in a round"
-                .to_owned(),
+                    .to_owned()
+            }
             Self::MissingShards { list, damaged, .. } => {
                 let replaced = if damaged.is_empty() { "" } else { ", which replaces damaged parts" };
                 format!("fly them with: tautline campaign shard FOLDER --shard {list}{replaced}")
             }
-            Self::Nondeterministic { .. } => "the same flight has the same bits everywhere: look for a faulty machine, or one whose program \
+            Self::Nondeterministic { .. } => {
+                "the same flight has the same bits everywhere: look for a faulty machine, or one whose program \
                                    is another; remove the wrong part to go on"
-                .to_owned(),
-            Self::Machine { .. } => "what was flown before is kept; free some space or mend access, and start again".to_owned(),
+                    .to_owned()
+            }
+            Self::Machine { .. } => {
+                "what was flown before is kept; free some space or mend access, and start again".to_owned()
+            }
         })
     }
 }
@@ -238,8 +239,7 @@ impl CampaignError {
     #[must_use]
     pub fn place(&self, name: &str, text: &str) -> Option<Place> {
         let keys = match self {
-            Self::Vary { key, .. } => vec![format!("vary.{key}")],
-            Self::Plan { key, .. } => vec![key.clone()],
+            Self::Input { key, .. } => vec![key.clone()],
             Self::Scenario { key, error, .. } => match error.place() {
                 Some(place) if place.source == SET && !key.starts_with("vary.") => {
                     let set = place.text.split('=').next().unwrap_or_default().trim();

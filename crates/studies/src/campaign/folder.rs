@@ -307,7 +307,7 @@ pub fn listed(shards: &[u64]) -> String {
 /// The shards of a list such as `7`, `3-5`, `13,500-502`, or `env:NAME` with such a list in that variable.
 ///
 /// # Errors
-/// [`CampaignError::Plan`] for what is no list, and for a shard beyond the last one.
+/// [`CampaignError::Input`] for what is no list, and for a shard beyond the last one.
 pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, CampaignError> {
     let help = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
     let wrong = |why: String| CampaignError::plan(why, help);

@@ -104,16 +104,15 @@ impl Spec {
     /// Reads the TOML of a specification, which messages call `name`.
     ///
     /// # Errors
-    /// [`CampaignError::Spec`] for what is not TOML and for keys that there are not, with their place.
+    /// [`CampaignError::Input`] for what is not TOML and for keys that there are not, with their place.
     pub fn read(name: &str, text: &str) -> Result<Self, CampaignError> {
-        let wrong = |why: String| CampaignError::Spec { name: name.to_owned(), why };
-        toml::from_str(text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))
+        toml::from_str(text).map_err(|error| CampaignError::specification(name, error.to_string().trim_end()))
     }
 
     /// The specification as TOML that reads back as the same one.
     ///
     /// # Errors
-    /// [`CampaignError::Plan`] for numbers that TOML cannot hold, such as a seed of 64 bits.
+    /// [`CampaignError::Input`] for numbers that TOML cannot hold, such as a seed of 64 bits.
     pub fn to_toml(&self) -> Result<String, CampaignError> {
         let wrong = |error: toml::ser::Error| CampaignError::plan(error.to_string(), "choose a seed below 2^63");
         toml::to_string(self).map_err(wrong)
@@ -130,7 +129,7 @@ impl Spec {
     /// The keys of `[vary]`, with their tables' names before them, in the order of the alphabet.
     ///
     /// # Errors
-    /// [`CampaignError::Vary`] for what is no variation.
+    /// [`CampaignError::Input`] for what is no variation.
     pub fn variations(&self) -> Result<BTreeMap<String, Variation>, CampaignError> {
         let mut keys = BTreeMap::new();
         flatten("", &self.vary, &draws, &mut keys);
@@ -159,7 +158,7 @@ impl Stop {
     /// Refuses numbers that no share can reach.
     ///
     /// # Errors
-    /// [`CampaignError::Plan`].
+    /// [`CampaignError::Input`].
     pub fn check(&self) -> Result<(), CampaignError> {
         let inside = |number: f64| number > 0.0 && number < 1.0;
         for (key, number) in [("stop.width", self.width), ("stop.decided", self.decided)] {

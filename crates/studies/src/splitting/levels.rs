@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-use super::lineage::{Crossing, Lineage, Watch};
+use super::lineage::{Crossing, Lineage, StepCounter};
 
 /// A random path that is made step by step, one at a time in the same place.
 pub trait Path {
@@ -91,7 +91,7 @@ pub fn split<P: Path>(
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Split<P::Saved>>, P::Error> {
     let Rule { flights, kill, target, is_past } = rule;
-    let (mut draws, mut watch) = (Draws::new(seed, repetition), Watch { steps: 0, carry_on });
+    let (mut draws, mut watch) = (Draws::new(seed, repetition), StepCounter { steps: 0, carry_on });
     let mut lineages = Vec::with_capacity(flights);
     for _ in 0..flights {
         match Lineage::begin(path, draws.noise_seed(), target, &mut watch)? {

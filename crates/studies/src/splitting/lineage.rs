@@ -44,13 +44,13 @@ impl Genealogy {
     }
 }
 
-/// Steps that were flown, and who is asked after each whether to go on.
-pub(super) struct Watch<'a> {
+/// Counts steps, and calls `carry_on` after each.
+pub(super) struct StepCounter<'a> {
     pub(super) steps: u64,
     pub(super) carry_on: &'a mut dyn FnMut(u64) -> ControlFlow<()>,
 }
 
-impl Watch<'_> {
+impl StepCounter<'_> {
     fn flown(&mut self) -> ControlFlow<()> {
         self.steps += 1;
         (self.carry_on)(self.steps)
@@ -110,7 +110,7 @@ impl<S> Lineage<S> {
         path: &mut P,
         noise_seed: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> Result<ControlFlow<(), Self>, P::Error> {
         path.begin(noise_seed)?;
         let mut lineage = Self {
@@ -131,7 +131,7 @@ impl<S> Lineage<S> {
         at: &Crossing<S>,
         noise_seed: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> ControlFlow<(), Self> {
         let &Crossing { step, score, ref saved } = at;
         path.restore(saved, Some(noise_seed));
@@ -151,7 +151,7 @@ impl<S> Lineage<S> {
         path: &mut P,
         mut step: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> ControlFlow<(), Self> {
         while self.score <= target && path.step() {
             step += 1;
@@ -194,7 +194,7 @@ impl<S> Lineage<S> {
         &self,
         path: &mut P,
         is_past: impl Fn(f64) -> bool,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> Option<ControlFlow<(), Crossing<S>>> {
         let &Record { step, score } = self.records.iter().find(|record| is_past(record.score))?;
         Some(match self.reach(path, step, watch) {
@@ -206,12 +206,13 @@ impl<S> Lineage<S> {
     /// Takes the path to its last record, and says which step that is.
     pub(super) fn last<P: Path<Saved = S>>(&self, path: &mut P) -> Option<u64> {
         let step = self.records.last()?.step;
-        let reached = self.reach(path, step, &mut Watch { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
+        let reached =
+            self.reach(path, step, &mut StepCounter { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
         reached.is_continue().then_some(step)
     }
 
     /// Makes the path again up to a step, from the last state that is kept before it.
-    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut Watch<'_>) -> ControlFlow<()> {
+    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut StepCounter<'_>) -> ControlFlow<()> {
         if let Some(state) = self.states.iter().rev().find(|state| state.step <= step) {
             path.restore(&state.saved, state.noise_seed);
             for _ in state.step..step {
@@ -260,7 +261,7 @@ mod tests {
     #[test]
     fn few_states_are_kept_and_every_record_is_found_again() {
         let mut carry_on = |_| ControlFlow::Continue(());
-        let mut watch = Watch { steps: 0, carry_on: &mut carry_on };
+        let mut watch = StepCounter { steps: 0, carry_on: &mut carry_on };
         let mut path = Climb(0);
         let ControlFlow::Continue(mut climb) = Lineage::begin(&mut path, 1, f64::INFINITY, &mut watch).expect("a path")
         else {
