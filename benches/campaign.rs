@@ -2,12 +2,12 @@
 
 use std::hint::black_box;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use tautline::campaign::{Campaign, Program, Spec};
-use tautline::compare::Watch;
+use tautline::request::Silent;
 use tautline::run::run;
+use tautline::studies::Batch;
 
 const SPEC: &str = "scenario = \"pentagon\"\nruns = 16\n[vary]\n\"start.jitter_m\" = { uniform = [0.0, 0.3] }\n";
 
@@ -25,8 +25,9 @@ fn campaigns(criterion: &mut Criterion) {
     });
     for threads in [1, 2] {
         group.bench_function(format!("a campaign on {threads} threads"), |bencher| {
-            let watch = Watch { flown: &|_| (), interrupted: &AtomicBool::new(false) };
-            bencher.iter(|| black_box(campaign.fly(threads, watch).expect("it flies")));
+            let monitor = Silent::default();
+            let batch = Batch::new(Some(threads), &monitor).expect("threads");
+            bencher.iter(|| black_box(campaign.fly(&batch).expect("it flies")));
         });
     }
     group.finish();

@@ -46,5 +46,6 @@ pub use tautline_recordings::{export, mcap, read};
 pub use tautline_render as render;
 pub use tautline_report::{figures, flight_log, replay, report, request, run};
 pub use tautline_sim::{continuous, feedback, link, metrics, plan, plant, preflight, scenario, sim, vehicle};
-pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics};
+pub use tautline_studies as studies;
+pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics, sweep};
 pub use tautline_validate as validate;

@@ -45,7 +45,7 @@ mod _native {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
-    use super::studies::{attack, campaign, compare, export, margin, scenarios, validate};
+    use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
 
     /// A campaign knows by this file what flew it, and not by the interpreter's.
     #[pymodule_init]

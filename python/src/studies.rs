@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use tautline::attack::{AttackRequest, Method, Variation};
+use tautline::attack::Variation;
 use tautline::campaign::CampaignRequest;
-use tautline::compare::CompareRequest;
 use tautline::export::WRITTEN;
-use tautline::margin::{MarginRequest, Question, Range};
+use tautline::margin::Range;
 use tautline::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
 use tautline::scenario::builtin;
+use tautline::studies::{Experiment, Question, Study as _, StudyFiles, StudyRequest};
+use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
-use crate::errors::{Raised as _, broken, wrong_by};
+use crate::errors::{Raised as _, broken};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
 use crate::work::away_with_threads;
@@ -58,34 +59,49 @@ pub(crate) fn export(
     answered(py, |monitor| export_file(&request, monitor))
 }
 
+/// Files and threads of a study, as keyword arguments give them.
+#[derive(FromPyObject)]
+pub(crate) struct Outputs {
+    #[pyo3(item)]
+    csv: Option<PathBuf>,
+    #[pyo3(item)]
+    latex: Option<PathBuf>,
+    #[pyo3(item)]
+    html: Option<PathBuf>,
+    #[pyo3(item)]
+    force: bool,
+    #[pyo3(item)]
+    threads: Option<usize>,
+}
+
+/// Flies a study and writes its files.
+fn study<E>(py: Python<'_>, scenario: &Scenario, options: E, outputs: Outputs) -> PyResult<Answer>
+where
+    E: Experiment<Study: Send> + Sync,
+{
+    let Outputs { csv, latex, html, force, threads } = outputs;
+    let files = StudyFiles { json: None, csv, latex, html, force };
+    let request = StudyRequest { scenario: scenario.request.clone(), options, files, threads };
+    let study = whole(answered(py, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
+    Ok((study.is_good(), json(study.to_json())?))
+}
+
+fn question(verdict: String) -> PyResult<Question> {
+    let questions = Question::ALL.map(|question| (question.name(), question));
+    Ok(choice("verdict", Some(verdict), &questions)?.unwrap_or_default())
+}
+
 /// Flies laws from the same starts.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
 pub(crate) fn compare(
     py: Python<'_>,
     scenario: &Scenario,
     laws: Option<Vec<String>>,
     runs: u64,
     seed: u64,
-    csv: Option<PathBuf>,
-    latex: Option<PathBuf>,
-    html: Option<PathBuf>,
-    force: bool,
-    threads: Option<usize>,
+    outputs: Outputs,
 ) -> PyResult<Answer> {
-    let request = CompareRequest {
-        laws,
-        runs,
-        seed,
-        csv,
-        latex,
-        html,
-        force,
-        threads,
-        ..CompareRequest::new(scenario.request.clone())
-    };
-    let comparison = whole(answered(py, |monitor| tautline::compare::compare(&request, &(), monitor))?)?;
-    Ok((comparison.runs == comparison.runs_asked, json(comparison.to_json())?))
+    study(py, scenario, tautline::compare::Options { laws, runs, seed }, outputs)
 }
 
 /// Searches for the values of a key between which a verdict turns.
@@ -94,7 +110,7 @@ pub(crate) fn compare(
 pub(crate) fn margin(
     py: Python<'_>,
     scenario: &Scenario,
-    key: &str,
+    key: String,
     start: f64,
     stop: f64,
     runs: u64,
@@ -103,30 +119,28 @@ pub(crate) fn margin(
     scan: usize,
     halvings: u64,
     logarithmic: bool,
-    csv: Option<PathBuf>,
-    html: Option<PathBuf>,
-    force: bool,
-    threads: Option<usize>,
+    outputs: Outputs,
 ) -> PyResult<Answer> {
-    let questions = Question::ALL.map(|question| (question.name(), question));
-    let question = choice("verdict", Some(verdict), &questions)?.unwrap_or(Question::Pass);
-    let request = MarginRequest {
-        range: Range {
-            from: start,
-            to: stop,
-            scan,
-            halvings: u32::try_from(halvings).unwrap_or(u32::MAX),
-            logarithmic,
-        },
-        asked: tautline::margin::Asked { question, runs, seed },
-        csv,
-        html,
-        force,
-        threads,
-        ..MarginRequest::new(scenario.request.clone(), key, start, stop)
-    };
-    let margin = whole(answered(py, |monitor| tautline::margin::margin(&request, monitor))?)?;
-    Ok((margin.is_known(), json(margin.to_json())?))
+    let halvings = u32::try_from(halvings).unwrap_or(u32::MAX);
+    let range = Range { from: start, to: stop, scan, halvings, logarithmic };
+    let options = tautline::margin::Options { key, range, question: question(verdict)?, runs, seed };
+    study(py, scenario, options, outputs)
+}
+
+/// Flies a grid over one key or two.
+#[pyfunction]
+pub(crate) fn sweep(
+    py: Python<'_>,
+    scenario: &Scenario,
+    keys: Vec<(String, Vec<f64>)>,
+    runs: u64,
+    seed: u64,
+    verdict: String,
+    outputs: Outputs,
+) -> PyResult<Answer> {
+    let keys = keys.into_iter().map(|(key, values)| SweptKey::new(&key, values)).collect::<Result<_, _>>();
+    let (keys, question) = (keys.map_err(Failure::raised)?, question(verdict)?);
+    study(py, scenario, tautline::sweep::Options { keys, question, runs, seed }, outputs)
 }
 
 /// Searches for the worst flight within bounds.
@@ -141,30 +155,15 @@ pub(crate) fn attack(
     vary: Vec<(String, f64, f64)>,
     flights: u64,
     seeds: u64,
-    method: String,
     seed: u64,
     out: Option<PathBuf>,
-    csv: Option<PathBuf>,
-    html: Option<PathBuf>,
-    force: bool,
-    threads: Option<usize>,
+    outputs: Outputs,
 ) -> PyResult<Answer> {
-    let methods = Method::ALL.map(|method| (method.name(), method));
-    let vary = vary.iter().map(|(key, low, high)| Variation::new(key, *low, *high)).collect::<Result<Vec<_>, _>>();
-    let asked = tautline::attack::Asked {
-        vary: vary.map_err(|error| wrong_by("attack/variation", format!("vary: {error}")))?,
-        start_m: start,
-        velocity_m_s: velocity,
-        apart_m: apart,
-        method: choice("method", Some(method), &methods)?.unwrap_or(Method::CmaEs),
-        flights,
-        seeds,
-        seed,
-    };
-    let request =
-        AttackRequest { out, csv, html, force, threads, ..AttackRequest::new(scenario.request.clone(), asked) };
-    let attack = whole(answered(py, |monitor| tautline::attack::attack(&request, &(), monitor))?)?;
-    Ok((!attack.is_bad() && !attack.interrupted, json(attack.to_json())?))
+    let vary = vary.iter().map(|(key, low, high)| Variation::new(key, *low, *high)).collect::<Result<_, _>>();
+    let vary = vary.map_err(Failure::raised)?;
+    let (start_m, velocity_m_s, apart_m) = (start, velocity, apart);
+    let options = tautline::attack::Options { vary, start_m, velocity_m_s, apart_m, flights, seeds, seed, out };
+    study(py, scenario, options, outputs)
 }
 
 /// Judges the claims of the paper and ours.
@@ -191,5 +190,5 @@ pub(crate) fn campaign(
     let request =
         CampaignRequest { out, shards, threads, until_width, until_decided, worst, ..CampaignRequest::new(spec) };
     let answer = whole(answered(py, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
-    Ok((answer.summary.is_clear(), json(serde_json::to_string(&answer.summary))?, answer.folder))
+    Ok((answer.summary.is_good(), json(serde_json::to_string(&answer.summary))?, answer.folder))
 }

@@ -15,7 +15,7 @@ from ._campaign import Campaign, campaign
 from ._flight import Flight, fly
 from ._law import Law
 from ._native import Error, Observation
-from ._program import Answer, attack, compare, export, margin, validate
+from ._program import Answer, attack, compare, export, margin, sweep, validate
 from ._recording import Recording, read
 from ._scenario import Check, Scenario, check, scenarios
 from ._simulation import Simulation
@@ -46,6 +46,7 @@ __all__ = [
     "margin",
     "read",
     "scenarios",
+    "sweep",
     "validate",
 ]
 

@@ -1,5 +1,5 @@
 from collections.abc import Sequence
-from typing import Any, final
+from typing import Any, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ __all__ = [
     "margin",
     "read",
     "scenarios",
+    "sweep",
     "validate",
 ]
 
@@ -249,6 +250,13 @@ class Question:
         independent: bool,
     ) -> Question: ...
 
+class Outputs(TypedDict):
+    csv: str | None
+    latex: str | None
+    html: str | None
+    force: bool
+    threads: int | None
+
 def attack(
     scenario: Scenario,
     start: float | None,
@@ -257,13 +265,9 @@ def attack(
     vary: Sequence[tuple[str, float, float]],
     flights: int,
     seeds: int,
-    method: str,
     seed: int,
     out: str | None,
-    csv: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def audit_arrays(
     question: Question,
@@ -293,11 +297,7 @@ def compare(
     laws: Sequence[str] | None,
     runs: int,
     seed: int,
-    csv: str | None,
-    latex: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def export(
     paths: Sequence[str],
@@ -322,11 +322,16 @@ def margin(
     scan: int,
     halvings: int,
     logarithmic: bool,
-    csv: str | None,
-    html: str | None,
-    force: bool,
-    threads: int | None,
+    outputs: Outputs,
 ) -> _Answered: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
+def sweep(
+    scenario: Scenario,
+    keys: Sequence[tuple[str, Sequence[float]]],
+    runs: int,
+    seed: int,
+    verdict: str,
+    outputs: Outputs,
+) -> _Answered: ...
 def validate(out: str, force: bool, threads: int | None) -> _Answered: ...

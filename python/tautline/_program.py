@@ -1,4 +1,4 @@
-"""Commands of the command line as functions: exports, laws side by side, margins, attacks, the claims of the paper."""
+"""Commands of the command line as functions: exports, laws side by side, margins, sweeps, attacks, the claims of the paper."""
 
 from __future__ import annotations
 
@@ -94,6 +94,17 @@ def asked(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _nati
     return found._native
 
 
+def outputs(csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None) -> _native.Outputs:
+    """Files and threads of a study."""
+    return {
+        "csv": maybe_path(csv, "csv"),
+        "latex": maybe_path(latex, "latex"),
+        "html": maybe_path(html, "html"),
+        "force": flag(force, "force"),
+        "threads": maybe_count(threads, "threads"),
+    }
+
+
 def compare(
     scenario: Scenario | PathLike,
     laws: Sequence[str] | None = None,
@@ -118,11 +129,7 @@ def compare(
             laws=None if laws is None else listed(laws, "laws"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
-            csv=maybe_path(csv, "csv"),
-            latex=maybe_path(latex, "latex"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 
@@ -141,6 +148,7 @@ def margin(
     log: bool = False,
     set: Mapping[str, Any] | None = None,
     csv: PathLike | None = None,
+    latex: PathLike | None = None,
     html: PathLike | None = None,
     force: bool = False,
     threads: int | None = None,
@@ -159,10 +167,40 @@ def margin(
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
             logarithmic=flag(log, "log"),
-            csv=maybe_path(csv, "csv"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
+        )
+    )
+
+
+def sweep(
+    scenario: Scenario | PathLike,
+    keys: Mapping[str, Sequence[float]],
+    *,
+    runs: int = 1,
+    seed: int = 0,
+    verdict: str = "pass",
+    set: Mapping[str, Any] | None = None,
+    csv: PathLike | None = None,
+    latex: PathLike | None = None,
+    html: PathLike | None = None,
+    force: bool = False,
+    threads: int | None = None,
+) -> Answer:
+    """Flies the grid of one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``: ``answer.points.to_pandas()`` is a row a
+    point, with the share of runs that show a verdict (``pass``, ``clear``, ``reached``). docs/sweeps.md says more."""
+    swept = []
+    for key, values in by_name(keys, "keys").items():
+        if isinstance(values, (str, bytes)) or not hasattr(values, "__iter__"):
+            raise TypeError(f"keys: {key} needs a list of numbers, not {values!r}")
+        swept.append((str(key), [number(value, key) for value in values]))
+    return Answer(
+        *_native.sweep(
+            asked(scenario, set),
+            keys=swept,
+            runs=count(runs, "runs"),
+            seed=count(seed, "seed"),
+            verdict=str(verdict),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 
@@ -176,11 +214,11 @@ def attack(
     apart: float | None = None,
     flights: int = 1000,
     seeds: int = 1,
-    method: str = "cma-es",
     seed: int = 0,
     set: Mapping[str, Any] | None = None,
     out: PathLike | None = None,
     csv: PathLike | None = None,
+    latex: PathLike | None = None,
     html: PathLike | None = None,
     force: bool = False,
     threads: int | None = None,
@@ -201,13 +239,9 @@ def attack(
             vary=varied,
             flights=count(flights, "flights"),
             seeds=count(seeds, "seeds"),
-            method=str(method),
             seed=count(seed, "seed"),
             out=maybe_path(out, "out"),
-            csv=maybe_path(csv, "csv"),
-            html=maybe_path(html, "html"),
-            force=flag(force, "force"),
-            threads=maybe_count(threads, "threads"),
+            outputs=outputs(csv, latex, html, force, threads),
         )
     )
 

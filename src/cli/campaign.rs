@@ -8,6 +8,7 @@ use super::Exit;
 use super::console::{self, Console, Terminal};
 use super::pictures::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
+use tautline_studies::Study as _;
 use tautline_studies::campaign::{
     self as study, CampaignAnswer, CampaignRequest, Folder, Program, ReplayRequest, listed, parse,
 };
@@ -41,9 +42,9 @@ enum What {
     Replay(Replay),
 }
 
-/// A specification, and what is asked beyond it.
+/// A specification, and when to stop.
 #[derive(Debug, Args)]
-struct Asked {
+struct SpecArguments {
     /// The specification.
     #[arg(value_name = "SPEC.toml")]
     spec: PathBuf,
@@ -58,7 +59,7 @@ struct Asked {
 #[derive(Debug, Args)]
 struct RunCampaign {
     #[command(flatten)]
-    asked: Asked,
+    spec: SpecArguments,
     /// Folder for everything; by default out/NAME, where NAME is the specification's.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -75,7 +76,7 @@ struct RunCampaign {
 #[derive(Debug, Args)]
 struct PlanCampaign {
     #[command(flatten)]
-    asked: Asked,
+    spec: SpecArguments,
     /// Folder for everything.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -114,22 +115,15 @@ struct Answered {
     says: Says,
 }
 
-/// Which flights are flown again for the page.
+/// How an answer is said.
 #[derive(Debug, Args)]
-struct Looks {
+struct Says {
     /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
     /// Take no pictures of them.
     #[arg(long)]
     no_snapshots: bool,
-}
-
-/// How an answer is said.
-#[derive(Debug, Args)]
-struct Says {
-    #[command(flatten)]
-    looks: Looks,
     /// Print the answer as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -166,13 +160,13 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
                 out: run.out.clone(),
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
-                worst: run.says.looks.worst.into(),
-                ..run.asked.request()
+                worst: run.says.worst.into(),
+                ..run.spec.request()
             };
-            run.says.answer(|monitor| study::campaign(&request, &*run.says.looks.pictures(), monitor))
+            run.says.answer(|monitor| study::campaign(&request, &*run.says.pictures(), monitor))
         }
         What::Plan(plan) => {
-            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.asked.request() };
+            let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
             let console = Console { data_on_stdout: false, quiet: false };
@@ -201,11 +195,11 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
         }
         What::Merge(Answered { folder, says }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::merge(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
+            says.answer(|monitor| study::merge(&folder, says.worst.into(), &*says.pictures(), monitor))
         }
         What::Report(Answered { folder, says }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::report(&folder, says.looks.worst.into(), &*says.looks.pictures(), monitor))
+            says.answer(|monitor| study::report(&folder, says.worst.into(), &*says.pictures(), monitor))
         }
         What::Replay(replay) => {
             let request =
@@ -217,7 +211,7 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
     }
 }
 
-impl Asked {
+impl SpecArguments {
     fn request(&self) -> CampaignRequest {
         CampaignRequest {
             until_width: self.until_width,
@@ -234,6 +228,10 @@ impl InFolder {
 }
 
 impl Says {
+    fn pictures(&self) -> Box<dyn Pictures> {
+        pictures("best", !self.no_snapshots)
+    }
+
     /// Answers a request, and prints the answer as JSON where that is asked for.
     fn answer(
         &self,
@@ -244,12 +242,6 @@ impl Says {
         if self.json {
             console::json(&summary)?;
         }
-        Ok(Exit::good_if(summary.is_clear()))
-    }
-}
-
-impl Looks {
-    fn pictures(&self) -> Box<dyn Pictures> {
-        pictures("best", !self.no_snapshots)
+        Ok(Exit::good_if(summary.is_good()))
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Once;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use super::Exit;
-use super::{attack, audit, campaign, check, compare, export, list, margin, run, validate};
+use super::{audit, campaign, check, export, list, run, studies, validate};
 #[cfg(feature = "viewer")]
 use super::{render, view};
 use tautline_recordings::read;
@@ -36,13 +36,15 @@ pub(super) enum Command {
     /// Reproduce the paper and judge every claim, ours and the paper's.
     Validate(validate::ValidateArguments),
     /// Fly the same starts under several laws and set them side by side.
-    Compare(compare::CompareArguments),
+    Compare(studies::CompareArguments),
     /// Find how much of one key a scenario survives: where between two values its verdict turns.
-    Margin(margin::MarginArguments),
+    Margin(studies::MarginArguments),
+    /// Fly a grid over one key or two: how shares and separations depend on them.
+    Sweep(studies::SweepArguments),
     /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
     Campaign(campaign::CampaignArguments),
     /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
-    Attack(attack::AttackArguments),
+    Attack(studies::AttackArguments),
     /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
     Export(export::ExportArguments),
     /// Draw a recording: pictures, films and contact sheets, without a screen.
@@ -83,10 +85,11 @@ pub(super) fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
         Command::Audit(arguments) => audit::audits(&arguments, line),
         Command::Check(arguments) => check::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
-        Command::Compare(arguments) => compare::compare(&arguments),
-        Command::Margin(arguments) => margin::margin(&arguments),
+        Command::Compare(arguments) => arguments.run(),
+        Command::Margin(arguments) => arguments.run(),
+        Command::Sweep(arguments) => arguments.run(),
         Command::Campaign(arguments) => campaign::campaign(&arguments),
-        Command::Attack(arguments) => attack::attack(&arguments),
+        Command::Attack(arguments) => arguments.run(),
         Command::Export(arguments) => export::export(&arguments),
         #[cfg(feature = "viewer")]
         Command::Render(arguments) => render::render(&arguments),

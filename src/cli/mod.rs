@@ -3,13 +3,11 @@
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
 
-mod attack;
 mod audit;
 mod audit_formats;
 mod campaign;
 mod check;
 mod command;
-mod compare;
 mod console;
 mod diagnostic;
 #[cfg(feature = "viewer")]
@@ -18,13 +16,13 @@ mod drawing;
 mod driver;
 mod export;
 mod list;
-mod margin;
 mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
 mod run;
 mod scenario;
+mod studies;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;

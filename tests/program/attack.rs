@@ -90,10 +90,8 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
         assert!(ran.err.contains("help:"), "{arguments:?}: {}", ran.err);
     }
     // Values that the command line itself refuses have no code.
-    for option in [["--flights", "0"], ["--method", "luck"]] {
-        let ran = ran(folder.path(), &[&["attack", "pentagon", "--start", "1"][..], &option].concat());
-        assert_eq!((ran.exit, ran.code()), (Some(2), ""), "{option:?}: {}", ran.err);
-    }
+    let none = ran(folder.path(), &["attack", "pentagon", "--start", "1", "--flights", "0"]);
+    assert_eq!((none.exit, none.code()), (Some(2), ""), "{}", none.err);
 }
 
 #[test]

@@ -33,6 +33,7 @@ mod refuses;
 mod runs;
 mod scenarios;
 mod shapes;
+mod sweep;
 
 impl program::Ran {
     /// Returns the stable code of the error: the first line on standard error that is `area/problem`, or nothing.

@@ -109,6 +109,12 @@ class Functions(Case):
         self.assertEqual(found.key, "time.duration_s")
         self.assertFalse(found.probes[0].get("holds", False))
 
+    def test_a_grid_is_swept(self) -> None:
+        found = tl.sweep(short(), {"law.alpha": np.array([0.5, 1.0]), "law.delta_m": [1, 9]}, verdict="clear")
+        self.assertEqual(found["grid"][1], {"key": "law.delta_m", "values": [1.0, 9.0]})
+        self.assertEqual([point.refused for point in found.points], [0, 1, 0, 1])
+        self.assertTrue(found.is_good)
+
     def test_an_attack_is_searched(self) -> None:
         found = tl.attack(short(), start=0.1, flights=6, vary={"sensing.latency_s": (0.0, 0.1)})
         self.assertEqual(found["scenario"], json.loads(json.dumps(found.to_dict()))["scenario"])

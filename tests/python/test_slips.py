@@ -87,6 +87,9 @@ class Words(Case):
         self.refuses(TypeError, "csv: a path is needed", lambda: tl.compare("pentagon", csv=3))
         self.refuses(TypeError, "force: True or False is needed", lambda: tl.compare("pentagon", force="yes"))
         self.refuses(TypeError, "a lower and an upper bound", lambda: tl.attack("pentagon", vary={"law.alpha": (0,)}))
+        self.refuses(TypeError, "needs a list of numbers", lambda: tl.sweep("pentagon", {"law.alpha": 1.0}))
+        self.refuses(tl.Error, "a sweep has one key or two", lambda: tl.sweep("pentagon", {}))
+        self.refuses(tl.Error, "is not finite", lambda: tl.sweep("pentagon", {"law.alpha": [1.0, float("nan")]}))
         self.refuses(TypeError, "not the class Springs", lambda: tl.fly("pentagon", law=Springs))
 
     def test_tables_of_pandas_are_named_for_what_they_are(self) -> None:

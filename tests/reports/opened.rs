@@ -46,6 +46,24 @@ fn a_report_of_a_violation_fits_too() {
 }
 
 #[test]
+fn pages_of_studies_fit_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let short = ["pentagon", "--set", "time.duration_s=2", "--quiet", "--html"];
+    let page = |name: &str, study: &[&str]| {
+        let page = folder.path().join(format!("{name}.html"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tautline"));
+        let program = command.arg(name).args(short).arg(&page).args(study).output().expect("the program runs");
+        assert!(program.status.code() <= Some(1), "{}", String::from_utf8_lossy(&program.stderr));
+        page
+    };
+    let grid = ["--key", "start.jitter_m=0:0.4:3", "--key", "law.delta_m=1,2,9", "--runs", "2", "--verdict", "clear"];
+    check(folder.path(), &page("sweep", &grid), "pentagon: start.jitter_m and law.delta_m", "6 of 9 points", 2);
+    let margin = ["--key", "law.alpha", "--from", "0.5", "--to", "2", "--scan", "2", "--runs", "2"];
+    check(folder.path(), &page("margin", &margin), "pentagon: law.alpha", "fails", 1);
+    check(folder.path(), &page("attack", &["--start", "0.4", "--flights", "6"]), "pentagon", "a search", 1);
+}
+
+#[test]
 fn a_page_that_is_too_wide_and_one_that_complains_are_seen() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);

@@ -1,10 +1,10 @@
 //! CMA-ES beside uniform random search, and the worst start found for each law, as the tables of docs/attack.md.
 
-use std::sync::atomic::AtomicBool;
-
-use tautline::attack::{Asked, Attack, Method, Plan, Variation};
-use tautline::compare::Watch;
-use tautline::scenario::{Override, Source};
+use tautline::attack::{Attack, Options, SearchSpace, Variation};
+use tautline::request::{ScenarioRequest, Silent};
+use tautline::studies::base::BaseScenario;
+use tautline::studies::{Batch, StudyRequest, answer};
+use tautline::wind::Normals;
 
 /// A search: the scenario, what is set, what is varied, and for how many flights.
 pub(crate) struct Case {
@@ -47,25 +47,38 @@ const LAWS: [&str; 7] = ["edge-tension", "displacement", "laplacian", "potential
 const LAW_FLIGHTS: u64 = 300;
 
 impl Case {
-    fn search(&self, law: Option<&str>, method: Method, seed: u64) -> Attack {
+    fn request(&self, law: Option<&str>, seed: u64) -> StudyRequest<Options> {
         let law = law.map(|law| format!("law.kind={law}"));
-        let sets = law.as_deref().into_iter().chain(self.sets.iter().copied());
-        let overrides: Vec<_> = sets.map(|set| Override::parse(set).expect("a set")).collect();
+        let sets: Vec<_> = law.into_iter().chain(self.sets.iter().map(|&set| set.to_owned())).collect();
         let vary = self.vary.iter().map(|text| Variation::parse(text).expect("a variation")).collect();
         let (start_m, apart_m, flights) = (Some(self.start_m), Some(self.apart_m), self.flights);
-        let asked = Asked { vary, start_m, velocity_m_s: None, apart_m, method, flights, seeds: 1, seed };
-        let plan = Plan::new(Source::Builtin(self.scenario.to_owned()), &overrides, asked);
-        let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", self.name));
-        let watch = Watch { flown: &|_| {}, interrupted: &AtomicBool::new(false) };
-        plan.search(2, watch).unwrap_or_else(|error| panic!("{}: {error}", self.name)).expect("not interrupted")
+        let options = Options { vary, start_m, apart_m, flights, seed, ..Options::default() };
+        StudyRequest::new(ScenarioRequest::named(self.scenario, &sets).expect("a scenario"), options)
+    }
+
+    fn search(&self, law: Option<&str>, seed: u64) -> Attack {
+        let attack = answer(&self.request(law, seed), &(), &Silent::default());
+        attack.unwrap_or_else(|error| panic!("{}: {error}", self.name)).expect("not interrupted")
+    }
+
+    /// The smallest separation of as many flights that are uniform within the bounds, each drawn by itself \[m\].
+    fn random_m(&self, seed: u64) -> f64 {
+        let StudyRequest { scenario, options, .. } = self.request(None, seed);
+        let space = SearchSpace::new(&BaseScenario::of(&scenario).expect("a scenario"), &options).expect("a space");
+        let mut normals = Normals::new(seed, 0);
+        let draw = || space.values(&space.bounds().iter().map(|_| normals.unit()).collect::<Vec<_>>());
+        let flyable = std::iter::repeat_with(draw).filter_map(|values| space.candidate(&values).ok());
+        let flights: Vec<_> = flyable.take(usize::try_from(self.flights).expect("few")).flatten().collect();
+        let monitor = Silent::default();
+        let batch = Batch::new(None, &monitor).expect("threads");
+        let flown = batch.run(flights.len(), |number| batch.fly(&flights[number], 0)).expect("flown");
+        flown.into_iter().flatten().filter_map(|flight| flight.min_m).fold(f64::INFINITY, f64::min)
     }
 
     /// The smallest separation that CMA-ES finds, and random search \[m\].
     pub(crate) fn found_m(&self, seed: u64) -> [f64; 2] {
-        [Method::CmaEs, Method::Random].map(|method| {
-            let worst = self.search(None, method, seed);
-            worst.worst().and_then(|worst| worst.flown.min_m).expect("a separation")
-        })
+        let attack = self.search(None, seed);
+        [attack.worst().and_then(|worst| worst.flown.min_m).expect("a separation"), self.random_m(seed)]
     }
 
     /// A seed's cells in the table.
@@ -118,7 +131,7 @@ pub(crate) fn worst_start(law: &str) -> String {
         vary: &[],
         flights: LAW_FLIGHTS,
     };
-    let attack = case.search(Some(law), Method::CmaEs, 0);
+    let attack = case.search(Some(law), 0);
     let worst = attack.worst().expect("a flight");
     let length = |length: Option<f64>| length.map_or_else(|| "-".to_owned(), shown);
     let [own, found, certified] = [attack.own.min_m, worst.flown.min_m, worst.flown.certified_m].map(length);

@@ -1,11 +1,11 @@
 //! How each law fares from random starts, as the tables of docs/campaigns.md.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use tautline::campaign::{Campaign, LawSummary, Program, Spec, Summary};
-use tautline::compare::Watch;
+use tautline::request::Silent;
 use tautline::statistics::Proportion;
+use tautline::studies::Batch;
 
 /// Random starts of so many vehicles.
 struct Starts {
@@ -84,9 +84,8 @@ impl Starts {
 fn answer(spec: &str, folder: &Path) -> Summary {
     let spec = Spec::read("spec", spec).expect("a specification");
     let campaign = Campaign::plan(&spec, "docs", folder, None, Program::running().expect("a program")).expect("a plan");
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let watch = Watch { flown: &|_| (), interrupted: &AtomicBool::new(false) };
-    campaign.fly(threads, watch).expect("it flies").expect("nobody interrupts")
+    let monitor = Silent::default();
+    campaign.fly(&Batch::new(None, &monitor).expect("threads")).expect("it flies").expect("nobody interrupts")
 }
 
 fn percent(share: &Proportion) -> String {

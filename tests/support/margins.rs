@@ -1,10 +1,8 @@
 //! How much of each imperfection five points and five Crazyflies survive on the same way, as the table of docs/margins.md.
 
-use std::sync::atomic::AtomicBool;
-
-use tautline::compare::Watch;
-use tautline::margin::{Asked, Margin, Plan, Question, Range};
-use tautline::scenario::{Override, Source};
+use tautline::margin::{Margin, Options, Range};
+use tautline::request::{ScenarioRequest, Silent};
+use tautline::studies::{Question, StudyRequest, answer};
 
 /// One imperfection: what it is, its key, its first and last value, runs of each value, and what else is set.
 struct Row {
@@ -60,15 +58,13 @@ impl Row {
     }
 
     fn margin(&self, vehicle: &[&str], question: Question) -> Margin {
-        let sets = self.sets.iter().chain(vehicle);
-        let overrides: Vec<_> = sets.map(|set| Override::parse(set).expect("a set")).collect();
+        let sets: Vec<_> = self.sets.iter().chain(vehicle).map(|&set| set.to_owned()).collect();
         let Self { from, to, logarithmic, runs, .. } = *self;
         let range = Range { from, to, scan: SCAN, halvings: HALVINGS, logarithmic };
-        let source = Source::Builtin("crazyflies".to_owned());
-        let plan = Plan::new(source, &overrides, self.key, range, Asked { question, runs, seed: 0 });
-        let plan = plan.unwrap_or_else(|error| panic!("{}: {error}", self.key));
-        let watch = Watch { flown: &|_| {}, interrupted: &AtomicBool::new(false) };
-        plan.search(2, watch).unwrap_or_else(|error| panic!("{}: {error}", self.key)).expect("not interrupted")
+        let options = Options { key: self.key.to_owned(), range, question, runs, seed: 0 };
+        let request = StudyRequest::new(ScenarioRequest::named("crazyflies", &sets).expect("a scenario"), options);
+        let margin = answer(&request, &(), &Silent::default());
+        margin.unwrap_or_else(|error| panic!("{}: {error}", self.key)).expect("not interrupted")
     }
 
     fn cell(&self, margin: &Margin) -> String {

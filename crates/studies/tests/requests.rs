@@ -4,26 +4,15 @@ use std::fs;
 use std::sync::atomic::Ordering;
 
 use tautline_report::request::{Failure, Monitor, ScenarioRequest, Silent};
-use tautline_studies::attack::{Asked, AttackRequest, Method, Variation, attack};
 use tautline_studies::campaign::{CampaignRequest, campaign};
-use tautline_studies::compare::{CompareRequest, compare};
-use tautline_studies::margin::{MarginRequest, margin};
+use tautline_studies::{Experiment, StudyFiles, StudyRequest, answer, attack, compare, margin, sweep};
 
 fn short() -> ScenarioRequest {
     ScenarioRequest::named("pentagon", &["time.duration_s=1".to_owned()]).expect("a scenario")
 }
 
-fn asked() -> Asked {
-    Asked {
-        vary: Vec::new(),
-        start_m: Some(0.2),
-        velocity_m_s: None,
-        apart_m: None,
-        method: Method::Random,
-        flights: 2,
-        seeds: 1,
-        seed: 0,
-    }
+fn options() -> attack::Options {
+    attack::Options { start_m: Some(0.2), flights: 2, ..attack::Options::default() }
 }
 
 fn interrupted() -> Silent {
@@ -36,55 +25,59 @@ fn interrupted() -> Silent {
 fn a_comparison_is_answered_and_its_files_are_written_and_kept() {
     let folder = tempfile::tempdir().expect("a folder");
     let csv = folder.path().join("laws.csv");
-    let request = CompareRequest {
-        laws: Some(vec!["edge-tension".to_owned(), "laplacian".to_owned()]),
-        runs: 2,
-        csv: Some(csv.clone()),
-        ..CompareRequest::new(short())
-    };
-    let comparison = compare(&request, &(), &Silent::default()).expect("compared").expect("an answer");
+    let laws = Some(vec!["edge-tension".to_owned(), "laplacian".to_owned()]);
+    let options = compare::Options { laws, runs: 2, ..compare::Options::default() };
+    let files = StudyFiles { csv: Some(csv.clone()), ..StudyFiles::default() };
+    let request = StudyRequest { files, ..StudyRequest::new(short(), options) };
+    let comparison = answer(&request, &(), &Silent::default()).expect("compared").expect("an answer");
     assert_eq!((comparison.runs, comparison.laws.len()), (2, 2));
     assert_eq!(fs::read_to_string(&csv).expect("a table").lines().count(), 3, "a header and a row a law");
-    let again = compare(&request, &(), &Silent::default()).expect_err("the file is there");
+    let again = answer(&request, &(), &Silent::default()).expect_err("the file is there");
     assert_eq!(again.code(), "files/exists");
 }
 
 #[test]
 fn an_interruption_leaves_no_answer_and_no_file() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let html = folder.path().join("page.html");
-    let compared = CompareRequest { html: Some(html.clone()), ..CompareRequest::new(short()) };
-    assert!(compare(&compared, &(), &interrupted()).expect("no failure").is_none());
-    let request =
-        MarginRequest { html: Some(html.clone()), ..MarginRequest::new(short(), "time.control_hz", 5.0, 50.0) };
-    assert!(margin(&request, &interrupted()).expect("no failure").is_none());
-    let request = AttackRequest { html: Some(html.clone()), ..AttackRequest::new(short(), asked()) };
-    assert!(attack(&request, &(), &interrupted()).expect("no failure").is_none());
-    assert!(!html.exists());
+    fn leaves_nothing<E: Experiment>(options: E) -> bool {
+        let folder = tempfile::tempdir().expect("a folder");
+        let files = StudyFiles { html: Some(folder.path().join("page.html")), ..StudyFiles::default() };
+        let request = StudyRequest { files, ..StudyRequest::new(short(), options) };
+        let is_none = answer(&request, &(), &interrupted()).expect("no failure").is_none();
+        is_none && fs::read_dir(folder.path()).expect("a folder").count() == 0
+    }
+    assert!(leaves_nothing(compare::Options::default()));
+    assert!(leaves_nothing(margin::Options::new("time.control_hz", 5.0, 50.0)));
+    assert!(leaves_nothing(options()));
+    let key = sweep::SweptKey::parse("law.alpha=0.5,1").expect("a key");
+    assert!(leaves_nothing(sweep::Options { keys: vec![key], runs: 1, ..sweep::Options::default() }));
+}
+
+/// The code of the failure of a study.
+fn refused<E: Experiment>(options: E) -> &'static str {
+    answer(&StudyRequest::new(short(), options), &(), &Silent::default()).err().expect("refused").code()
 }
 
 #[test]
 fn wrong_requests_have_codes() {
     let silent = Silent::default();
     let code = |failure: Failure| failure.code();
-    let of = |request: CompareRequest| code(compare(&request, &(), &silent).expect_err("refused"));
-    assert_eq!(of(CompareRequest { runs: 0, ..CompareRequest::new(short()) }), "request/out-of-range");
-    assert_eq!(of(CompareRequest { seed: u64::MAX, ..CompareRequest::new(short()) }), "request/out-of-range");
-    assert_eq!(of(CompareRequest { threads: Some(0), ..CompareRequest::new(short()) }), "request/out-of-range");
-    assert_eq!(of(CompareRequest { laws: Some(Vec::new()), ..CompareRequest::new(short()) }), "compare/no-law");
+    let options_of = compare::Options::default;
+    assert_eq!(refused(compare::Options { runs: 0, ..options_of() }), "request/out-of-range");
+    assert_eq!(refused(compare::Options { seed: u64::MAX, ..options_of() }), "request/out-of-range");
+    assert_eq!(refused(compare::Options { laws: Some(Vec::new()), ..options_of() }), "compare/no-law");
+    let no_threads = StudyRequest { threads: Some(0), ..StudyRequest::new(short(), options_of()) };
+    assert_eq!(code(answer(&no_threads, &(), &silent).expect_err("refused")), "request/out-of-range");
 
-    let of = |request: MarginRequest| code(margin(&request, &silent).expect_err("refused"));
-    assert_eq!(of(MarginRequest::new(short(), "time.control_hz", 5.0, 5.0)), "margin/range");
-    assert_eq!(of(MarginRequest::new(short(), "time.control_hz", f64::NAN, 5.0)), "margin/range");
-    assert_eq!(of(MarginRequest::new(short(), "law.nope", 1.0, 5.0)), "scenario/unknown-key");
+    assert_eq!(refused(margin::Options::new("time.control_hz", 5.0, 5.0)), "margin/range");
+    assert_eq!(refused(margin::Options::new("time.control_hz", f64::NAN, 5.0)), "margin/range");
+    assert_eq!(refused(margin::Options::new("law.nope", 1.0, 5.0)), "scenario/unknown-key");
 
-    let of = |asked: Asked| code(attack(&AttackRequest::new(short(), asked), &(), &silent).expect_err("refused"));
-    assert_eq!(of(Asked { start_m: None, ..asked() }), "attack/nothing-varied");
-    assert_eq!(of(Asked { start_m: Some(-1.0), ..asked() }), "attack/out-of-range");
-    assert_eq!(of(Asked { flights: 0, ..asked() }), "request/out-of-range");
-    assert_eq!(of(Asked { seeds: 3, ..asked() }), "attack/too-few-flights");
-    let seed = Variation::new("noise.seed", 0.0, 9.0).expect("a range");
-    assert_eq!(of(Asked { vary: vec![seed], ..asked() }), "attack/seed-varied");
+    assert_eq!(refused(attack::Options { start_m: None, ..options() }), "attack/nothing-varied");
+    assert_eq!(refused(attack::Options { start_m: Some(-1.0), ..options() }), "attack/out-of-range");
+    assert_eq!(refused(attack::Options { flights: 0, ..options() }), "request/out-of-range");
+    assert_eq!(refused(attack::Options { seeds: 3, ..options() }), "attack/too-few-flights");
+    let seed = attack::Variation::new("noise.seed", 0.0, 9.0).expect("a range");
+    assert_eq!(refused(attack::Options { vary: vec![seed], ..options() }), "attack/seed-varied");
 
     let missing = CampaignRequest::new("none.toml".into());
     assert_eq!(code(campaign(&missing, &(), &silent).expect_err("refused")), "campaign/cannot-read");

@@ -1,7 +1,7 @@
 //! Axes: what range they show, and where their ticks are.
 
 use super::svg::text_px;
-use tautline_core::text::decimals_of;
+use tautline_core::text::{at_least, decimals_of};
 
 /// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
 const LARGEST: f64 = 1e150;
@@ -124,6 +124,11 @@ impl Axis {
     /// Width of what is written at the ticks, that of the widest \[px\].
     pub(super) fn labels_px(&self) -> f64 {
         self.ticks.iter().map(|&tick| text_px(&self.tick_label(tick))).fold(0.0, f64::max)
+    }
+
+    /// A number of a linear axis, rounded down, with a digit more than its ticks.
+    pub(super) fn rounded_down(&self, number: f64) -> String {
+        at_least(number, u8::try_from(decimals_of(0.1 * self.step, 6)).unwrap_or(6))
     }
 
     /// What is written at the tick at `place`.

@@ -1,9 +1,10 @@
-//! Shares of flights over the values of a key.
+//! Shares and separations of flights over the values of a key.
 
 use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark};
-use super::svg::{Marker, PALETTE, SOFT_INK, Stroke};
+use super::svg::{INK, Marker, PALETTE, SOFT_INK, Stroke};
+use tautline_core::text::metres;
 
 /// The flights of one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,4 +78,41 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
     }
     let title = format!("Share that {does} over {key}");
     chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
+}
+
+/// The smallest separations of the flights of one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Separation {
+    /// The value.
+    pub value: f64,
+    /// Smallest of all flights \[m\].
+    pub smallest_m: f64,
+    /// Median of the flights \[m\].
+    pub median_m: f64,
+    /// Its 95 % interval \[m\], where there is one.
+    pub interval_m: Option<[f64; 2]>,
+}
+
+/// Smallest separations of flights over the values of a key, with the safety distance delta \[m\].
+#[must_use]
+pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) -> Figure {
+    let lengths = flights
+        .iter()
+        .flat_map(|of| [of.smallest_m, of.median_m].into_iter().chain(of.interval_m.into_iter().flatten()));
+    let x = Axis::linear(key, flights.iter().map(|of| of.value), false);
+    let mut chart = Chart::new(x, Axis::linear("smallest separation [m]", lengths.chain([delta_m]), true));
+    for of in flights {
+        let ends = of.interval_m.into_iter().flatten().map(|end| (of.value, end));
+        chart.lines.push(Line { points: ends.collect(), stroke: Stroke::of_line(0), label: None });
+    }
+    let curve = |of: fn(&Separation) -> f64| flights.iter().map(|flight| (flight.value, of(flight))).collect();
+    chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
+    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
+    let title = format!("Smallest separation over {key}");
+    chart.figure(
+        name,
+        &title,
+        &format!("{title}: the median of the flights with its 95 % interval, and the smallest of all."),
+    )
 }

@@ -18,6 +18,8 @@
 //! | [`attack`](attack()) | the smallest separation that a search had found over its flights |
 //! | [`margin`](margin()) | the share of flights that show something over the values of a key |
 //! | [`shares`] | the same of several laws |
+//! | [`separations`] | the smallest separation of flights over the values of a key |
+//! | [`heat_map`](heat_map()) | a number over a grid of two keys |
 //! | [`histograms`] | how often a number of many flights falls where |
 //!
 //! [`of_run`] draws every one that a run has data for. All of them draw a [`FlightLog`] and never fail for
@@ -31,6 +33,7 @@ mod attack;
 mod axis;
 mod chart;
 mod distances;
+mod heat_map;
 mod histogram;
 mod margin;
 mod over_time;
@@ -42,8 +45,9 @@ mod validation;
 
 pub use attack::attack;
 pub use distances::distances;
+pub use heat_map::{GridAxis, heat_map};
 pub use histogram::{Histogram, histograms};
-pub use margin::{Share, margin, shares};
+pub use margin::{Separation, Share, margin, separations, shares};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};

@@ -148,6 +148,19 @@ impl Canvas {
         self.shapes += &shape.into_string();
     }
 
+    /// A filled tile from its upper left corner, with words of a colour in its middle. Both colours are the same on light and dark
+    /// paper.
+    pub(super) fn tile(&mut self, (x, y): Point, (width, height): Point, fill: &str, words: Option<(String, &str)>) {
+        let shape = html! {
+            // Neighbours overlap a little, or the paper shines through between them.
+            rect x=(px(x)) y=(px(y)) width=(px(width + 0.3)) height=(px(height + 0.3)) fill=(fill) {}
+            @if let Some((words, ink)) = words {
+                text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) { (words) }
+            }
+        };
+        self.shapes += &shape.into_string();
+    }
+
     /// A marker of a radius \[px\].
     pub(super) fn marker(&mut self, marker: Marker, (x, y): Point, radius: f64, colour: Colour) {
         match marker {

@@ -1,13 +1,26 @@
 //! CMA-ES: candidates are normal around a mean, and mean, step and covariance follow the better half of them.
 //!
-//! N. Hansen, *The CMA evolution strategy: a tutorial* (2016), with its default numbers and positive weights. Candidates are
-//! asked for and their values told, so that a generation may be flown on any number of threads. Sums run in a fixed order and
-//! elementary functions come from `libm`: the same seed gives the same candidates on every machine.
+//! N. Hansen, *The CMA evolution strategy: a tutorial* (2016), with its default numbers and positive weights. A generation of
+//! candidates is drawn first and learned from afterwards, so that it may be flown on any number of threads. Sums run in a fixed
+//! order and elementary functions come from `libm`: the same seed gives the same candidates on every machine.
+//!
+//! [`Optimiser`] starts the search again with twice the population where it converges (IPOP), [`folded`] keeps candidates within
+//! their bounds.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use tautline_laws::wind::Normals;
 
+/// Standard deviation of the first candidates along each axis, for bounds that are 1 apart.
+const FIRST_STEP: f64 = 0.3;
+/// Standard deviation at which a search has converged.
+const CONVERGED_STEP: f64 = 1e-4;
+/// Range of the best values of late generations, over delta, at which a search has converged.
+const CONVERGED_VALUE: f64 = 1e-6;
+/// Population of a restarted search over that of the search before.
+const GROWTH: usize = 2;
+/// Part of the bounds that is bent on either side.
+const BENT: f64 = 0.05;
 /// Smallest and largest eigenvalue of the covariance beyond whose ratio numbers run out of digits.
 const WORST_CONDITION: f64 = 1e14;
 
@@ -45,7 +58,7 @@ struct Rates {
     expected: f64,
 }
 
-/// Candidates of a generation unless it is enlarged: 4 + 3 ln n in n dimensions.
+/// Default population: 4 + 3 ln n in n dimensions.
 pub(super) fn usual_population(dimensions: usize) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and far below 2^32")]
     let more = (3.0 * libm::log(dimensions.max(1) as f64)) as usize;
@@ -176,6 +189,105 @@ fn dot(count: usize, term: impl Fn(usize) -> f64) -> f64 {
     (0..count).map(term).sum()
 }
 
+/// CMA-ES with restarts.
+#[derive(Clone, Debug)]
+pub(super) struct Optimiser {
+    normals: Normals,
+    dimensions: usize,
+    /// Difference of values that counts as none \[m\].
+    tolerance_m: f64,
+    descent: Descent,
+    restarts: u64,
+}
+
+/// One run of CMA-ES.
+#[derive(Clone, Debug)]
+struct Descent {
+    distribution: CmaEs,
+    /// Best value of each generation.
+    best: Vec<f64>,
+}
+
+impl Descent {
+    fn new(mean: &[f64], population: usize) -> Self {
+        Self { distribution: CmaEs::new(mean, FIRST_STEP, population), best: Vec::new() }
+    }
+
+    fn has_converged(&self, dimensions: usize, tolerance: f64) -> bool {
+        let late = 10 + (30 * dimensions).div_ceil(self.distribution.population());
+        let is_flat = self.best.len() > late && {
+            let late = &self.best[self.best.len() - late..];
+            let low = late.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = late.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            high - low <= tolerance
+        };
+        is_flat || self.distribution.is_degenerate() || self.distribution.spread() < CONVERGED_STEP
+    }
+}
+
+impl Optimiser {
+    /// A search from the middle of the bounds.
+    pub(super) fn new(dimensions: usize, delta_m: f64, seed: u64) -> Self {
+        let descent = Descent::new(&vec![0.5; dimensions], usual_population(dimensions));
+        Self {
+            normals: Normals::new(seed, 0),
+            dimensions,
+            tolerance_m: CONVERGED_VALUE * delta_m,
+            descent,
+            restarts: 0,
+        }
+    }
+
+    /// Number of candidates of a generation.
+    pub(super) fn population(&self) -> usize {
+        self.descent.distribution.population()
+    }
+
+    /// Number of restarts.
+    pub(super) fn restarts(&self) -> u64 {
+        self.restarts
+    }
+
+    /// Draws a candidate on the real line; [`folded`] gives its place within the bounds.
+    pub(super) fn draw(&mut self) -> Vec<f64> {
+        self.descent.distribution.draw(&mut self.normals)
+    }
+
+    /// Takes the values of a whole generation.
+    pub(super) fn learn(&mut self, candidates: &[Vec<f64>], values: &[f64]) {
+        self.descent.distribution.learn(candidates, values);
+        self.descent.best.push(values.iter().copied().fold(f64::INFINITY, f64::min));
+        if self.descent.has_converged(self.dimensions, self.tolerance_m) {
+            self.restart(GROWTH);
+        }
+    }
+
+    /// Starts again from a random place, with a population that is `growth` times as large.
+    pub(super) fn restart(&mut self, growth: usize) {
+        let population = growth * self.population();
+        let place: Vec<_> = (0..self.dimensions).map(|_| self.normals.unit()).collect();
+        self.restarts += 1;
+        self.descent = Descent::new(&place, population);
+    }
+}
+
+/// Folds the real line into the interval from 0 to 1: the identity but for a twentieth at either bound, where a parabola leads to
+/// the bound and back again. A value that falls towards a bound so has its minimum inside, where an optimiser converges
+/// (`BoxConstraintsLinQuadTransformation` of Hansen's `pycma`).
+pub(super) fn folded(x: f64) -> f64 {
+    let width = 1.0 + 2.0 * BENT;
+    let along = (x + BENT).rem_euclid(2.0 * width);
+    let place = if along > width { 2.0 * width - along } else { along } - BENT;
+    let bent = |beyond: f64| beyond * beyond / (4.0 * BENT);
+    if place < BENT {
+        bent(place + BENT)
+    } else if place > 1.0 - BENT {
+        1.0 - bent(1.0 + BENT - place)
+    } else {
+        place
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -235,5 +347,18 @@ mod tests {
         let drawn = |seed: u64| CmaEs::new(&[0.5; 4], 0.3, 8).draw(&mut Normals::new(seed, 0));
         assert_eq!(drawn(1), drawn(1));
         assert_ne!(drawn(1), drawn(2));
+    }
+
+    #[test]
+    fn every_place_is_folded_into_the_interval_without_a_jump() {
+        let step = 1e-4;
+        let mut before = folded(-7.0);
+        for k in 1..140_000_i32 {
+            let now = folded(-7.0 + f64::from(k) * step);
+            assert!((0.0..=1.0).contains(&now) && (now - before).abs() <= step * (1.0 + 1e-6), "{k}: {before} {now}");
+            before = now;
+        }
+        assert_eq!([0.05, 0.3, 0.5, 0.95].map(folded), [0.05, 0.3, 0.5, 0.95]);
+        assert!(folded(-0.05).abs() < 1e-15 && (folded(1.05) - 1.0).abs() < 1e-15);
     }
 }

@@ -1,26 +1,512 @@
 //! The worst start, wind or loss within stated bounds, searched for by an optimiser over the smallest separation of a flight.
 //!
-//! [`Plan`] says what may be varied and how far, [`Plan::search`] flies candidates on all threads, and an [`Attack`] holds the
-//! worst that was found. A search that finds nothing proves nothing.
+//! [`Options`] say what may be varied and how far, and fly candidates on all threads; an [`Attack`] holds the worst that was
+//! found. A search that finds nothing proves nothing.
 
-mod bounds;
 mod cma_es;
-mod csv;
-mod fold;
-mod html;
-mod method;
-mod plan;
-mod request;
-mod result;
-mod search;
-mod words;
-
-pub use bounds::{Bound, Variation};
-pub use html::AttackPage;
-pub use method::Method;
-pub use plan::{Asked, AttackError, Plan};
-pub use request::{AttackRequest, FLIGHTS, SEEDS_OF_A_CANDIDATE, attack};
-pub use result::{Attack, Candidate, Flown, SCHEMA_VERSION};
-
+mod space;
 #[cfg(test)]
 mod tests;
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+pub use space::{Bound, SearchSpace, Variation};
+
+use crate::base::BaseScenario;
+use crate::batch::Batch;
+use crate::flight::{FlightSummary, Outcome};
+use crate::study::{About, Block, Experiment, Section, Study};
+use crate::table::{Kind, Table};
+use cma_es::{Optimiser, folded};
+use tautline_core::text::{at_least, counted, exact, metres_below, seconds};
+use tautline_report::figures::attack as figure;
+use tautline_report::report::page::{Badge, Tone};
+use tautline_report::request::{
+    Failure, Monitor, OutFolder, Pictures, Quiet, RECORDING, RunRequest, ScenarioRequest, in_range, run_into,
+};
+use tautline_sim::scenario::Scenario;
+
+/// Flights that a search may have.
+pub const FLIGHTS: RangeInclusive<u64> = 1..=10_000_000;
+/// Seeds that a candidate may be flown with.
+pub const SEEDS_OF_A_CANDIDATE: RangeInclusive<u64> = 1..=10_000;
+/// Candidates in a row that cannot be flown before a search starts again elsewhere.
+const MOST_REFUSED: usize = 1000;
+/// Places in a row at which it does so before it gives up.
+const MOST_PLACES: usize = 4;
+
+/// What every search says of itself.
+const CAVEAT: &str = "This is a search, not a proof: what it did not find may be there all the same, and the worst found need not be the worst.";
+
+/// What the numbers rest on.
+const ASSUMED: [&str; 4] = [
+    CAVEAT,
+    "A candidate is as bad as its flight brings two vehicles close, as the judge saw it between the samples too; clearances of \
+     obstacles are judged, and not searched for.",
+    "Bounds are a box: every number is free between its own two, whatever the others are. What cannot be flown, such as a start of \
+     two vehicles within delta, is no attack and costs no flight.",
+    "Noise has the seed of the scenario, and those that follow it where several are asked for: another seed does not make a scenario \
+     harder.",
+];
+
+/// Options of an attack.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Keys, each between two values.
+    pub vary: Vec<Variation>,
+    /// How far each start may be from that of the scenario along each axis \[m\].
+    pub start_m: Option<f64>,
+    /// How far each velocity at the start may be from that of the scenario along each axis \[m/s\].
+    pub velocity_m_s: Option<f64>,
+    /// Smallest distance of two starts, more than delta \[m\]; none for any start that can be flown.
+    pub apart_m: Option<f64>,
+    /// Flights of the whole search: [`FLIGHTS`].
+    pub flights: u64,
+    /// Flights of each candidate, with the scenario's seed of noise and those that follow it; the worst counts:
+    /// [`SEEDS_OF_A_CANDIDATE`].
+    pub seeds: u64,
+    /// Seed of the search itself.
+    pub seed: u64,
+    /// Folder for the recording, report and pictures of the worst flight, as `tautline run` leaves them.
+    pub out: Option<PathBuf>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            vary: Vec::new(),
+            start_m: None,
+            velocity_m_s: None,
+            apart_m: None,
+            flights: 1000,
+            seeds: 1,
+            seed: 0,
+            out: None,
+        }
+    }
+}
+
+/// A candidate that was worse than all before it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Candidate {
+    /// The number of its flight, from 1.
+    pub flight: u64,
+    /// Which of the candidate's seeds, from 0.
+    pub run: u64,
+    /// Its values, in the order of the bounds.
+    pub values: Vec<f64>,
+    /// Its flight; the seed is that of the noise.
+    pub flown: FlightSummary,
+}
+
+/// The worst that a search found. What does not apply is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Attack {
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
+    /// Seed of the search.
+    pub seed: u64,
+    /// Flights of each candidate, of which the worst counts.
+    pub seeds: u64,
+    /// Flights that were asked for.
+    pub flights_asked: u64,
+    /// Flights that were flown, without that of the scenario as it is.
+    pub flights: u64,
+    /// Each number that was free, and its bounds.
+    pub bounds: Vec<Bound>,
+    /// Candidates that could not be flown; they cost no flight.
+    pub refused: u64,
+    /// Why the first of them could not be flown.
+    pub first_refusal: Option<String>,
+    /// Flights with a violation.
+    pub violated: u64,
+    /// Flights without a violation that ended early.
+    pub ended_early: u64,
+    /// Flights that the judge cannot decide.
+    pub undecided: u64,
+    /// Flights that a certificate held for.
+    pub certified: u64,
+    /// Flights in which two vehicles came closer than certified: each shows a defect.
+    pub certificates_broken: u64,
+    /// Number of restarts from elsewhere.
+    pub restarts: u64,
+    /// Whether the search ended for want of candidates that can be flown.
+    pub exhausted: bool,
+    /// Whether the search was interrupted before the flights were spent.
+    pub interrupted: bool,
+    /// The scenario as it is.
+    pub own: FlightSummary,
+    /// Candidates that were each worse than all before; the last is the worst.
+    pub progress: Vec<Candidate>,
+    /// The overrides that fly the worst again by themselves, those of the call first.
+    pub sets: Vec<String>,
+}
+
+impl Experiment for Options {
+    type Study = Attack;
+
+    const COMMAND: &'static str = "attack";
+
+    fn check(&self) -> Result<(), Failure> {
+        in_range("--flights", &self.flights, &FLIGHTS)?;
+        in_range("--seeds", &self.seeds, &SEEDS_OF_A_CANDIDATE)
+    }
+
+    fn arguments(&self, _study: &Attack) -> Vec<String> {
+        let vary = self.vary.iter().map(|of| ("--vary", of.to_string()));
+        let reaches = [("--start", self.start_m), ("--velocity", self.velocity_m_s), ("--apart", self.apart_m)];
+        let reaches = reaches.into_iter().filter_map(|(option, by)| Some((option, format!("{:?}", by?))));
+        let counts = [("--flights", self.flights), ("--seeds", self.seeds), ("--seed", self.seed)];
+        let counts = counts.into_iter().map(|(option, count)| (option, count.to_string()));
+        vary.chain(reaches).chain(counts).flat_map(|(option, value)| [option.to_owned(), value]).collect()
+    }
+
+    fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Attack>, Failure> {
+        let space = SearchSpace::new(base, self)?;
+        batch
+            .monitor()
+            .begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(self.flights.saturating_add(1))));
+        let as_it_is = |error| Failure::from(error).under("with the keys as they are");
+        let Some(own) = batch.fly(base.own(), space.noise_seed(0)).map_err(as_it_is)? else { return Ok(None) };
+        let delta_m = base.own().delta_m;
+        let mut search = Search {
+            space: &space,
+            batch,
+            optimiser: Optimiser::new(space.bounds().len(), delta_m, self.seed),
+            found: Attack {
+                about: About::new(base.own()),
+                seed: self.seed,
+                seeds: self.seeds,
+                flights_asked: self.flights,
+                flights: 0,
+                bounds: space.bounds().to_vec(),
+                refused: 0,
+                first_refusal: None,
+                violated: 0,
+                ended_early: 0,
+                undecided: 0,
+                certified: 0,
+                certificates_broken: 0,
+                restarts: 0,
+                exhausted: false,
+                interrupted: false,
+                own,
+                progress: Vec::new(),
+                sets: Vec::new(),
+            },
+        };
+        search.fly()?;
+        let Search { optimiser, mut found, .. } = search;
+        found.restarts = optimiser.restarts();
+        found.interrupted = batch.is_interrupted();
+        if let Some(worst) = found.progress.last() {
+            found.sets = base.sets().chain(space.sets(&worst.values, worst.run)).collect();
+        }
+        let is_empty = found.interrupted && found.flights == 0;
+        Ok((!is_empty).then_some(found))
+    }
+
+    fn prepare(&self, force: bool) -> Result<(), Failure> {
+        let Some(path) = self.out.as_deref() else { return Ok(()) };
+        // The flight itself opens the folder again.
+        OutFolder::at(path, "run", "report.json").open(force).map(drop)
+    }
+
+    fn conclude(
+        &self,
+        request: &ScenarioRequest,
+        study: &Attack,
+        pictures: &dyn Pictures,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let (Some(out), Some(_), false) = (&self.out, study.worst(), study.interrupted) else { return Ok(()) };
+        let own = ScenarioRequest { overrides: study.sets.clone(), ..request.clone() };
+        let scenario = own.read()?;
+        let run = RunRequest::reproducible(&scenario, request.run_command(&study.sets), out.clone());
+        run_into(&run, pictures, &Quiet::new(monitor))?;
+        monitor.say(&format!("wrote {} and the report beside it", out.join(RECORDING).display()));
+        Ok(())
+    }
+}
+
+/// A candidate that can be flown.
+struct Next {
+    /// Its place on the real line.
+    drawn: Vec<f64>,
+    values: Vec<f64>,
+    /// A flight for each seed.
+    flights: Vec<Scenario>,
+}
+
+/// A search under way.
+struct Search<'a> {
+    space: &'a SearchSpace,
+    batch: &'a Batch<'a>,
+    optimiser: Optimiser,
+    found: Attack,
+}
+
+impl Search<'_> {
+    /// Flies generations of candidates until the flights are spent.
+    fn fly(&mut self) -> Result<(), Failure> {
+        let (flights, seeds) = (self.found.flights_asked, self.found.seeds);
+        while let Some(left) = (flights - self.found.flights).checked_div(seeds).filter(|&left| left > 0) {
+            let whole = self.optimiser.population();
+            let count = usize::try_from(left).map_or(whole, |left| left.min(whole));
+            let Some(next) = self.next(count) else {
+                self.found.exhausted = !self.batch.is_interrupted();
+                return Ok(());
+            };
+            let Some(values) = self.values(&next)? else { return Ok(()) };
+            if count == whole {
+                let drawn: Vec<_> = next.into_iter().map(|next| next.drawn).collect();
+                self.optimiser.learn(&drawn, &values);
+            }
+        }
+        Ok(())
+    }
+
+    /// Draws candidates that can be flown; none where hardly any can.
+    fn next(&mut self, count: usize) -> Option<Vec<Next>> {
+        for _ in 0..MOST_PLACES {
+            let next: Option<Vec<_>> = std::iter::repeat_with(|| self.flyable()).take(count).collect();
+            if next.is_some() || self.batch.is_interrupted() {
+                return next;
+            }
+            self.optimiser.restart(1);
+        }
+        None
+    }
+
+    fn flyable(&mut self) -> Option<Next> {
+        for _ in 0..MOST_REFUSED {
+            if self.batch.is_interrupted() {
+                return None;
+            }
+            let drawn = self.optimiser.draw();
+            let values = self.space.values(&drawn.iter().copied().map(folded).collect::<Vec<_>>());
+            match self.space.candidate(&values) {
+                Ok(flights) => return Some(Next { drawn, values, flights }),
+                Err(why) => {
+                    self.found.refused += 1;
+                    self.found.first_refusal.get_or_insert(why);
+                }
+            }
+        }
+        None
+    }
+
+    /// Flies candidates and returns the smallest clearance of each; none where the search was interrupted.
+    fn values(&mut self, next: &[Next]) -> Result<Option<Vec<f64>>, Failure> {
+        let flights: Vec<_> = next
+            .iter()
+            .flat_map(|next| next.flights.iter().enumerate().map(move |(k, flight)| (next, k as u64, flight)))
+            .collect();
+        let (space, batch) = (self.space, self.batch);
+        let flown = batch.run(flights.len(), |number| {
+            let (next, k, scenario) = flights[number];
+            let flight = batch.fly(scenario, space.noise_seed(k));
+            let under = || format!("with {}", space.sets(&next.values, k).join(", "));
+            flight.map_err(|error| Failure::from(error).under(&under()))
+        })?;
+        let mut values = vec![f64::INFINITY; next.len()];
+        let seeds = flights.len() / next.len().max(1);
+        for (number, flight) in flown.into_iter().enumerate() {
+            // A flight that was interrupted, and those after it, do not count.
+            let Some(flight) = flight else { return Ok(None) };
+            let (candidate, run) = (number / seeds, (number % seeds) as u64);
+            values[candidate] = values[candidate].min(flight.clearance_m().unwrap_or(f64::INFINITY));
+            self.found.take(flight, run, &next[candidate].values);
+        }
+        Ok(Some(values))
+    }
+}
+
+impl Attack {
+    /// Counts a flight of a candidate.
+    fn take(&mut self, flown: FlightSummary, run: u64, values: &[f64]) {
+        self.flights += 1;
+        match flown.outcome {
+            Outcome::Violated => self.violated += 1,
+            Outcome::EndedEarly => self.ended_early += 1,
+            Outcome::Undecided => self.undecided += 1,
+            Outcome::Clear => {}
+        }
+        self.certified += u64::from(flown.certified_m.is_some());
+        // A scenario that `check` refuses is certified nothing.
+        self.certificates_broken += u64::from(flown.breaks_certificate && flown.refused.is_empty());
+        if self.progress.last().is_none_or(|worst| flown.is_worse_than(&worst.flown)) {
+            self.progress.push(Candidate { flight: self.flights, run, values: values.to_vec(), flown });
+        }
+    }
+
+    /// The worst candidate; none where none could be flown.
+    #[must_use]
+    pub fn worst(&self) -> Option<&Candidate> {
+        self.progress.last()
+    }
+
+    /// Whether a flight violated or came closer than certified, the scenario's own included; or whether too little is known to say
+    /// that none did.
+    #[must_use]
+    pub fn is_bad(&self) -> bool {
+        let of_own = self.own.outcome == Outcome::Violated || self.own.breaks_certificate;
+        let known = self.flights.saturating_sub(self.ended_early + self.undecided);
+        of_own || self.violated > 0 || self.certificates_broken > 0 || known == 0
+    }
+
+    /// What was found, in a sentence without its end.
+    fn result(&self) -> String {
+        let flights = counted(self.flights, "flight", "flights");
+        let delta = exact(self.about.delta_m);
+        let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
+        let closest = self.closest(worst);
+        if self.violated > 0 {
+            return format!("VIOLATION found: {closest} (delta {delta} m); {} of {flights} violated", self.violated);
+        }
+        if self.own.outcome == Outcome::Violated {
+            return format!(
+                "VIOLATION in the scenario as it is; {flights} beside it found none: the worst came to {closest}"
+            );
+        }
+        if self.ended_early + self.undecided >= self.flights {
+            return format!("nothing is known: of {flights} none was flown to its end and judged");
+        }
+        format!("no violation found in {flights}: the worst came to {closest} (delta {delta} m)")
+    }
+
+    /// The closest approach of a candidate: distance, time and vehicles.
+    fn closest(&self, worst: &Candidate) -> String {
+        let FlightSummary { min_m, min_at_s, min_pair, .. } = &worst.flown;
+        let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
+        let shown =
+            if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
+        let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
+        let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a}-{b}"));
+        format!("{shown} m{at}{pair}")
+    }
+}
+
+impl Study for Attack {
+    fn kind(&self) -> &'static str {
+        "Attack"
+    }
+
+    fn title(&self) -> String {
+        self.about.scenario.name.clone()
+    }
+
+    fn badge(&self) -> Badge {
+        let tone = if self.is_bad() { Tone::Bad } else { Tone::Neutral };
+        Badge { tone, word: counted(self.flights, "flight", "flights") }
+    }
+
+    fn headline(&self) -> String {
+        let broken = if self.certificates_broken > 0 { "CERTIFICATE BROKEN, " } else { "" };
+        format!("{broken}{}. {CAVEAT}", self.result())
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let flights = |count: u64| counted(count, "flight", "flights");
+        let flown = format!("of {} flights {} were flown", self.flights_asked, self.flights);
+        let mut notes = Vec::new();
+        let mut note = |is: bool, text: String| notes.extend(is.then_some(text));
+        note(
+            self.certificates_broken > 0,
+            format!(
+                "DEFECT: in {} two came closer than the law's certificate promises; that is a defect of law, plant or step, \
+                 whatever delta says: please report it with the command below",
+                flights(self.certificates_broken)
+            ),
+        );
+        note(
+            self.certified > 0 && self.certified == self.flights && self.certificates_broken == 0,
+            "every flight had a certificate of its law and kept it; a certificate, unlike a search, is a proof"
+                .to_owned(),
+        );
+        let worst = self.worst().map(|worst| &worst.flown);
+        note(
+            worst.is_some_and(|of| of.outcome == Outcome::Violated && of.clearance_m().is_some_and(|of| of >= 0.0)),
+            "the violation is of an obstacle's clearance; the search looks at separations of vehicles alone".to_owned(),
+        );
+        note(self.interrupted, format!("interrupted: {flown}"));
+        note(
+            self.exhausted,
+            format!("hardly any candidate within the bounds can be flown: {flown}; narrow the bounds"),
+        );
+        let first = self.first_refusal.as_ref().map_or_else(String::new, |first| format!(", the first: {first}"));
+        let candidates = counted(self.refused, "candidate", "candidates");
+        note(self.refused > 0, format!("{candidates} could not be flown and cost no flight{first}"));
+        note(
+            worst.is_some_and(|of| of.min_at_s == Some(0.0)),
+            "the worst is the distance of two starts; --apart keeps starts farther apart".to_owned(),
+        );
+        note(
+            self.ended_early > 0,
+            format!(
+                "{} ended early without a violation, and count with what the judge saw up to then",
+                flights(self.ended_early)
+            ),
+        );
+        note(self.undecided > 0, format!("the judge cannot decide about {}", flights(self.undecided)));
+        notes
+    }
+
+    fn records(&self) -> Table {
+        let table = Table::of("Candidates that were each worse than all before", &self.progress)
+            .column("flight", "Flight", Kind::Count, |of| of.flight)
+            .column("noise_seed", "", Kind::Integer, |of| of.flown.seed)
+            .column("outcome", "Verdict", Kind::Text, |of| of.flown.outcome.name())
+            .column("min", "Separation [m]", Kind::Metres, |of| of.flown.min_m)
+            .column("min_at", "At [s]", Kind::Exact, |of| of.flown.min_at_s)
+            .column("certified", "Certified [m]", Kind::Metres, |of| of.flown.certified_m);
+        let keys = self.bounds.iter().enumerate();
+        keys.fold(table, |table, (k, bound)| {
+            table.column(&bound.key, &bound.key, Kind::Exact, |of| of.values.get(k).copied())
+        })
+        .build()
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let found = self.progress.iter().filter_map(|worst| Some((worst.flight, worst.flown.min_m?)));
+        let chart = figure(&found.collect::<Vec<_>>(), self.flights, self.about.delta_m, self.own.min_m);
+        let own = ("as the scenario is", &self.own);
+        let worst = self.worst().map(|worst| ("the worst found", &worst.flown));
+        let flights: Vec<_> = std::iter::once(own).chain(worst).collect();
+        let flights = Table::of("The scenario as it is, and the worst found", &flights)
+            .column("", "Flight", Kind::Text, |(what, _)| *what)
+            .column("", "Separation [m]", Kind::Metres, |(_, flown)| flown.min_m)
+            .column("", "Certified [m]", Kind::Metres, |(_, flown)| flown.certified_m)
+            .column("", "Verdict", Kind::Text, |(_, flown)| flown.outcome.name().replace('_', " "))
+            .build();
+        let worst = |k: usize| self.worst().and_then(|worst| worst.values.get(k).copied());
+        let bounds: Vec<_> = self.bounds.iter().enumerate().collect();
+        let bounds = Table::of("All else is as the scenario says", &bounds)
+            .column("", "Key", Kind::Text, |(_, bound)| bound.key.clone())
+            .column("", "Smallest", Kind::Exact, |(_, bound)| bound.low)
+            .column("", "Largest", Kind::Exact, |(_, bound)| bound.high)
+            .column("", "Worst", Kind::Exact, |(k, _)| worst(*k))
+            .build();
+        vec![
+            Section::new("How the search went", [Block::Figures(vec![chart]), Block::Table(flights)]),
+            Section::new("Bounds and the worst within them", [Block::Table(bounds)]),
+        ]
+    }
+
+    fn assumptions(&self) -> Vec<String> {
+        ASSUMED.map(str::to_owned).to_vec()
+    }
+
+    fn is_good(&self) -> bool {
+        !self.is_bad() && !self.interrupted
+    }
+
+    fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
+        let worst = self.worst().map(|_| ("Fly the worst again:".to_owned(), scenario.run_command(&self.sets)));
+        worst.into_iter().collect()
+    }
+}

@@ -1,10 +1,15 @@
 //! A search finds what is there, says what it looked at, and never takes what cannot be flown for an attack.
 
-use std::sync::atomic::AtomicBool;
+use std::ops::ControlFlow;
 
-use super::{Asked, Attack, AttackError, AttackPage, Method, Plan, Variation};
-use crate::compare::{Outcome, Watch};
-use tautline_sim::scenario::{Override, Source};
+use super::{Attack, Options, SearchSpace, Variation};
+use crate::base::BaseScenario;
+use crate::batch::Batch;
+use crate::flight::{Outcome, fly};
+use crate::study::{Experiment as _, Study as _, StudyPage};
+use crate::tests::{InterruptAfter, base, batch};
+use tautline_report::request::Failure;
+use tautline_sim::scenario::Source;
 
 /// Two that change sides, the one a little aside, under a law that avoids nothing.
 const BLIND: &str = r#"name = "blind"
@@ -22,37 +27,29 @@ dt_s = 0.01
 record_hz = 10
 "#;
 
-fn asked(method: Method, flights: u64) -> Asked {
-    Asked {
-        vary: Vec::new(),
-        start_m: Some(1.5),
-        velocity_m_s: None,
-        apart_m: None,
-        method,
-        flights,
-        seeds: 1,
-        seed: 0,
-    }
+fn asked(flights: u64) -> Options {
+    Options { start_m: Some(1.5), flights, ..Options::default() }
 }
 
-fn varied(vary: &[&str], flights: u64) -> Asked {
+fn varied(vary: &[&str], flights: u64) -> Options {
     let vary = vary.iter().map(|text| Variation::parse(text).expect("a variation")).collect();
-    Asked { vary, start_m: None, ..asked(Method::CmaEs, flights) }
+    Options { vary, flights, ..Options::default() }
 }
 
-fn plan(sets: &[&str], asked: Asked) -> Result<Plan, AttackError> {
-    let source = Source::Text { name: "blind".to_owned(), text: BLIND.to_owned() };
-    let sets: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("a set")).collect();
-    Plan::new(source, &sets, asked)
+fn blind(sets: &[&str]) -> BaseScenario {
+    base(Source::Text { name: "blind".to_owned(), text: BLIND.to_owned() }, sets)
 }
 
-fn searched_on(plan: &Plan, threads: usize) -> Attack {
-    let watch = Watch { flown: &|_| {}, interrupted: &AtomicBool::new(false) };
-    plan.search(threads, watch).expect("flown").expect("not interrupted")
+fn space(sets: &[&str], options: &Options) -> Result<SearchSpace, Failure> {
+    SearchSpace::new(&blind(sets), options)
 }
 
-fn searched(sets: &[&str], asked: Asked) -> Attack {
-    searched_on(&plan(sets, asked).expect("a plan"), 2)
+fn searched_on(base: &BaseScenario, options: &Options, threads: usize) -> Attack {
+    batch(threads, &mut |batch| options.fly(base, batch)).expect("flown").expect("not interrupted")
+}
+
+fn searched(sets: &[&str], options: &Options) -> Attack {
+    searched_on(&blind(sets), options, 2)
 }
 
 fn worst_m(attack: &Attack) -> f64 {
@@ -61,36 +58,36 @@ fn worst_m(attack: &Attack) -> f64 {
 
 #[test]
 fn a_start_from_which_two_meet_is_found_and_flown_again_from_what_is_said_of_it() {
-    for method in [Method::CmaEs, Method::Random] {
-        let plan = plan(&[], asked(method, 60)).expect("a plan");
-        let [attack, other] = [1, 3].map(|threads| searched_on(&plan, threads));
-        assert_eq!(attack, other, "the number of threads changes nothing");
-        assert_eq!(attack.flights, 60);
-        assert_eq!(attack.own.outcome, Outcome::Clear);
-        let worst = attack.worst().expect("a worst");
-        assert_eq!(worst.flown.outcome, Outcome::Violated);
-        assert!(attack.violated > 0 && worst_m(&attack) < 1.0, "{}", attack.headline());
-        assert!(attack.headline().starts_with("VIOLATION found: "), "{}", attack.headline());
-        for (bound, &value) in attack.bounds.iter().zip(&worst.values) {
-            assert!((bound.low..=bound.high).contains(&value) && bound.high - bound.low == 3.0, "{bound:?} {value}");
-        }
-        assert_eq!(attack.bounds.len(), 4, "a plane has no z: {:?}", attack.bounds);
-        let falls = attack.progress.windows(2).all(|pair| pair[1].flown.min_m < pair[0].flown.min_m);
-        assert!(falls && attack.progress.windows(2).all(|pair| pair[0].flight < pair[1].flight));
-
-        let again = plan.scenario(&worst.values, worst.run).expect("the worst");
-        assert_eq!(again.sha256_hex(), worst.flown.scenario_sha256);
-        let row = crate::compare::fly(&again, 0, &mut |_| std::ops::ControlFlow::Continue(()))
-            .expect("flown")
-            .expect("whole");
-        assert_eq!((row.state_hash.as_str(), row.min_m), (worst.flown.state_hash.as_str(), worst.flown.min_m));
+    let (base, options) = (blind(&[]), asked(60));
+    let [attack, other] = [1, 3].map(|threads| searched_on(&base, &options, threads));
+    assert_eq!(
+        attack.to_json().expect("JSON"),
+        other.to_json().expect("JSON"),
+        "the number of threads changes nothing"
+    );
+    assert_eq!(attack.flights, 60);
+    assert_eq!(attack.own.outcome, Outcome::Clear);
+    let worst = attack.worst().expect("a worst");
+    assert_eq!(worst.flown.outcome, Outcome::Violated);
+    assert!(attack.violated > 0 && worst_m(&attack) < 1.0, "{}", attack.headline());
+    assert!(attack.headline().starts_with("VIOLATION found: "), "{}", attack.headline());
+    for (bound, &value) in attack.bounds.iter().zip(&worst.values) {
+        assert!((bound.low..=bound.high).contains(&value) && bound.high - bound.low == 3.0, "{bound:?} {value}");
     }
+    assert_eq!(attack.bounds.len(), 4, "a plane has no z: {:?}", attack.bounds);
+    let falls = attack.progress.windows(2).all(|pair| pair[1].flown.min_m < pair[0].flown.min_m);
+    assert!(falls && attack.progress.windows(2).all(|pair| pair[0].flight < pair[1].flight));
+
+    let again = base.with(&attack.sets).expect("the worst");
+    assert_eq!(again.sha256_hex(), worst.flown.scenario_sha256);
+    let flight = fly(&again, 0, &mut |_| ControlFlow::Continue(())).expect("flown").expect("whole");
+    assert_eq!((flight.state_hash.as_str(), flight.min_m), (worst.flown.state_hash.as_str(), worst.flown.min_m));
 }
 
 #[test]
 fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
     let sets = ["law.kind=displacement"];
-    let attack = searched(&sets, asked(Method::CmaEs, 40));
+    let attack = searched(&sets, &asked(40));
     assert_eq!((attack.violated, attack.certificates_broken), (0, 0));
     let said = attack.headline();
     assert!(said.starts_with("no violation found in 40 flights: the worst came to 1."), "{said}");
@@ -100,8 +97,8 @@ fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
         "{:?}",
         attack.notes()
     );
-    let html = attack.to_html(&AttackPage { command: "tautline attack", worst: Some("tautline run") });
-    for part in ["a search, not a proof", "<svg", "tautline run", "start.positions_m.2.y"] {
+    let html = attack.to_html(&StudyPage { commands: vec!["tautline attack".to_owned()], ..StudyPage::default() });
+    for part in ["a search, not a proof", "<svg", "tautline attack", "start.positions_m.2.y"] {
         assert!(html.contains(part), "{part}");
     }
     let csv = String::from_utf8(attack.to_csv().expect("csv")).expect("text");
@@ -110,7 +107,7 @@ fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
 
 #[test]
 fn a_flight_below_its_certificate_is_said_to_be_a_defect_first_of_all() {
-    let attack = searched(&["law.kind=displacement"], asked(Method::CmaEs, 4));
+    let attack = searched(&["law.kind=displacement"], &asked(4));
     let says_so = |attack: &Attack| {
         let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two came closer"));
         (attack.headline().starts_with("CERTIFICATE BROKEN, "), noted, attack.is_bad())
@@ -123,14 +120,14 @@ fn a_flight_below_its_certificate_is_said_to_be_a_defect_first_of_all() {
 fn what_cannot_be_flown_costs_no_flight_and_is_never_the_worst() {
     // The second may start anywhere around the first, within delta too.
     let near = ["start.positions_m.2.x=-1.2..1.2", "start.positions_m.2.y=-1.2..1.2"];
-    let attack = searched(&["law.kind=displacement"], varied(&near, 30));
+    let attack = searched(&["law.kind=displacement"], &varied(&near, 30));
     assert!(attack.refused > 0 && attack.flights == 30, "{attack:?}");
     assert!(attack.first_refusal.as_ref().is_some_and(|why| why.contains("start")), "{:?}", attack.first_refusal);
     assert!(worst_m(&attack) >= 1.0, "{}", attack.headline());
     assert!(attack.notes().iter().any(|note| note.contains("could not be flown and cost no flight")));
 
     let within = ["start.positions_m.2.x=-0.6..0.6", "start.positions_m.2.y=-0.6..0.6"];
-    let nowhere = searched(&[], varied(&within, 30));
+    let nowhere = searched(&[], &varied(&within, 30));
     assert!(nowhere.exhausted && nowhere.flights == 0 && nowhere.worst().is_none(), "{nowhere:?}");
     assert!(nowhere.headline().starts_with("no flight was flown"), "{}", nowhere.headline());
     assert!(nowhere.notes().iter().any(|note| note.starts_with("hardly any candidate")), "{:?}", nowhere.notes());
@@ -139,20 +136,21 @@ fn what_cannot_be_flown_costs_no_flight_and_is_never_the_worst() {
 #[test]
 fn starts_are_as_far_apart_as_is_asked() {
     let sets = ["law.kind=displacement"];
-    let nearest = |asked: Asked| {
-        let attack = searched(&sets, asked);
+    let nearest = |options: &Options| {
+        let attack = searched(&sets, options);
         let apart_m = |values: &[f64]| libm::hypot(values[2] - values[0], values[3] - values[1]);
         let nearest_m = attack.progress.iter().map(|worst| apart_m(&worst.values)).fold(f64::INFINITY, f64::min);
         (nearest_m, attack)
     };
-    let wide = Asked { start_m: Some(2.4), ..asked(Method::Random, 60) };
-    let (_, anywhere) = nearest(wide.clone());
-    let (near_m, attack) = nearest(Asked { apart_m: Some(4.0), ..wide.clone() });
+    let wide = Options { start_m: Some(2.4), ..asked(60) };
+    let (_, anywhere) = nearest(&wide);
+    let (near_m, attack) = nearest(&Options { apart_m: Some(4.0), ..wide.clone() });
     assert!(near_m >= 4.0 && attack.refused > anywhere.refused, "{near_m}");
     let why = attack.first_refusal.expect("a reason");
     assert!(why.contains("nearer than the 4 m"), "{why}");
     for apart_m in [1.0, 5.1, f64::NAN] {
-        let refused = plan(&sets, Asked { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
+        let refused =
+            space(&sets, &Options { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
         assert!(refused.contains("where delta is 1 m and the scenario's own are 5 m apart"), "{refused}");
     }
 }
@@ -160,60 +158,54 @@ fn starts_are_as_far_apart_as_is_asked() {
 #[test]
 fn keys_take_whole_numbers_where_they_take_no_others() {
     let whole = varied(&["time.max_halvings=0..4", "law.f1_per_s2=0.5..2"], 1);
-    let plan = plan(&[], whole).expect("a plan");
-    assert_eq!(plan.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true, false]);
-    assert_eq!(plan.sets(&plan.values(&[0.5, 0.5]), 0), ["time.max_halvings=2", "law.f1_per_s2=1.25"]);
+    let space = space(&[], &whole).expect("a space");
+    assert_eq!(space.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true, false]);
+    assert_eq!(space.sets(&space.values(&[0.5, 0.5]), 0), ["time.max_halvings=2", "law.f1_per_s2=1.25"]);
 }
 
 #[test]
 fn a_key_is_none_of_whole_numbers_where_a_value_between_is_refused_for_its_size() {
-    let scale = plan(&["law.delta_m=3.5"], varied(&["formation.scale=0..2"], 1)).expect("a plan");
+    let scale = space(&["law.delta_m=3.5"], &varied(&["formation.scale=0..2"], 1)).expect("a space");
     assert_eq!(scale.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
     // Refused from 21 on, and whole where it is taken.
-    let halvings = plan(&[], varied(&["time.max_halvings=0..100"], 1)).expect("a plan");
+    let halvings = space(&[], &varied(&["time.max_halvings=0..100"], 1)).expect("a space");
     assert_eq!(halvings.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true]);
 }
 
 #[test]
 fn the_worst_of_several_seeds_counts_and_each_is_a_flight() {
     let radio = ["network={rate_hz=20, loss=0.3}", "noise.seed=5"];
-    let seeds = Asked { seeds: 3, ..varied(&["network.loss=0.1..0.6"], 20) };
-    let plan = plan(&radio, seeds).expect("a plan");
-    let attack = searched_on(&plan, 2);
+    let seeds = Options { seeds: 3, ..varied(&["network.loss=0.1..0.6"], 20) };
+    let attack = searched(&radio, &seeds);
     assert_eq!(attack.flights, 18, "six candidates with three flights each");
     let worst = attack.worst().expect("a worst");
-    assert_eq!(worst.flown.noise_seed, 5 + worst.run);
-    assert!(attack.sets.contains(&format!("noise.seed={}", worst.flown.noise_seed)), "{:?}", attack.sets);
+    assert_eq!(worst.flown.seed, 5 + worst.run);
+    assert!(attack.sets.contains(&format!("noise.seed={}", worst.flown.seed)), "{:?}", attack.sets);
 }
 
 #[test]
 fn an_interrupted_search_says_so_and_one_without_a_flight_says_nothing() {
-    let plan = plan(&[], asked(Method::CmaEs, 60)).expect("a plan");
-    let interrupted = AtomicBool::new(true);
-    let watch = Watch { flown: &|_| {}, interrupted: &interrupted };
-    assert!(plan.search(1, watch).expect("no error").is_none());
-    interrupted.store(false, std::sync::atomic::Ordering::Relaxed);
-    let steps = std::sync::atomic::AtomicU64::new(0);
-    let flown = |more: u64| {
-        let all = steps.fetch_add(more, std::sync::atomic::Ordering::Relaxed);
-        interrupted.store(all > 20 * 600, std::sync::atomic::Ordering::Relaxed);
+    let fly = |most: u64| {
+        let monitor = InterruptAfter::new(most);
+        let batch = Batch::new(Some(1), &monitor).expect("a batch");
+        asked(60).fly(&blind(&[]), &batch).expect("no failure")
     };
-    let attack =
-        plan.search(1, Watch { flown: &flown, interrupted: &interrupted }).expect("no error").expect("flights");
+    assert!(fly(0).is_none());
+    let attack = fly(20 * 600).expect("flights");
     assert!(attack.interrupted && attack.flights > 0 && attack.flights < 60, "{}", attack.flights);
     assert!(attack.notes().iter().any(|note| note.starts_with("interrupted")));
 }
 
 #[test]
 fn what_is_no_search_is_refused() {
-    let refused = |asked: Asked| plan(&[], asked).expect_err("refused").to_string();
-    let start = || asked(Method::CmaEs, 10);
+    let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
+    let start = || asked(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
-    assert!(refused(Asked { start_m: Some(0.0), ..start() }).contains("the start is to be varied by 0"));
-    assert!(refused(Asked { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(refused(Asked { flights: 0, ..start() }).contains("of 0 flights none is left"));
-    assert!(refused(Asked { seeds: 11, ..start() }).contains("of 10 flights none is left"));
-    assert!(refused(Asked { seeds: 2, ..start() }).contains("nothing in the flight is random"));
+    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("the start is to be varied by 0"));
+    assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
+    assert!(refused(Options { flights: 0, ..start() }).contains("of 0 flights none is left"));
+    assert!(refused(Options { seeds: 11, ..start() }).contains("of 10 flights none is left"));
+    assert!(refused(Options { seeds: 2, ..start() }).contains("nothing in the flight is random"));
     assert!(refused(varied(&["law.f1=0..1"], 10)).contains("f1"));
     assert!(refused(varied(&["law.kind=0..1"], 10)).contains("law.kind = 0"));
     assert!(refused(varied(&["name=0..1"], 10)).contains("name = 0"));
@@ -221,15 +213,15 @@ fn what_is_no_search_is_refused() {
     assert!(refused(varied(&["law.f1_per_s2=1..2", "law.f1_per_s2=1..3"], 10)).contains("varied twice"));
     let x = ["start.positions_m.1.x=0..1", "start.positions_m.1.1=0..1"];
     assert!(refused(varied(&x, 10)).contains("varied twice"));
-    let both = Asked { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
+    let both = Options { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
     assert!(refused(both).contains("start.positions_m.1.x is varied twice"));
 }
 
 #[test]
 fn whole_numbers_are_those_of_keys_that_count_whatever_their_bounds() {
     let bound = |key: &str| {
-        let source = Source::Builtin("crazyflies".to_owned());
-        Plan::new(source, &[], varied(&[key], 2)).map(|plan| plan.bounds()[0].whole)
+        let base = base(Source::Builtin("crazyflies".to_owned()), &[]);
+        SearchSpace::new(&base, &varied(&[key], 2)).map(|space| space.bounds()[0].whole)
     };
     assert!(!bound("sensing.latency_s=0..1").expect("a plan"));
     assert!(bound("time.max_halvings=0..4").expect("a plan"));

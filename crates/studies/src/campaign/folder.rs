@@ -1,4 +1,4 @@
-//! The folder of a campaign: its manifest, its parts, and which of them are missing.
+//! The folder of a campaign: its manifest, its parts, which of them are missing, and all of them as one table and one answer.
 
 use std::collections::hash_map::RandomState;
 use std::fs;
@@ -6,14 +6,36 @@ use std::hash::BuildHasher as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::error::{CampaignError, DamagedPart};
-use super::manifest::{Manifest, Program};
-use super::part::{self, Found};
-use super::plan::Campaign;
-use super::row::Row;
+use sha2::{Digest as _, Sha256};
 
-/// What a campaign leaves beside its parts, and takes from nobody else.
+use super::error::{CampaignError, DamagedPart};
+use super::flights::Campaign;
+use super::manifest::{Manifest, Program, base16};
+use super::row::{Row, fields};
+use super::shard::{self, Found};
+use super::summary::{Gathered, Summary};
+use crate::study::Study as _;
+use crate::table::{Cell, ParquetTable};
+use tautline_report::report::{write_atomically, write_atomically_with};
+
+/// The table's name in the folder of a campaign.
+pub const RESULTS: &str = "results.parquet";
+/// The answer's name in the folder of a campaign.
+pub const ANSWER: &str = "campaign.json";
+
+/// Rows of a group of the table, which is built in memory.
+const GROUP_ROWS: usize = 50_000;
+/// Files beside the parts, which a new campaign does not overwrite.
 const LEFT: [&str; 3] = ["results.parquet", "campaign.json", "campaign.html"];
+
+/// What a merge left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Merged {
+    /// The answer.
+    pub summary: Summary,
+    /// SHA-256 of the table.
+    pub sha256: String,
+}
 
 /// A folder and the campaign in it.
 #[derive(Clone, Debug)]
@@ -139,21 +161,21 @@ impl Folder {
     /// Reads the part of a shard.
     ///
     /// # Errors
-    /// [`CampaignError::Alarm`] where it was flown twice with different results, [`CampaignError::Foreign`] for a part of
+    /// [`CampaignError::Nondeterministic`] where it was flown twice with different results, [`CampaignError::Foreign`] for a part of
     /// another campaign, [`CampaignError::Machine`] where the file cannot be read.
     pub fn read(&self, shard: u64) -> Result<Found, CampaignError> {
         let kept = self.part(shard);
         let other = self.differs(shard);
         if other.exists() {
-            return Err(CampaignError::Alarm { shard, kept, other });
+            return Err(CampaignError::Nondeterministic { shard, kept, other });
         }
-        part::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
+        shard::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
     }
 
     /// The row of a run under a law, counted from 0; none where it has not been flown.
     ///
     /// # Errors
-    /// As [`Folder::read`], and [`CampaignError::Holes`] where its part is damaged.
+    /// As [`Folder::read`], and [`CampaignError::MissingShards`] where its part is damaged.
     pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, CampaignError> {
         let manifest = self.campaign.manifest();
         let Some(shard) = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)) else {
@@ -162,7 +184,7 @@ impl Folder {
         match self.read(shard)? {
             Found::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
             Found::Nothing => Ok(None),
-            Found::Damaged(why) => Err(CampaignError::Holes {
+            Found::Damaged(why) => Err(CampaignError::MissingShards {
                 list: shard.to_string(),
                 shards: manifest.shards,
                 damaged: vec![DamagedPart { shard, path: self.part(shard), why }],
@@ -192,6 +214,75 @@ impl Folder {
     }
 }
 
+impl Folder {
+    /// Writes `results.parquet` and `campaign.json`: the same bytes for any number of shards and threads, in whatever order and
+    /// however often interrupted they were flown. Runs after which enough was known are left out, whether they were flown or not.
+    ///
+    /// # Errors
+    /// [`CampaignError::MissingShards`] where shards are missing or damaged, [`CampaignError::Foreign`] where one is of another campaign,
+    /// [`CampaignError::Nondeterministic`] where one was flown twice with different results, [`CampaignError::Machine`].
+    pub fn merge(&self) -> Result<Merged, CampaignError> {
+        let path = self.file(RESULTS);
+        let summary = write_atomically_with(&path, |file| {
+            let failed =
+                |error: parquet::errors::ParquetError| CampaignError::writing(&path, std::io::Error::other(error));
+            let copy = file.try_clone().map_err(|error| CampaignError::writing(&path, error))?;
+            let (columns, cells): (Vec<_>, Vec<_>) = fields(self.campaign()).into_iter().unzip();
+            let about = ["tautline.campaign", &self.campaign().manifest().campaign];
+            let mut table = ParquetTable::create(columns, about, copy).map_err(failed)?;
+            let mut rows: Vec<Vec<Cell>> = Vec::new();
+            let summary = self.gather(&mut |row| {
+                rows.push(cells.iter().map(|cell| cell(row)).collect());
+                if rows.len() == GROUP_ROWS {
+                    table.write(&std::mem::take(&mut rows)).map_err(failed)?;
+                }
+                Ok(())
+            })?;
+            if !rows.is_empty() {
+                table.write(&rows).map_err(failed)?;
+            }
+            table.close().map_err(failed)?;
+            Ok::<_, CampaignError>(summary)
+        })?;
+        let answer = self.file(ANSWER);
+        let json = summary.to_json().map_err(|error| CampaignError::writing(&answer, error.into()))?;
+        write_atomically(&answer, json.as_bytes())?;
+        let bytes = fs::read(&path).map_err(|error| CampaignError::reading(&path, error))?;
+        Ok(Merged { summary, sha256: base16(&Sha256::digest(&bytes)) })
+    }
+
+    /// The answer of what was flown, without writing it.
+    ///
+    /// # Errors
+    /// As [`Folder::merge`].
+    pub fn summary(&self) -> Result<Summary, CampaignError> {
+        self.gather(&mut |_| Ok(()))
+    }
+
+    /// The answer of all rows that count, each of which `take` receives in order.
+    fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), CampaignError>) -> Result<Summary, CampaignError> {
+        let mut gathered = Gathered::new(self.campaign());
+        for shard in 0..self.campaign().manifest().shards {
+            if gathered.is_enough() {
+                break;
+            }
+            let Found::Whole(rows) = self.read(shard)? else { return Err(self.missing_from(shard)?) };
+            for row in &rows {
+                if gathered.take(row) {
+                    take(row)?;
+                }
+            }
+        }
+        Ok(gathered.finish(self.campaign()))
+    }
+
+    fn missing_from(&self, from: u64) -> Result<CampaignError, CampaignError> {
+        let missing: Vec<_> = self.missing()?.into_iter().filter(|&shard| shard >= from).collect();
+        let damaged = missing.iter().filter_map(|&shard| self.damaged(shard).transpose()).collect::<Result<_, _>>()?;
+        Ok(CampaignError::MissingShards { list: listed(&missing), shards: self.campaign().manifest().shards, damaged })
+    }
+}
+
 /// Rows of a process that is under way, or was killed.
 pub(super) const JOURNAL: &str = "journal";
 
@@ -216,7 +307,7 @@ pub fn listed(shards: &[u64]) -> String {
 /// The shards of a list such as `7`, `3-5`, `13,500-502`, or `env:NAME` with such a list in that variable.
 ///
 /// # Errors
-/// [`CampaignError::Plan`] for what is no list, and for a shard beyond the last one.
+/// [`CampaignError::Input`] for what is no list, and for a shard beyond the last one.
 pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, CampaignError> {
     let help = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
     let wrong = |why: String| CampaignError::plan(why, help);

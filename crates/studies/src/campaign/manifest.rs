@@ -8,10 +8,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::error::CampaignError;
+use crate::SCHEMA_VERSION;
 use tautline_report::report::write_atomically;
-
-/// Version of the keys of `manifest.json` and of the parts: raised when one is renamed, removed or changes its meaning.
-pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// Everything that a shard needs to be flown anywhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

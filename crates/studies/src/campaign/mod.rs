@@ -5,45 +5,31 @@
 //! merged into one table of a row a flight and a [`Summary`]. The bytes of both are the same for any number of shards,
 //! threads, machines and interruptions.
 
-mod again;
 mod bins;
+mod document;
 mod error;
-mod fly;
+mod flights;
 mod folder;
-mod html;
 mod manifest;
-mod merge;
-mod overlaps;
-mod part;
-mod place;
-mod plan;
+mod replay;
 mod request;
-mod result;
 mod row;
 mod shard;
 mod spec;
-mod table;
+mod summary;
 mod tally;
 mod vary;
-mod words;
-mod worst;
 
 pub use bins::{Bin, BinShares, Varied};
 pub use error::{CampaignError, DamagedPart};
-pub use folder::{Folder, listed, parse};
-pub use html::{CampaignPage, WorstFlight};
+pub use flights::{Campaign, Law, MOST_RUNS};
+pub use folder::{ANSWER, Folder, Merged, RESULTS, listed, parse};
 pub use manifest::{Manifest, Program};
-pub use merge::{ANSWER, Merged, RESULTS};
-pub use part::Found;
-pub use plan::{Campaign, Law, MOST_RUNS};
-pub use request::{
-    CampaignAnswer, CampaignRequest, MOST_WORST, ReplayRequest, campaign, fly_shards, merge, missing_shards, replay,
-    report,
-};
-pub use result::{BadRun, LawSummary, Pair, Quantiles, SCHEMA_VERSION, Summary};
+pub use replay::{ReplayRequest, WorstFlight, replay};
+pub use request::{CampaignAnswer, CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
 pub use row::{Known, Row};
-pub use shard::Shard;
-pub use spec::{Asked, Method, Spec, SplittingKeys, Stop};
+pub use shard::{Found, Shard};
+pub use spec::{Method, Spec, SplittingKeys, Stop};
+pub use summary::{BadRun, LawSummary, Pair, Quantiles, Summary, Worst};
 pub use tally::{BoundKind, Intervals, Tally, UpperBound};
 pub use vary::{Grid, Variation};
-pub use worst::Worst;

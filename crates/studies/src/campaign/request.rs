@@ -4,13 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::{
-    ANSWER, Asked, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally, again,
-};
-use crate::compare::Watch;
-use crate::threads;
+use super::replay::{WorstFlight, fly_worst_again};
+use super::{ANSWER, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally};
+use crate::Question;
+use crate::batch::Batch;
+use crate::study::{Study as _, StudyPage};
+use tautline_core::text::counted;
 use tautline_report::report::write_atomically;
-use tautline_report::request::{Failure, Monitor, Pictures, RECORDING, command_line, in_range};
+use tautline_report::request::{Failure, Monitor, Pictures, command_line, in_range};
 
 /// The page for people.
 const PAGE: &str = "campaign.html";
@@ -45,19 +46,6 @@ pub struct CampaignAnswer {
     pub folder: PathBuf,
 }
 
-/// Which flight of a campaign is flown again, and where its files go.
-#[derive(Clone, Debug)]
-pub struct ReplayRequest {
-    /// Number of the run, from 0.
-    pub run: u64,
-    /// The law; the first by default.
-    pub law: Option<String>,
-    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
-    pub bad: Option<usize>,
-    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
-    pub out: Option<PathBuf>,
-}
-
 impl CampaignRequest {
     /// A campaign as its specification says, of which the ten worst flights are flown again.
     #[must_use]
@@ -82,7 +70,7 @@ impl CampaignRequest {
         })?;
         let mut spec = Spec::read(&shown, &text)?;
         if self.until_width.is_some() || self.until_decided.is_some() {
-            let stop = spec.stop.unwrap_or(Stop { of: Asked::Clear, width: None, decided: None });
+            let stop = spec.stop.unwrap_or(Stop { of: Question::Clear, width: None, decided: None });
             spec.stop = Some(Stop {
                 width: self.until_width.or(stop.width),
                 decided: self.until_decided.or(stop.decided),
@@ -120,7 +108,7 @@ pub fn campaign(
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
     in_range("--worst", &request.worst, &(0..=MOST_WORST))?;
-    let threads = threads(request.threads)?;
+    let batch = Batch::new(request.threads, monitor)?;
     let folder = request.plan()?;
     let campaign = folder.campaign();
     let manifest = campaign.manifest();
@@ -133,8 +121,7 @@ pub fn campaign(
             break;
         }
         warn_of_damage(&folder, shard, monitor)?;
-        let watch = Watch { flown: &|steps| monitor.advance(steps), interrupted: monitor.interruption().as_ref() };
-        let rows = match folder.fly(shard, threads, watch)? {
+        let rows = match folder.fly(shard, &batch)? {
             Shard::Kept(rows) => {
                 monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
                 rows
@@ -158,7 +145,7 @@ pub fn campaign(
         let seconds = began.elapsed().as_secs_f64();
         let an_hour = 3600.0 * flights as f64 / seconds;
         let what = if campaign.splitting().is_some() { "estimates" } else { "flights" };
-        let on = if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
+        let on = counted(batch.threads() as u64, "thread", "threads");
         monitor.say(&format!("{flights} {what} in {seconds:.1} s on {on}: {an_hour:.0} an hour"));
     }
     merge(&folder, request.worst, pictures, monitor)
@@ -169,13 +156,13 @@ pub fn campaign(
 /// # Errors
 /// [`Failure`] where the system refuses.
 pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn Monitor) -> Result<bool, Failure> {
+    let batch = Batch::new(Some(threads), monitor)?;
     let manifest = folder.campaign().manifest();
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
     for &shard in shards {
         warn_of_damage(folder, shard, monitor)?;
-        let watch = Watch { flown: &|steps| monitor.advance(steps), interrupted: monitor.interruption().as_ref() };
-        monitor.say(&match folder.fly(shard, threads, watch)? {
+        monitor.say(&match folder.fly(shard, &batch)? {
             Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
             Shard::Flown { flown, .. } => format!("shard {shard}: {flown} flights flown"),
             Shard::Interrupted => {
@@ -257,14 +244,19 @@ fn answer(
         monitor.warn(&format!("note: {note}"));
     }
     monitor.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
-    let flown = again::flown_again(folder, &summary, worst, pictures, monitor)?;
+    let flights = fly_worst_again(folder, &summary, worst, pictures, monitor)?;
     let path = folder.file(PAGE);
     if monitor.is_interrupted() {
         monitor.warn("interrupted: no page was written");
         return Ok(None);
     }
     let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
-    let page = flown.page(&command, &folder.campaign().manifest().spec);
+    let page = StudyPage {
+        commands: vec![command, folder.campaign().manifest().spec.clone()],
+        sections: vec![WorstFlight::section(&flights)],
+        has_replays: flights.iter().any(|flight| flight.replay.is_some()),
+        ..StudyPage::default()
+    };
     write_atomically(&path, summary.to_html(&page).as_bytes())?;
     if let Some(sha256) = sha256 {
         monitor.say(&format!("{sha256}  {}", folder.file(RESULTS).display()));
@@ -273,69 +265,4 @@ fn answer(
         monitor.say(&format!("wrote {}", path.display()));
     }
     Ok(Some(CampaignAnswer { summary, folder: folder.path().to_owned() }))
-}
-
-/// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
-/// Returns whether it passes.
-///
-/// # Errors
-/// [`Failure`] where there is no such flight, it has another state hash, or the system refuses.
-pub fn replay(
-    folder: &Folder,
-    request: &ReplayRequest,
-    pictures: &dyn Pictures,
-    monitor: &dyn Monitor,
-) -> Result<bool, Failure> {
-    let campaign = folder.campaign();
-    let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
-    let law = match &request.law {
-        None => campaign.laws().first(),
-        Some(name) => campaign.laws().iter().find(|law| law.name == *name),
-    };
-    let Some(law) = law else {
-        let said = request.law.as_deref().unwrap_or_default();
-        return Err(Failure::input(
-            "campaign/unknown-law",
-            format!("no law of this campaign is named {said}"),
-            format!("its laws are {}", names.join(", ")),
-        ));
-    };
-    let runs = campaign.manifest().runs;
-    if request.run >= runs {
-        let help = format!("its runs are 0 to {}", runs - 1);
-        return Err(Failure::input("campaign/no-run", format!("the campaign has no run {}", request.run), help));
-    }
-    if campaign.splitting().is_some() {
-        let bad = request.bad.unwrap_or_default();
-        let default = || again::place_of_bad(folder, &law.name, request.run, bad);
-        let place = request.out.clone().unwrap_or_else(default);
-        let hash = again::fly_bad(folder, law, [request.run, bad as u64], &place)?;
-        let recording = place.join(RECORDING);
-        monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", recording.display()));
-        return Ok(false);
-    }
-    if let Some(out) = request.out.as_ref().filter(|out| out.join("report.json").exists()) {
-        let message = format!("{} holds a finished run", out.display());
-        return Err(Failure::input("files/finished", message, "give another folder with --out"));
-    }
-    let out = request.out.clone().unwrap_or_else(|| again::place(folder, &law.name, request.run));
-    again::replay(folder, request.run, law, out, pictures, monitor)
-}
-
-impl From<CampaignError> for Failure {
-    fn from(error: CampaignError) -> Self {
-        match error {
-            CampaignError::Scenario { under, error, .. } => {
-                let failure = Self::from(*error);
-                if under.is_empty() { failure } else { failure.under(under.trim_end_matches(": ")) }
-            }
-            CampaignError::Flight { run, law, error } => {
-                Self::from(*error).under(&format!("run {run} under the law {law}"))
-            }
-            other => {
-                let failure = Self::new(other.code(), other.is_machine(), other.to_string());
-                other.help().into_iter().fold(failure, Self::with_help)
-            }
-        }
-    }
 }

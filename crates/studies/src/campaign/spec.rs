@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::error::CampaignError;
 use super::vary::Variation;
+use crate::Question;
 use crate::splitting::Settings;
 
 /// Words by which a table of `[vary]` says how it draws; another table holds keys of the scenario.
@@ -92,40 +93,26 @@ impl From<SplittingKeys> for Settings {
 pub struct Stop {
     /// Which share it is about.
     #[serde(default)]
-    pub of: Asked,
+    pub of: Question,
     /// Once the interval of every law's share is no wider than this.
     pub width: Option<f64>,
     /// Once every law's share is known to be above or below this.
     pub decided: Option<f64>,
 }
 
-/// What a flight has to show to count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Asked {
-    /// No two vehicles come closer than delta, proved to the end of the flight.
-    #[default]
-    Clear,
-    /// The formation is reached and kept to the end.
-    Reached,
-    /// Both, as far as the scenario asks.
-    Pass,
-}
-
 impl Spec {
     /// Reads the TOML of a specification, which messages call `name`.
     ///
     /// # Errors
-    /// [`CampaignError::Spec`] for what is not TOML and for keys that there are not, with their place.
+    /// [`CampaignError::Input`] for what is not TOML and for keys that there are not, with their place.
     pub fn read(name: &str, text: &str) -> Result<Self, CampaignError> {
-        let wrong = |why: String| CampaignError::Spec { name: name.to_owned(), why };
-        toml::from_str(text).map_err(|error| wrong(error.to_string().trim_end().to_owned()))
+        toml::from_str(text).map_err(|error| CampaignError::specification(name, error.to_string().trim_end()))
     }
 
     /// The specification as TOML that reads back as the same one.
     ///
     /// # Errors
-    /// [`CampaignError::Plan`] for numbers that TOML cannot hold, such as a seed of 64 bits.
+    /// [`CampaignError::Input`] for numbers that TOML cannot hold, such as a seed of 64 bits.
     pub fn to_toml(&self) -> Result<String, CampaignError> {
         let wrong = |error: toml::ser::Error| CampaignError::plan(error.to_string(), "choose a seed below 2^63");
         toml::to_string(self).map_err(wrong)
@@ -142,7 +129,7 @@ impl Spec {
     /// The keys of `[vary]`, with their tables' names before them, in the order of the alphabet.
     ///
     /// # Errors
-    /// [`CampaignError::Vary`] for what is no variation.
+    /// [`CampaignError::Input`] for what is no variation.
     pub fn variations(&self) -> Result<BTreeMap<String, Variation>, CampaignError> {
         let mut keys = BTreeMap::new();
         flatten("", &self.vary, &draws, &mut keys);
@@ -171,7 +158,7 @@ impl Stop {
     /// Refuses numbers that no share can reach.
     ///
     /// # Errors
-    /// [`CampaignError::Plan`].
+    /// [`CampaignError::Input`].
     pub fn check(&self) -> Result<(), CampaignError> {
         let inside = |number: f64| number > 0.0 && number < 1.0;
         for (key, number) in [("stop.width", self.width), ("stop.decided", self.decided)] {
@@ -189,6 +176,61 @@ impl Stop {
         }
         Ok(())
     }
+}
+
+/// Refuses keys of which one is the other, or a part of it, and a varied law where laws are named.
+pub(super) fn refuse_overlaps(
+    sets: &BTreeMap<String, toml::Value>,
+    variations: &BTreeMap<String, Variation>,
+    names_laws: bool,
+) -> Result<(), CampaignError> {
+    let place = |key: &String| format!("{}.{key}", if sets.contains_key(key) { "set" } else { "vary" });
+    let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
+    if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
+        let refused = CampaignError::plan(
+            format!("`{key}` is not a key of a scenario"),
+            "write the key as --set takes it: time.dt_s",
+        );
+        return Err(refused.at(&place(key)));
+    }
+    let plain = |key: &String| {
+        let axis = |part: &str| match part {
+            "x" => "1".to_owned(),
+            "y" => "2".to_owned(),
+            "z" => "3".to_owned(),
+            other => other.to_owned(),
+        };
+        key.split('.').map(axis).collect::<Vec<_>>()
+    };
+    let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
+    for (k, key) in all.iter().enumerate() {
+        let varies = |number: usize| number >= sets.len();
+        let clash = |&number: &usize| {
+            let (one, other) = (plain(key), plain(all[number]));
+            (varies(k) || varies(number)) && (one.starts_with(&other) || other.starts_with(&one))
+        };
+        if let Some(other) = (0..k).find(clash) {
+            let places = if varies(k) && varies(other) { "both in [vary]" } else { "in [set] and in [vary]" };
+            let refused = CampaignError::plan(
+                format!("{} and {key} stand {places}, and one is the other or a part of it", all[other]),
+                "a key either has one value or differs from run to run: take one of them out",
+            );
+            return Err(refused.at(&format!("vary.{key}")));
+        }
+    }
+    let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
+    match variations.keys().find(is_law) {
+        Some(key) if names_laws => Err(CampaignError::plan(
+            format!("{key} stands in [vary], and laws are named beside it"),
+            "name laws to fly each of them from the same starts, or vary the law, and not both",
+        )
+        .at(&format!("vary.{key}"))),
+        _ => Ok(()),
+    }
+}
+
+fn is_word(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_' || c == '-'
 }
 
 #[cfg(test)]
@@ -218,7 +260,7 @@ mod tests {
         let variations = spec.variations().expect("variations");
         assert_eq!(variations.keys().collect::<Vec<_>>(), ["network.loss", "start.jitter_m", "start.seed"]);
         assert_eq!(variations["start.seed"], Variation::Seed {});
-        assert_eq!(spec.stop.map(|stop| stop.of), Some(Asked::Clear));
+        assert_eq!(spec.stop.map(|stop| stop.of), Some(Question::Clear));
         let again = Spec::read("again", &spec.to_toml().expect("TOML")).expect("read");
         assert_eq!(again, spec);
     }
@@ -234,7 +276,7 @@ mod tests {
             Spec::read("s", "scenario = 'p'\n[vary]\nlaw.alpha = { unifrom = [0.0, 1.0] }").expect("TOML").variations();
         assert!(said.expect_err("no variation").to_string().contains("law.alpha.unifrom"));
         for (width, decided) in [(Some(0.0), None), (None, Some(1.0)), (Some(f64::NAN), None), (None, None)] {
-            assert!(Stop { of: Asked::Clear, width, decided }.check().is_err());
+            assert!(Stop { of: Question::Clear, width, decided }.check().is_err());
         }
     }
 }

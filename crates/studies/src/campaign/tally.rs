@@ -1,7 +1,8 @@
 //! Rows counted in their order, up to where enough has been flown.
 
 use super::row::{Known, Row};
-use super::spec::{Asked, Stop};
+use super::spec::Stop;
+use crate::Question;
 use crate::statistics::{CONFIDENCE, Proportion, anytime};
 
 /// Runs after which it is first asked whether enough has been flown; then after twice as many, and so on.
@@ -110,11 +111,11 @@ impl Counts {
 
     /// The share that shows what is asked.
     #[must_use]
-    pub fn share(&self, asked: Asked, intervals: Intervals) -> Proportion {
-        match asked {
-            Asked::Clear => intervals.share(self.clear, self.unknown, self.flown),
-            Asked::Reached => intervals.share(self.reached, 0, self.flown),
-            Asked::Pass => intervals.share(self.pass, 0, self.flown),
+    pub fn share(&self, question: Question, intervals: Intervals) -> Proportion {
+        match question {
+            Question::Clear => intervals.share(self.clear, self.unknown, self.flown),
+            Question::Reached => intervals.share(self.reached, 0, self.flown),
+            Question::Pass => intervals.share(self.pass, 0, self.flown),
         }
     }
 

@@ -78,9 +78,9 @@ impl Variation {
     /// What a table `[vary]` says of a key.
     ///
     /// # Errors
-    /// [`CampaignError::Vary`] for what is no variation, and for one between whose ends there is nothing.
+    /// [`CampaignError::Input`] for what is no variation, and for one between whose ends there is nothing.
     pub fn read(key: &str, said: &toml::Value) -> Result<Self, CampaignError> {
-        let wrong = |why: String| CampaignError::Vary { key: key.to_owned(), why };
+        let wrong = |why: String| CampaignError::variation(key, &why);
         if said.as_str() == Some(BY_RUN) {
             return Ok(Self::Seed {});
         }

@@ -1,52 +1,61 @@
-//! What is left of a comparison that is interrupted.
+//! An interrupted comparison, wrong laws, and times to reach.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use super::{Comparison, Options, by_law};
+use crate::base::BaseScenario;
+use crate::batch::Batch;
+use crate::study::{Experiment as _, Study as _};
+use crate::tests::{InterruptAfter, base, batch};
+use tautline_report::request::Failure;
+use tautline_sim::scenario::Source;
 
-use super::{CompareError, Plan, Watch};
-use tautline_sim::scenario::{Override, Source, Template};
-
-fn plan(laws: &[&str], runs: u64) -> Result<Plan, CompareError> {
-    let short = Override::parse("time.duration_s=1.5").expect("an override");
-    let template = Template::read(&Source::Builtin("pentagon".to_owned()), &[short]).expect("a built-in");
-    Plan::new(template, laws, runs, 3)
+fn pentagon() -> BaseScenario {
+    base(Source::Builtin("pentagon".to_owned()), &["time.duration_s=1.5"])
 }
 
-/// The comparison that is interrupted once so many steps have been flown.
-fn interrupted_after(steps: u64, threads: usize) -> super::Comparison {
-    let (interrupted, flown) = (AtomicBool::new(false), AtomicU64::new(0));
-    let count = |more: u64| {
-        let now = flown.fetch_add(more, Ordering::Relaxed) + more;
-        interrupted.store(now >= steps, Ordering::Relaxed);
-    };
-    let plan = plan(&["edge-tension", "laplacian"], 3).expect("a plan");
-    plan.fly(threads, Watch { flown: &count, interrupted: &interrupted }).expect("a comparison")
+fn options(laws: &[&str], runs: u64) -> Options {
+    Options { laws: Some(laws.iter().map(|&law| law.to_owned()).collect()), runs, seed: 3 }
+}
+
+fn interrupted_after(steps: u64, threads: usize) -> Option<Comparison> {
+    let monitor = InterruptAfter::new(steps);
+    let batch = Batch::new(Some(threads), &monitor).expect("a batch");
+    options(&["edge-tension", "laplacian"], 3).fly(&pentagon(), &batch).expect("no failure")
 }
 
 #[test]
-fn an_interrupted_comparison_is_about_the_starts_that_were_flown_under_every_law() {
+fn an_interrupted_comparison_has_the_starts_that_were_flown_under_every_law() {
     // 360 steps a flight: the third, of the second start, is under way.
-    let found = interrupted_after(360 * 2 + 100, 1);
+    let found = interrupted_after(360 * 2 + 100, 1).expect("a comparison");
     assert_eq!((found.runs, found.runs_asked), (1, 3));
     assert!(found.laws.iter().all(|law| law.flights.len() == 1 && law.flights[0].seed == 3));
     assert!(found.laws.iter().all(|law| law.flights[0].steps == 360), "whole flights");
     assert!(found.notes()[0].starts_with("interrupted: of 3 starts, 1 were flown"), "{:?}", found.notes());
-    let nothing = interrupted_after(100, 1);
-    assert!(nothing.runs == 0 && nothing.laws.iter().all(|law| law.flights.is_empty() && law.clear.share.is_none()));
-    // Two threads, each with a law of the second start: the law that is through with it stays with its start.
-    let paired = interrupted_after(360 * 3 + 200, 2);
+    assert!(interrupted_after(100, 1).is_none());
+    // Two threads, each with a law of the second start: the law that has finished it keeps its start.
+    let paired = interrupted_after(360 * 3 + 200, 2).expect("a comparison");
     assert!(paired.laws[0].flights.iter().zip(&paired.laws[1].flights).all(|(one, other)| one.seed == other.seed));
     assert!(paired.laws.iter().all(|law| law.flights.len() as u64 == paired.runs && law.name == law.kind));
-    let whole = interrupted_after(u64::MAX, 2);
+    let whole = interrupted_after(u64::MAX, 2).expect("a comparison");
     assert_eq!((whole.runs, whole.laws[1].flights.len()), (3, 3));
     assert!(!whole.notes().iter().any(|note| note.starts_with("interrupted")));
 }
 
 #[test]
-fn a_plan_needs_laws_that_it_knows_once_each() {
-    assert!(matches!(plan(&[], 1), Err(CompareError::NoLaw)));
-    assert!(matches!(plan(&["laplacian", "laplacian"], 1), Err(CompareError::Twice(name)) if name == "laplacian"));
-    assert!(matches!(plan(&["none"], 1), Err(CompareError::Law(_))));
-    assert_eq!(plan(&["laplacian"], 4).expect("a plan").steps(), 4 * 360);
+fn a_start_that_was_not_flown_under_every_law_is_left_out() {
+    let flown = [Some(10), Some(11), None, Some(21), Some(30), Some(31), Some(40), None, None, None];
+    assert_eq!(by_law(flown.to_vec(), 2), [vec![10, 30], vec![11, 31]]);
+    assert_eq!(by_law(Vec::<Option<u8>>::new(), 3), vec![Vec::<u8>::new(); 3]);
+}
+
+#[test]
+fn unknown_laws_and_laws_named_twice_are_refused() {
+    let refused = |laws: &[&str]| {
+        let flown = batch(1, &mut |batch| options(laws, 1).fly(&pentagon(), batch));
+        flown.map_err(|failure: Failure| failure.code()).expect_err("refused")
+    };
+    assert_eq!(refused(&[]), "compare/no-law");
+    assert_eq!(refused(&["laplacian", "laplacian"]), "compare/law-twice");
+    assert_eq!(refused(&["none"]), "scenario/unknown-choice");
 }
 
 /// A mission whose first leg is cut off, and whose second is reached.
@@ -71,10 +80,9 @@ start_s = START_S
 fn times_to_reach_are_of_flights_that_reached_alone() {
     let of = |start_s: &str| {
         let text = CUT_SHORT.replace("START_S", start_s);
-        let template = Template::read(&Source::Text { name: "t".to_owned(), text }, &[]).expect("a scenario");
-        let plan = Plan::new(template, &["displacement"], 1, 0).expect("a plan");
-        let never = AtomicBool::new(false);
-        plan.fly(1, Watch { flown: &|_| {}, interrupted: &never }).expect("a comparison").laws.remove(0)
+        let base = base(Source::Text { name: "t".to_owned(), text }, &[]);
+        let flown = batch(1, &mut |batch| options(&["displacement"], 1).fly(&base, batch));
+        flown.expect("no failure").expect("a comparison").laws.remove(0)
     };
     let [cut, whole] = [of("1"), of("\"reached\"")];
     assert!(!cut.flights[0].reached && cut.flights[0].reached_at_s.is_some(), "its last leg was");

@@ -1,11 +1,9 @@
 //! The search finds where an answer turns, and says what it looked at.
 
-use std::sync::atomic::AtomicBool;
-
-use super::search::{Found, Range, search};
-use super::{Asked, Margin, Plan, Question};
-use crate::compare::Watch;
-use tautline_sim::scenario::Source;
+use super::{Found, Margin, Options, Range, search};
+use crate::Question;
+use crate::study::{Experiment as _, Study as _};
+use crate::tests::{base, batch, pair};
 
 fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
     Range { from, to, scan, halvings, logarithmic: false }
@@ -84,35 +82,22 @@ fn a_search_that_is_broken_off_says_only_what_it_knows() {
     assert_eq!((before, after), (0.0, 0.5));
 }
 
-/// A pair that starts too far apart.
-const PAIR: &str = r#"name = "pair"
-[start]
-positions_m = [[0.0, 0.0], [4.0, 0.0]]
-[formation]
-shape = "line"
-spacing_m = 3.0
-[law]
-delta_m = 2.0
-alpha = 0.5
-[time]
-duration_s = 2.0
-record_hz = 10
-"#;
+fn options(key: &str, range: Range, question: Question, runs: u64, seed: u64) -> Options {
+    Options { key: key.to_owned(), range, question, runs, seed }
+}
 
-fn margin_in(key: &str, range: Range, asked: Asked) -> Margin {
-    let source = Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() };
-    let plan = Plan::new(source, &[], key, range, asked).expect("a plan");
-    let interrupted = AtomicBool::new(false);
-    let one = plan.search(1, Watch { flown: &|_| {}, interrupted: &interrupted }).expect("flown").expect("found");
-    let two = plan.search(2, Watch { flown: &|_| {}, interrupted: &interrupted }).expect("flown").expect("found");
-    assert_eq!(one, two, "the number of threads changes nothing");
+fn margin_of(options: &Options) -> Margin {
+    let base = base(pair(), &[]);
+    let [one, two] =
+        [1, 2].map(|threads| batch(threads, &mut |batch| options.fly(&base, batch)).expect("flown").expect("found"));
+    let timeless = |margin: &Margin| margin.to_json().expect("JSON");
+    assert_eq!(timeless(&one), timeless(&two), "the number of threads changes nothing");
     one
 }
 
 #[test]
 fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
-    let asked = Asked { question: Question::Reached, runs: 1, seed: 0 };
-    let margin = margin_in("time.duration_s", range(1.5, 40.0, 3, 6), asked);
+    let margin = margin_of(&options("time.duration_s", range(1.5, 40.0, 3, 6), Question::Reached, 1, 0));
     let turn = margin.turn.expect("it takes time to arrive");
     assert!(!turn.holds_below, "{turn:?}");
     let [holds, fails] = margin.sides().expect("both sides");
@@ -124,30 +109,18 @@ fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
 }
 
 #[test]
-fn a_key_that_takes_whole_numbers_alone_is_halved_at_whole_numbers() {
-    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
-    let any = margin_in("time.record_hz", range(1.0, 8.0, 3, 2), asked);
+fn a_key_that_takes_integers_only_is_halved_at_whole_numbers() {
+    let margin = |key| margin_of(&options(key, range(1.0, 8.0, 3, 2), Question::Clear, 1, 0));
+    let any = margin("time.record_hz");
     assert!(any.probes.iter().any(|probe| probe.value.fract() != 0.0), "record_hz takes any number");
-    let whole = margin_in("start.seed", range(1.0, 8.0, 3, 2), asked);
+    let whole = margin("start.seed");
     let values: Vec<_> = whole.probes.iter().map(|probe| probe.value).collect();
     assert_eq!(values, [1.0, 5.0, 8.0]);
 }
 
 #[test]
-fn a_key_that_measures_takes_any_number_though_a_millionth_beside_its_ends_is_refused() {
-    let asked = Asked { question: Question::Clear, runs: 1, seed: 0 };
-    let plan = |key: &str| {
-        let source = Source::Builtin("crazyflies".to_owned());
-        Plan::new(source, &[], key, range(0.0, 1.0, 9, 6), asked).expect("a plan")
-    };
-    assert!(!plan("sensing.latency_s").is_whole());
-    assert!(plan("noise.seed").is_whole());
-}
-
-#[test]
 fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
-    let asked = Asked { question: Question::Clear, runs: 3, seed: 7 };
-    let margin = margin_in("law.alpha", range(0.5, 1.0, 2, 1), asked);
+    let margin = margin_of(&options("law.alpha", range(0.5, 1.0, 2, 1), Question::Clear, 3, 7));
     assert!(margin.turn.is_none() && margin.holds_everywhere() && margin.jittered);
     for probe in &margin.probes {
         let seeds: Vec<_> = probe.flights.iter().map(|flown| flown.seed).collect();
@@ -160,10 +133,10 @@ fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
 
 #[test]
 fn ranges_that_are_none_and_values_that_cannot_be_flown_are_refused() {
-    let asked = Asked { question: Question::Pass, runs: 1, seed: 0 };
     let refused = |key: &str, range: Range| {
-        let source = Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() };
-        Plan::new(source, &[], key, range, asked).expect_err("refused").to_string()
+        let options = options(key, range, Question::Pass, 1, 0);
+        let flown = options.check().and_then(|()| batch(1, &mut |batch| options.fly(&base(pair(), &[]), batch)));
+        flown.expect_err("refused").to_string()
     };
     assert!(refused("law.alpha", range(1.0, 1.0, 2, 1)).contains("both ends"));
     assert!(refused("law.alpha", range(f64::NAN, 1.0, 2, 1)).contains("NaN"));

@@ -1,24 +1,106 @@
-//! The probability that a flight is violated.
+//! The probability that a flight is violated: its settings, one estimate, several of them, and violated flights flown again.
 
 use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::bad::{BadFlight, begun};
-use super::levels::{Rule, Split, split};
-use super::lineage::Lineage;
-use super::path::Path;
-use super::settings::{Settings, SplittingError};
-use tautline_core::record::{Sample, StateHash};
+use super::levels::{Path, Rule, Split, split};
+use super::lineage::{Genealogy, Lineage};
+use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{Saved, SimError, Simulation};
+use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
+
+/// Flights from which on estimates seldom end with nothing.
+const ENOUGH: usize = 100;
+/// Estimates below which Student's interval of what is skewed is too optimistic to go without a word.
+const MANY: usize = 20;
+
+/// How flights are split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Flights at a time, n; 100 and more are good, 2 the least.
+    pub flights: usize,
+    /// At least so many are ended in a round, k, less than n: 1 is the most accurate for the steps flown.
+    pub kill: usize,
+    /// Most bad flights that are kept.
+    pub keep: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { flights: ENOUGH, kill: 1, keep: 10 }
+    }
+}
+
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error)]
+pub enum SplittingError {
+    /// Too few flights for one to be a copy of another.
+    #[error("splitting with {flights} flights: at least 2 are needed, and 100 are advised")]
+    Flights {
+        /// So many.
+        flights: usize,
+    },
+    /// A number to be ended that leaves none, or ends none.
+    #[error("splitting that ends {kill} of {flights} flights in a round: between 1 and {} are possible", flights - 1)]
+    Kill {
+        /// So many are to be ended.
+        kill: usize,
+        /// Of so many.
+        flights: usize,
+    },
+    /// Two flights that go on from one state are the same flight.
+    #[error(
+        "nothing in this flight is random from step to step, and splitting needs two flights from one state to differ: add \
+         turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses or jitter \
+         of messages (network.loss, network.jitter_s)"
+    )]
+    NoNoise,
+    /// Law or judge do not exist.
+    #[error(transparent)]
+    Flight(#[from] SimError),
+}
+
+impl Settings {
+    /// Whether there are flights to be ended, and others to take their place.
+    ///
+    /// # Errors
+    /// [`SplittingError::Flights`] and [`SplittingError::Kill`].
+    pub fn check(&self) -> Result<(), SplittingError> {
+        let &Self { flights, kill, .. } = self;
+        if flights < 2 {
+            return Err(SplittingError::Flights { flights });
+        }
+        if kill == 0 || kill >= flights {
+            return Err(SplittingError::Kill { kill, flights });
+        }
+        Ok(())
+    }
+
+    /// What is to be said before so few flights are flown.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        (self.flights < ENOUGH).then(|| warning(self.flights as u64)).flatten()
+    }
+}
+
+/// What is to be said of so few flights.
+fn warning(flights: u64) -> Option<String> {
+    (flights < ENOUGH as u64).then(|| {
+        format!(
+            "{flights} flights at a time are few: where the event is rare, most estimates end at 0 and a few far above the truth, \
+             so that their mean is right only over very many of them; take {ENOUGH} or more"
+        )
+    })
+}
 
 /// An estimate of the probability that a flight is violated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Splitting {
     /// Its number under its seed.
     pub repetition: u64,
-    /// The estimate, without bias; a single one says nothing of how far off it is: [`super::Repetitions`] does.
+    /// The estimate, without bias; a single one says nothing of how far off it is: [`Repetitions`] does.
     pub probability: f64,
     /// Flights at a time.
     pub flights: u64,
@@ -55,7 +137,7 @@ pub fn estimate(
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Splitting>, SplittingError> {
     check(scenario, settings)?;
-    let mut path = Flown { scenario, simulation: begun(scenario, scenario.noise_seed)? };
+    let mut path = Running { scenario, simulation: begun(scenario, scenario.noise_seed)? };
     let rule = Rule::new(settings.flights, settings.kill, 0.0);
     let Some(mut split) = split(&mut path, rule, [seed, repetition], carry_on)? else { return Ok(None) };
     let bad = bad(&mut path, &mut split, settings.keep);
@@ -82,12 +164,12 @@ fn is_noisy(scenario: &Scenario) -> bool {
 }
 
 /// A flight under way.
-struct Flown<'a> {
+struct Running<'a> {
     scenario: &'a Scenario,
     simulation: Simulation,
 }
 
-impl Path for Flown<'_> {
+impl Path for Running<'_> {
     type Saved = Saved;
     type Error = SimError;
 
@@ -118,7 +200,7 @@ impl Path for Flown<'_> {
 }
 
 /// So many of the flights that were violated, those of different first ancestors first.
-fn bad(path: &mut Flown<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFlight> {
+fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFlight> {
     let hit: Vec<_> = split.lineages.iter().filter(|lineage| lineage.score() > 0.0).collect();
     let ancestor = |lineage: &Lineage<_>| lineage.genealogy().noise_seed;
     let earlier = |index: usize| hit[..index].iter().filter(|other| ancestor(other) == ancestor(hit[index])).count();
@@ -139,4 +221,173 @@ fn bad(path: &mut Flown<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFl
         })
     })
     .collect()
+}
+
+/// A flight that was violated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BadFlight {
+    /// How it is flown again.
+    pub genealogy: Genealogy,
+    /// The step in which it was violated, from 1; 0 is the start.
+    pub violated_at_step: u64,
+    /// The smallest clearance up to there \[m\], below 0.
+    pub clearance_m: f64,
+    /// SHA-256 over time, positions, velocities and commands after that step, as [`tautline_core::record::StateHash`] has it.
+    pub state_hash: String,
+}
+
+/// Hash over the state after one step, as [`BadFlight::state_hash`] has it.
+#[derive(Clone, Debug)]
+pub struct StateAt {
+    step: u64,
+    seen: u64,
+    hash: Option<String>,
+}
+
+impl StateAt {
+    /// Of the step in which a flight was violated.
+    #[must_use]
+    pub fn violation_of(flight: &BadFlight) -> Self {
+        Self { step: flight.violated_at_step, seen: 0, hash: None }
+    }
+
+    /// The hash, once the step has been flown.
+    #[must_use]
+    pub fn hash(&self) -> Option<&str> {
+        self.hash.as_deref()
+    }
+}
+
+impl Sink for StateAt {
+    fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        if self.seen == self.step {
+            let mut hash = StateHash::new();
+            hash.observe(&Sample::new(step.time_s, self.seen, step.swarm, step.control));
+            self.hash = Some(hash.finish());
+        }
+        self.seen += 1;
+    }
+}
+
+/// Flies a flight again to its end, with the same bits, and hands what is recorded to `sink`.
+///
+/// The scenario must be the one that was split.
+///
+/// # Errors
+/// [`SimError`] where law or judge do not exist, or the recording cannot be kept.
+pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -> Result<Flight, SimError> {
+    let mut simulation = begun(scenario, genealogy.noise_seed)?;
+    let mut branches = genealogy.branches.iter().peekable();
+    let mut take_over = |simulation: &mut Simulation| {
+        while let Some(branch) = branches.next_if(|branch| branch.step == simulation.steps()) {
+            simulation.load(&simulation.save(), Some(branch.noise_seed));
+        }
+        ControlFlow::Continue(())
+    };
+    let _goes_on = take_over(&mut simulation);
+    fly_on(simulation, sink, &mut take_over)
+}
+
+/// The scenario at its start, with the noise of a seed.
+fn begun(scenario: &Scenario, noise_seed: u64) -> Result<Simulation, SimError> {
+    Simulation::new(&Scenario { noise_seed, ..scenario.clone() })
+}
+
+/// The mean of independent estimates of one probability, with its interval.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Repetitions {
+    /// Number of estimates.
+    pub repetitions: u64,
+    /// Their mean, which has no bias, with Student's interval, cut off at 0 and 1. It is that of normal values, and estimates
+    /// are skewed, the more the fewer flights each has: `advice` says where that matters.
+    pub probability: Estimate,
+    /// [`CONFIDENCE`].
+    pub confidence: f64,
+    /// Estimates that ended with nothing, at 0.
+    pub extinct: Proportion,
+    /// Steps flown for all of them.
+    pub steps: u64,
+    /// What is to be said with the interval, if anything.
+    pub advice: Vec<String>,
+}
+
+impl Repetitions {
+    /// Of repetitions under one seed, each of another number.
+    #[must_use]
+    pub fn new(estimates: &[Splitting]) -> Self {
+        let probabilities: Vec<_> = estimates.iter().map(|estimate| estimate.probability).collect();
+        let extinct = estimates.iter().filter(|estimate| estimate.extinct).count();
+        let all_extinct = extinct == estimates.len();
+        let Estimate { value, low, high } = Estimate::mean(&probabilities);
+        let low = low.map(|low| low.max(0.0));
+        // Where no estimate has found anything there is no spread to tell how much more there may be.
+        let high = high.map(|high| high.min(1.0)).filter(|_| !all_extinct);
+        let fewest = estimates.iter().map(|estimate| estimate.flights).min();
+        let mut advice: Vec<_> = fewest.and_then(warning).into_iter().collect();
+        if extinct > 0 {
+            advice.push(format!(
+                "{extinct} of {} estimates ended with no flight left, at 0: {}; fly more at a time",
+                estimates.len(),
+                if all_extinct { "there is no upper bound" } else { "the mean rests on the others" }
+            ));
+        }
+        if estimates.len() < MANY {
+            advice.push(format!(
+                "the interval of {} estimates is that of normal values, which estimates are not; {MANY} or more make it near that",
+                estimates.len()
+            ));
+        }
+        Self {
+            repetitions: estimates.len() as u64,
+            probability: Estimate { value, low, high },
+            confidence: CONFIDENCE,
+            extinct: Proportion::new(extinct as u64, estimates.len() as u64),
+            steps: estimates.iter().map(|estimate| estimate.steps).sum(),
+            advice,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(probability: f64, flights: u64) -> Splitting {
+        Splitting {
+            repetition: 0,
+            probability,
+            flights,
+            kill: 1,
+            iterations: 0,
+            extinct: probability == 0.0,
+            steps: 10,
+            bad: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn estimates_are_told_with_what_is_to_be_said_of_them() {
+        let many = Repetitions::new(&vec![[estimate(0.25, 100), estimate(0.75, 100)]; 10].concat());
+        assert_eq!((many.advice.as_slice(), many.steps, many.probability.value), ([].as_slice(), 200, Some(0.5)));
+        // s = 0.2565, t = 2.093 for 19 degrees of freedom.
+        assert!(many.probability.low.is_some_and(|low| (low - 0.37996).abs() < 1e-4));
+        let few = Repetitions::new(&[estimate(1e-6, 20), estimate(0.0, 20)]);
+        assert_eq!((few.probability.low, few.extinct.count, few.advice.len()), (Some(0.0), 1, 3));
+        assert!(few.advice[0].contains("20 flights at a time are few") && few.advice[1].contains("1 of 2"));
+    }
+
+    #[test]
+    fn nothing_found_is_no_bound() {
+        let none = Repetitions::new(&vec![estimate(0.0, 100); 30]);
+        assert_eq!((none.probability.value, none.probability.high), (Some(0.0), None));
+        assert!(none.advice[0].contains("no upper bound"));
+    }
 }

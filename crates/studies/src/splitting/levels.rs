@@ -1,10 +1,38 @@
-//! The algorithm.
+//! The algorithm: paths, levels and the random choices between them.
 
 use std::ops::ControlFlow;
 
-use super::draws::Draws;
-use super::lineage::{Crossing, Lineage, Watch};
-use super::path::Path;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+
+use super::lineage::{Crossing, Lineage, StepCounter};
+
+/// A random path that is made step by step, one at a time in the same place.
+pub trait Path {
+    /// Everything of it at one instant, random numbers included.
+    type Saved;
+    /// Why a path cannot be begun.
+    type Error;
+
+    /// Begins anew, with random numbers of a seed.
+    ///
+    /// # Errors
+    /// Where there is no such path.
+    fn begin(&mut self, noise_seed: u64) -> Result<(), Self::Error>;
+
+    /// Goes on by a step; false, and nothing else, where it is at its end.
+    fn step(&mut self) -> bool;
+
+    /// How near the event it has come so far: the larger, the nearer. It never falls.
+    fn score(&self) -> f64;
+
+    /// Everything as it is now.
+    fn save(&self) -> Self::Saved;
+
+    /// Becomes what was saved and goes on with the same bits as if it had never been left; with a `noise_seed`, all that is drawn
+    /// from now on is drawn from it and nothing else changes.
+    fn restore(&mut self, saved: &Self::Saved, noise_seed: Option<u64>);
+}
 
 /// What is split, and how.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +91,7 @@ pub fn split<P: Path>(
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Split<P::Saved>>, P::Error> {
     let Rule { flights, kill, target, is_past } = rule;
-    let (mut draws, mut watch) = (Draws::new(seed, repetition), Watch { steps: 0, carry_on });
+    let (mut draws, mut watch) = (Draws::new(seed, repetition), StepCounter { steps: 0, carry_on });
     let mut lineages = Vec::with_capacity(flights);
     for _ in 0..flights {
         match Lineage::begin(path, draws.noise_seed(), target, &mut watch)? {
@@ -116,4 +144,34 @@ fn level<S>(lineages: &[Lineage<S>], k: usize) -> f64 {
     let mut scores: Vec<_> = lineages.iter().map(Lineage::score).collect();
     scores.sort_by(f64::total_cmp);
     scores.get(k.saturating_sub(1)).copied().unwrap_or(f64::INFINITY)
+}
+
+/// Seeds of noise and choices of survivors, of one repetition under a seed; those of others are independent.
+#[derive(Clone, Debug)]
+struct Draws(ChaCha8Rng);
+
+impl Draws {
+    fn new(seed: u64, repetition: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(repetition);
+        Self(random)
+    }
+
+    /// A seed that a scenario file can hold.
+    fn noise_seed(&mut self) -> u64 {
+        self.0.next_u64() >> 1
+    }
+
+    /// One of 0, 1, ... below `count`, each as likely; 0 of none.
+    fn below(&mut self, count: usize) -> usize {
+        let count = (count as u64).max(1);
+        // Words beyond the last whole multiple would favour the first ones.
+        let whole = u64::MAX - u64::MAX % count;
+        loop {
+            let word = self.0.next_u64();
+            if word < whole {
+                return usize::try_from(word % count).unwrap_or_default();
+            }
+        }
+    }
 }

@@ -1,10 +1,11 @@
-//! A path with what it takes to branch off from it.
+//! A path, the random numbers that it was made of, and what it takes to branch off from it.
 
 use std::ops::ControlFlow;
 use std::rc::Rc;
 
-use super::genealogy::{Branch, Genealogy};
-use super::path::Path;
+use serde::{Deserialize, Serialize};
+
+use super::levels::Path;
 
 /// Most states that are kept of a path besides the one that it began with.
 const KEPT: usize = 8;
@@ -12,13 +13,44 @@ const KEPT: usize = 8;
 /// Steps between two states that are kept, at first.
 const FIRST_APART: u64 = 16;
 
-/// Steps that were flown, and who is asked after each whether to go on.
-pub(super) struct Watch<'a> {
+/// The random numbers that a path was made of, as they came one after the other: with them it can be made again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Genealogy {
+    /// Its seed of noise at the start.
+    pub noise_seed: u64,
+    /// Where other random numbers took over, in the order of steps.
+    pub branches: Vec<Branch>,
+}
+
+/// Where a path left the one that it is a copy of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Branch {
+    /// The last step that both have in common, from 1; 0 is the start.
+    pub step: u64,
+    /// The seed of noise from there on.
+    pub noise_seed: u64,
+}
+
+impl Genealogy {
+    /// Of a path that is no copy.
+    pub(super) fn new(noise_seed: u64) -> Self {
+        Self { noise_seed, branches: Vec::new() }
+    }
+
+    /// Of a copy up to a step.
+    pub(super) fn branched(&self, branch: Branch) -> Self {
+        let branches = self.branches.iter().copied().chain([branch]).collect();
+        Self { noise_seed: self.noise_seed, branches }
+    }
+}
+
+/// Counts steps, and calls `carry_on` after each.
+pub(super) struct StepCounter<'a> {
     pub(super) steps: u64,
     pub(super) carry_on: &'a mut dyn FnMut(u64) -> ControlFlow<()>,
 }
 
-impl Watch<'_> {
+impl StepCounter<'_> {
     fn flown(&mut self) -> ControlFlow<()> {
         self.steps += 1;
         (self.carry_on)(self.steps)
@@ -78,7 +110,7 @@ impl<S> Lineage<S> {
         path: &mut P,
         noise_seed: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> Result<ControlFlow<(), Self>, P::Error> {
         path.begin(noise_seed)?;
         let mut lineage = Self {
@@ -99,7 +131,7 @@ impl<S> Lineage<S> {
         at: &Crossing<S>,
         noise_seed: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> ControlFlow<(), Self> {
         let &Crossing { step, score, ref saved } = at;
         path.restore(saved, Some(noise_seed));
@@ -119,7 +151,7 @@ impl<S> Lineage<S> {
         path: &mut P,
         mut step: u64,
         target: f64,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> ControlFlow<(), Self> {
         while self.score <= target && path.step() {
             step += 1;
@@ -162,7 +194,7 @@ impl<S> Lineage<S> {
         &self,
         path: &mut P,
         is_past: impl Fn(f64) -> bool,
-        watch: &mut Watch<'_>,
+        watch: &mut StepCounter<'_>,
     ) -> Option<ControlFlow<(), Crossing<S>>> {
         let &Record { step, score } = self.records.iter().find(|record| is_past(record.score))?;
         Some(match self.reach(path, step, watch) {
@@ -174,12 +206,13 @@ impl<S> Lineage<S> {
     /// Takes the path to its last record, and says which step that is.
     pub(super) fn last<P: Path<Saved = S>>(&self, path: &mut P) -> Option<u64> {
         let step = self.records.last()?.step;
-        let reached = self.reach(path, step, &mut Watch { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
+        let reached =
+            self.reach(path, step, &mut StepCounter { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
         reached.is_continue().then_some(step)
     }
 
     /// Makes the path again up to a step, from the last state that is kept before it.
-    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut Watch<'_>) -> ControlFlow<()> {
+    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut StepCounter<'_>) -> ControlFlow<()> {
         if let Some(state) = self.states.iter().rev().find(|state| state.step <= step) {
             path.restore(&state.saved, state.noise_seed);
             for _ in state.step..step {
@@ -228,7 +261,7 @@ mod tests {
     #[test]
     fn few_states_are_kept_and_every_record_is_found_again() {
         let mut carry_on = |_| ControlFlow::Continue(());
-        let mut watch = Watch { steps: 0, carry_on: &mut carry_on };
+        let mut watch = StepCounter { steps: 0, carry_on: &mut carry_on };
         let mut path = Climb(0);
         let ControlFlow::Continue(mut climb) = Lineage::begin(&mut path, 1, f64::INFINITY, &mut watch).expect("a path")
         else {

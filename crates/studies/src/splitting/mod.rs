@@ -8,26 +8,12 @@
 //! [`estimate`] asks for the probability that a flight is violated, [`Repetitions`] gives the interval of several estimates, and
 //! [`replay`] flies a bad flight again.
 
-mod bad;
-mod draws;
 mod estimate;
-mod genealogy;
 mod levels;
 mod lineage;
-mod path;
-mod repetitions;
-mod settings;
-
-pub use bad::{BadFlight, StateAt, replay};
-pub use estimate::{Splitting, check, estimate};
-pub use genealogy::{Branch, Genealogy};
-pub use levels::{Rule, Split, split};
-pub use lineage::Lineage;
-pub use path::Path;
-pub use repetitions::Repetitions;
-pub use settings::{Settings, SplittingError};
-
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod walk;
+
+pub use estimate::{BadFlight, Repetitions, Settings, Splitting, SplittingError, StateAt, check, estimate, replay};
+pub use levels::{Path, Rule, Split, split};
+pub use lineage::{Branch, Genealogy, Lineage};

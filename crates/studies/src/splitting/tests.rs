@@ -1,5 +1,7 @@
 //! Flights that are split: against plain flights, and flown again to the same bits.
 
+mod walk;
+
 use std::ops::ControlFlow;
 
 use super::{Genealogy, Repetitions, Settings, Splitting, SplittingError, estimate, replay};

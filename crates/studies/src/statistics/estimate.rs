@@ -3,7 +3,7 @@
 use serde::Serialize;
 use statrs::distribution::{Binomial, ContinuousCDF as _, DiscreteCDF as _, StudentsT};
 
-use super::confidence::TAIL;
+use super::TAIL;
 
 /// An estimate with its interval; a bound that so few values do not give is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -65,7 +65,7 @@ fn middle(sorted: &[f64], p: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{binomial_up_to, near};
+    use super::super::tests::{binomial_up_to, near};
     use super::*;
 
     #[test]

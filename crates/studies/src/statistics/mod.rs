@@ -4,19 +4,19 @@
 //! fixed beforehand. [`Proportion::upper_bound`] is one-sided, with at most 5 % above. Whoever wants to stop where the answer is known takes [`anytime`] and [`ConfidenceSequence`], which hold at
 //! every number of runs at once. `coverage` measures how often each of them holds the truth.
 
-mod confidence;
 mod estimate;
-mod paired;
 mod proportion;
 mod sequence;
 
-pub use confidence::CONFIDENCE;
 pub use estimate::Estimate;
-pub use paired::Paired;
-pub use proportion::Proportion;
+pub use proportion::{Paired, Proportion};
 pub use sequence::{ConfidenceSequence, anytime, looks};
 
+/// How often an interval holds the true value.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// Probability that an interval leaves out on either side.
+const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
+
 #[cfg(test)]
-mod coverage;
-#[cfg(test)]
-mod testing;
+mod tests;

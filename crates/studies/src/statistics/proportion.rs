@@ -1,9 +1,9 @@
-//! How often something happens, of a number of runs that was fixed beforehand.
+//! Shares of a number of runs that was fixed beforehand, and of pairs of runs.
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ContinuousCDF as _};
+use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
 
-use super::confidence::{CONFIDENCE, TAIL};
+use super::{CONFIDENCE, TAIL};
 
 /// So many of so many, with the interval of their share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -63,9 +63,71 @@ fn beta_quantile(a: f64, b: f64, p: f64) -> Option<f64> {
     Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok()
 }
 
+/// Pairs of runs that differ in one thing alone, such as the law, and of each run whether something happened.
+///
+/// Pairs in which it happened to both or to neither say nothing of which is the more likely; the others are discordant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Paired {
+    /// Pairs in which it happened to the first alone.
+    pub only_first: u64,
+    /// Pairs in which it happened to the second alone.
+    pub only_second: u64,
+    /// All pairs.
+    pub of: u64,
+    /// The two-sided p-value of the exact test of `McNemar` (Psychometrika 12, 1947): how likely discordant pairs are at least as uneven
+    /// where each favours either with the same probability. 1 where there are none.
+    pub p_value: f64,
+    /// The share of discordant pairs that are `only_first`, with the interval of Clopper and Pearson given their number.
+    pub first_of_discordant: Proportion,
+    /// Probability of the first less that of the second, from -1 to 1; none of none.
+    pub difference: Option<f64>,
+    /// The true difference is at least this.
+    pub low: f64,
+    /// And at most this.
+    pub high: f64,
+    /// [`CONFIDENCE`].
+    pub confidence: f64,
+}
+
+impl Paired {
+    /// What is known of `of` pairs; more discordant ones than pairs are taken for that many pairs.
+    ///
+    /// The difference of the two probabilities is psi (2 theta - 1), with psi the probability of a discordant pair and theta that
+    /// of one that favours the first. Its interval is conservative: intervals of Clopper and Pearson at 1 - alpha/2 for psi, of all
+    /// pairs, and for theta, of the discordant ones given their number, hold both at once with probability 1 - alpha at least
+    /// (Bonferroni), and the bounds are the least and the largest product within.
+    #[must_use]
+    pub fn new(only_first: u64, only_second: u64, of: u64) -> Self {
+        let discordant = only_first.saturating_add(only_second);
+        let of = of.max(discordant);
+        let [psi_low, psi_high] = clopper_pearson(discordant, of, 0.5 * TAIL);
+        let [theta_low, theta_high] = clopper_pearson(only_first, discordant, 0.5 * TAIL);
+        let [from, to] = [theta_low, theta_high].map(|theta| 2.0 * theta - 1.0);
+        Self {
+            only_first,
+            only_second,
+            of,
+            p_value: p_value(only_first.min(only_second), discordant),
+            first_of_discordant: Proportion::new(only_first, discordant),
+            difference: (of > 0).then(|| (only_first as f64 - only_second as f64) / of as f64),
+            low: (from * psi_low).min(from * psi_high),
+            high: (to * psi_low).max(to * psi_high),
+            confidence: CONFIDENCE,
+        }
+    }
+}
+
+/// Twice the probability of at most the `fewer` of two kinds that are as likely.
+fn p_value(fewer: u64, of: u64) -> f64 {
+    if of == 0 {
+        return 1.0;
+    }
+    Binomial::new(0.5, of).map_or(1.0, |even| (2.0 * even.cdf(fewer)).min(1.0))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{binomial_up_to, near};
+    use super::super::tests::{binomial_up_to, near};
     use super::*;
 
     #[test]
@@ -109,5 +171,60 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_p_value_is_that_of_the_sign_test() {
+        for (first, second, expected) in
+            [(10, 0, 2.0 / 1024.0), (0, 10, 2.0 / 1024.0), (5, 5, 1.0), (0, 0, 1.0), (1, 0, 1.0)]
+        {
+            near(Paired::new(first, second, 50).p_value, expected, 1e-12);
+        }
+        for of in 1..60 {
+            for first in 0..=of {
+                let expected = (2.0 * binomial_up_to(first.min(of - first), of, 0.5)).min(1.0);
+                near(Paired::new(first, of - first, 100).p_value, expected, 1e-10);
+            }
+        }
+    }
+
+    /// Under the null hypothesis a p-value is at most alpha with a probability of alpha at most.
+    #[test]
+    fn it_rejects_equal_laws_no_more_often_than_it_says() {
+        let law = |count: u64, of: u64| {
+            binomial_up_to(count, of, 0.5) - if count == 0 { 0.0 } else { binomial_up_to(count - 1, of, 0.5) }
+        };
+        for of in 1..80 {
+            for alpha in [0.01, 0.05, 0.2] {
+                let rejected = (0..=of).filter(|&first| Paired::new(first, of - first, of).p_value <= alpha);
+                let size: f64 = rejected.map(|first| law(first, of)).sum();
+                assert!(size <= alpha + 1e-12, "{size} of {of}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_difference_is_mirrored_by_exchanging_both_and_is_within_its_bounds() {
+        for (first, second, of) in [(10, 0, 100), (3, 8, 40), (0, 0, 20), (7, 7, 14), (500, 100, 10_000)] {
+            let (one, other) = (Paired::new(first, second, of), Paired::new(second, first, of));
+            near(one.low, -other.high, 1e-12);
+            near(one.high, -other.low, 1e-12);
+            assert!(
+                one.difference.is_some_and(|difference| one.low <= difference && difference <= one.high),
+                "{one:?}"
+            );
+            assert!(-1.0 <= one.low && one.high <= 1.0);
+        }
+        let none = Paired::new(0, 0, 0);
+        assert_eq!((none.difference, none.low, none.high), (None, -1.0, 1.0));
+        assert_eq!(Paired::new(3, 4, 5).of, 7);
+    }
+
+    #[test]
+    fn ten_to_nothing_tell_two_laws_apart_and_five_to_nothing_do_not() {
+        let ten = Paired::new(10, 0, 100);
+        assert!(ten.low > 0.0 && ten.p_value < 0.05 && ten.first_of_discordant.low > 0.5);
+        let five = Paired::new(5, 0, 100);
+        assert!(five.low < 0.0 && five.p_value > 0.05 && five.first_of_discordant.low < 0.5);
     }
 }

@@ -1,6 +1,6 @@
 //! Intervals that hold however often they are looked at.
 
-use super::confidence::CONFIDENCE;
+use super::CONFIDENCE;
 use super::proportion::Proportion;
 
 /// Both parameters of the beta mixture, Jeffreys' prior. Against 1 it has a third less to say against few: 0 of 10,000 bound the
@@ -90,7 +90,7 @@ impl ConfidenceSequence {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::near;
+    use super::super::tests::near;
     use super::*;
 
     /// The same ratio by its product, run by run: all hits first.

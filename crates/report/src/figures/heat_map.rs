@@ -1,0 +1,171 @@
+//! A number over a grid of two keys.
+
+use super::axis::{Axis, extent};
+use super::chart::{TITLE, WIDTH};
+use super::Figure;
+use tautline_core::text::at_least;
+
+use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};
+
+/// Space for the numbers and the label below the cells \[px\].
+const BELOW: f64 = 44.0;
+/// Space for the label of the vertical axis, and between the numbers and the cells \[px\].
+const LABEL: f64 = 32.0;
+const GAP: f64 = 6.0;
+/// Width of the colour scale, and the space for it with its numbers and its label \[px\].
+const SCALE: f64 = 14.0;
+const SCALE_SPACE: f64 = 92.0;
+/// Height of the cells together \[px\].
+const HEIGHT: f64 = 260.0;
+/// Steps of the colour scale.
+const STEPS: u32 = 40;
+/// Colours from the smallest to the largest number, which colour-blind people tell apart (cividis of Nunez, Anderton and
+/// Renslow, 2018) and whose lightness grows evenly. They are the same on light and dark paper.
+const COLOURS: [[u8; 3]; 6] =
+    [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
+
+/// One axis of a grid: a key, and its values in the order in which they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridAxis<'a> {
+    /// The key, whose name ends with its unit.
+    pub key: &'a str,
+    /// Its values.
+    pub values: &'a [f64],
+}
+
+/// A number over a grid of two keys as colours, with a colour scale. `numbers` has a row for each value of `y`, each with a cell
+/// for each value of `x`; a cell without a number is crossed out. The scale spans `range`, or the numbers themselves.
+#[must_use]
+pub fn heat_map(
+    name: &str,
+    label: &str,
+    [x, y]: [GridAxis<'_>; 2],
+    numbers: &[Option<f64>],
+    range: Option<[f64; 2]>,
+) -> Figure {
+    // Numbers that are not finite have no colour.
+    let numbers: Vec<_> = numbers.iter().map(|number| number.filter(|number| extent([*number]).is_some())).collect();
+    let known = || numbers.iter().flatten().copied();
+    let scale = match range {
+        Some([from, to]) => Axis::spanning(label, from, to, 5.0),
+        None => Axis::linear(label, known(), false),
+    };
+    let y_labels = y.values.iter().map(f64::to_string).collect::<Vec<_>>();
+    let left = LABEL + GAP + y_labels.iter().map(|label| text_px(label)).fold(0.0, f64::max);
+    let (right, bottom) = (WIDTH - SCALE_SPACE, TITLE + HEIGHT);
+    let (columns, rows) = (x.values.len().max(1), y.values.len().max(1));
+    let (width, height) = ((right - left) / columns as f64, HEIGHT / rows as f64);
+    let title = format!("{} over two keys", capitalised(label));
+    let mut canvas = Canvas::new((WIDTH, bottom + BELOW), &title, f64::midpoint(left, right));
+    let shown = |number: f64| scale.rounded_down(number);
+    let has_room =
+        numbers.iter().flatten().all(|&number| text_px(&shown(number)) + GAP <= width) && height >= TEXT + 2.0;
+    for (place, number) in numbers.iter().enumerate() {
+        let corner = (left + width * (place % columns) as f64, bottom - height * (1 + place / columns) as f64);
+        let Some(number) = number else {
+            let middle = (corner.0 + width / 2.0, corner.1 + height / 2.0);
+            canvas.marker(Marker::Cross, middle, 4.0_f64.min(0.3 * width.min(height)), SOFT_INK);
+            continue;
+        };
+        let (fill, ink) = colour(scale.place(*number).map_or(0.0, |place| scale.share(place)));
+        let words = has_room.then(|| shown(*number));
+        canvas.tile(corner, (width, height), &fill, words.map(|words| (words, ink)));
+    }
+    let every = |room: f64, count: usize, each: f64| -> usize {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
+        let most = (room / each).max(1.0) as usize;
+        count.div_ceil(most)
+    };
+    let x_labels = x.values.iter().map(f64::to_string).collect::<Vec<_>>();
+    let widest = x_labels.iter().map(|label| text_px(label)).fold(0.0, f64::max) + GAP;
+    for (k, words) in x_labels.iter().enumerate().step_by(every(right - left, columns, widest)) {
+        canvas.text((left + width * (k as f64 + 0.5), bottom + GAP), Align::CENTRE_ABOVE, words);
+    }
+    for (k, words) in y_labels.iter().enumerate().step_by(every(HEIGHT, rows, TEXT + 2.0)) {
+        canvas.text((left - GAP, bottom - height * (k as f64 + 0.5)), Align::RIGHT, words);
+    }
+    canvas.text((f64::midpoint(left, right), bottom + BELOW - 6.0), Align::CENTRE_BELOW, x.key);
+    canvas.text_upwards((17.0, TITLE + HEIGHT / 2.0), y.key);
+    let edge = right + 16.0;
+    let step = HEIGHT / f64::from(STEPS);
+    for k in 0..STEPS {
+        let (fill, _) = colour((f64::from(k) + 0.5) / f64::from(STEPS));
+        canvas.tile((edge, bottom - step * f64::from(k + 1)), (SCALE, step), &fill, None);
+    }
+    for &tick in &scale.ticks {
+        let (at, end) = (bottom - HEIGHT * scale.share(tick), edge + SCALE);
+        canvas.line(&[(end, at), (end + 4.0, at)], Stroke::solid(SOFT_INK, 0.8));
+        canvas.text((end + 7.0, at), Align::LEFT, &scale.tick_label(tick));
+    }
+    canvas.text_upwards((WIDTH - 5.0, TITLE + HEIGHT / 2.0), label);
+    canvas.figure(name, &description(label, [x, y], &numbers))
+}
+
+fn description(label: &str, [x, y]: [GridAxis<'_>; 2], numbers: &[Option<f64>]) -> String {
+    let without = numbers.iter().filter(|number| number.is_none()).count();
+    let spanned = match extent(numbers.iter().flatten().copied()) {
+        Some((low, high)) => format!("from {} to {}", at_least(low, 3), at_least(high, 3)),
+        None => "unknown everywhere".to_owned(),
+    };
+    let crossed = if without > 0 { format!("; {without} crossed cells have none") } else { String::new() };
+    format!("{} over {} (to the right) and {} (upwards): {spanned}{crossed}.", capitalised(label), x.key, y.key)
+}
+
+fn capitalised(words: &str) -> String {
+    let mut chars = words.chars();
+    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
+}
+
+/// The colour of a place on the scale, from 0 to 1, and a colour of words that can be read on it.
+fn colour(share: f64) -> (String, &'static str) {
+    let along = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of colours")]
+    let below = (along.floor() as usize).min(COLOURS.len() - 2);
+    let part = along - below as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
+    let channel = |k: usize| {
+        let [from, to] = [COLOURS[below][k], COLOURS[below + 1][k]].map(f64::from);
+        (from + part * (to - from)).round() as u8
+    };
+    let fill = format!("#{:02X}{:02X}{:02X}", channel(0), channel(1), channel(2));
+    (fill, if share < 0.55 { "#FFFFFE" } else { "#000001" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(numbers: &[Option<f64>]) -> Figure {
+        let x = GridAxis { key: "sensing.latency_s", values: &[0.0, 0.1, 0.2] };
+        let y = GridAxis { key: "network.loss", values: &[0.0, 0.5] };
+        heat_map("sweep", "smallest separation [m]", [x, y], numbers, None)
+    }
+
+    #[test]
+    fn each_number_has_a_colour_and_a_missing_one_is_crossed_out() {
+        let figure = map(&[Some(1.0), Some(2.0), Some(3.0), Some(1.5), None, Some(2.5)]);
+        assert_eq!(figure.svg.matches("<rect").count(), 1 + 5 + 40, "paper, cells and the scale");
+        for part in ["#00224E", "#FEE838", "sensing.latency_s", "network.loss", "smallest separation [m]", ">2.5<"] {
+            assert!(figure.svg.contains(part), "{part}: {}", figure.svg);
+        }
+        assert!(
+            figure.description.contains("from 1.000 to 3.000; 1 crossed cells have none"),
+            "{}",
+            figure.description
+        );
+    }
+
+    #[test]
+    fn grids_of_any_size_and_impossible_numbers_are_drawn() {
+        let values: Vec<_> = (0..50).map(|k| f64::from(k) / 7.0).collect();
+        let axis = GridAxis { key: "law.alpha", values: &values };
+        let numbers: Vec<_> = (0..2500).map(|k| Some(f64::from(k))).collect();
+        let large = heat_map("sweep", "share", [axis, axis], &numbers, Some([0.0, 1.0]));
+        assert!(large.svg.len() < 600_000, "{}", large.svg.len());
+        for numbers in [vec![None; 6], vec![Some(f64::NAN); 6], vec![Some(f64::INFINITY); 6], vec![Some(1e300); 6]] {
+            assert!(!map(&numbers).svg.contains("NaN"));
+        }
+        let none = GridAxis { key: "law.alpha", values: &[] };
+        assert!(heat_map("sweep", "share", [none, none], &[], None).svg.contains("law.alpha"));
+    }
+}

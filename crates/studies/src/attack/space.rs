@@ -1,0 +1,392 @@
+//! What an attack may vary, and how far.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::Options;
+use crate::base::BaseScenario;
+use tautline_core::swarm::{Rows, separation};
+use tautline_core::text::as_toml;
+use tautline_report::request::Failure;
+use tautline_sim::scenario::{Scenario, ScenarioError};
+
+/// A place between two bounds, neither an end nor the middle, at which a key is tried.
+const BETWEEN: f64 = 0.381_966;
+/// The axes of a point, as keys have them.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// Steps from one bound to the other that values are rounded to, so that a flight can be repeated with few digits.
+const STEPS: f64 = 1e6;
+/// Most decimals of a value.
+const MOST_DECIMALS: u8 = 15;
+
+/// A key of a scenario and the values between which it may be: an argument of `--vary`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variation {
+    /// The key, as for an override.
+    pub key: String,
+    /// Its smallest value.
+    pub low: f64,
+    /// Its largest value.
+    pub high: f64,
+}
+
+/// A number that a search chooses within bounds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Bound {
+    /// Its key.
+    pub key: String,
+    /// Its smallest value.
+    pub low: f64,
+    /// Its largest value.
+    pub high: f64,
+    /// Whether the number is an integer.
+    pub whole: bool,
+}
+
+impl fmt::Display for Variation {
+    /// As [`Variation::parse`] reads it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}..{}", self.key, self.low, self.high)
+    }
+}
+
+impl Variation {
+    /// Parses `KEY=LOW..HIGH`.
+    ///
+    /// # Errors
+    /// [`Failure`] `attack/variation`.
+    pub fn parse(text: &str) -> Result<Self, Failure> {
+        let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
+        let Some((key, (low, high))) = parts else { return Err(wrong(&format!("`{text}` is not KEY=LOW..HIGH"))) };
+        let number =
+            |text: &str| text.trim().parse::<f64>().map_err(|_| wrong(&format!("`{}` is not a number", text.trim())));
+        Self::new(key, number(low)?, number(high)?)
+    }
+
+    /// A key between two values.
+    ///
+    /// # Errors
+    /// [`Failure`] `attack/variation` for bounds that are not finite, or of which the first is not the smaller one.
+    pub fn new(key: &str, low: f64, high: f64) -> Result<Self, Failure> {
+        if !(low.is_finite() && high.is_finite() && (high - low).is_finite()) {
+            return Err(wrong(&format!("{key} is to be between {low} and {high}")));
+        }
+        if low >= high {
+            let why = format!("{key} is to be between {low} and {high}, of which the first is not the smaller one");
+            return Err(wrong(&why));
+        }
+        Ok(Self { key: key.to_owned(), low, high })
+    }
+
+    fn bound(&self, whole: bool) -> Bound {
+        Bound { key: self.key.clone(), low: self.low, high: self.high, whole }
+    }
+}
+
+impl Bound {
+    /// The value at a place from 0 to 1 between the bounds, rounded to a millionth of their distance, or to a whole number.
+    #[must_use]
+    pub fn at(&self, place: f64) -> f64 {
+        let Self { low, high, whole, .. } = *self;
+        if whole {
+            // Each whole number has the same share of the places.
+            return (low + ((high - low + 1.0) * place).floor()).clamp(low, high);
+        }
+        let value = low + (high - low) * place;
+        let decimals = tautline_core::text::decimals_of((high - low) / STEPS, MOST_DECIMALS);
+        let rounded = format!("{value:.decimals$}").parse().unwrap_or(value);
+        // Adding 0 turns -0 into 0.
+        f64::clamp(rounded, low, high) + 0.0
+    }
+}
+
+/// The failure of an argument of `--vary`.
+fn wrong(why: &str) -> Failure {
+    Failure::input(
+        "attack/variation",
+        format!("--vary: {why}"),
+        "write a key that is a number and two different finite numbers, the smaller one first, as in --vary network.loss=0..0.3",
+    )
+}
+
+/// The numbers that a search chooses, and the scenario that they change.
+#[derive(Clone, Debug)]
+pub struct SearchSpace {
+    base: BaseScenario,
+    options: Options,
+    bounds: Vec<Bound>,
+}
+
+impl SearchSpace {
+    /// The space of a search, all else being as the scenario says.
+    ///
+    /// # Errors
+    /// [`Failure`] where nothing is varied or a key twice, for a key that is no number of the scenario, and for flights and
+    /// seeds that do not fit.
+    pub fn new(base: &BaseScenario, options: &Options) -> Result<Self, Failure> {
+        let Options { flights, seeds, start_m, velocity_m_s, .. } = *options;
+        if seeds == 0 || flights < seeds {
+            return Err(Failure::input(
+                "attack/too-few-flights",
+                format!("of {flights} flights none is left for a candidate that is flown with {seeds} seeds"),
+                "give --flights at least as many as --seeds",
+            ));
+        }
+        let mut space = Self { base: base.clone(), options: options.clone(), bounds: Vec::new() };
+        let mut is_random = base.own().is_random_in_flight();
+        for variation in &options.vary {
+            space.check_key(&variation.key)?;
+            let (bound, varied) = space.bound(variation)?;
+            is_random |= varied.is_random_in_flight();
+            space.bounds.push(bound);
+        }
+        let reaches = [("the start", start_m), ("the velocity at the start", velocity_m_s)];
+        for (what, by) in reaches.into_iter().filter_map(|(what, by)| Some((what, by?))) {
+            if !(by.is_finite() && by > 0.0) {
+                return Err(Failure::input(
+                    "attack/out-of-range",
+                    format!("{what} is to be varied by {by}"),
+                    "give --start metres and --velocity metres a second, each a positive finite number",
+                ));
+            }
+        }
+        space.check_apart()?;
+        space.bounds.extend(space.start_bounds());
+        if space.bounds.is_empty() {
+            return Err(Failure::input(
+                "attack/nothing-varied",
+                "nothing is varied: the only flight to search is the scenario's own",
+                "say what may be varied: --start 1 moves every start by up to 1 m, --vary network.loss=0..0.3 a key",
+            ));
+        }
+        if seeds > 1 && !is_random {
+            return Err(Failure::input(
+                "attack/nothing-random",
+                format!("nothing in the flight is random: with each of {seeds} seeds it is the same"),
+                "leave --seeds out, or give the scenario turbulence, noise of measurement, loss or jitter",
+            ));
+        }
+        Ok(space)
+    }
+
+    /// Each number that is free, and its bounds.
+    #[must_use]
+    pub fn bounds(&self) -> &[Bound] {
+        &self.bounds
+    }
+
+    /// The value of each number at places from 0 to 1.
+    #[must_use]
+    pub fn values(&self, places: &[f64]) -> Vec<f64> {
+        self.bounds.iter().zip(places).map(|(bound, &place)| bound.at(place)).collect()
+    }
+
+    /// The overrides that fly a candidate of these values with the `k`-th seed of noise, from 0, on top of those that every
+    /// flight has.
+    #[must_use]
+    pub fn sets(&self, values: &[f64], k: u64) -> Vec<String> {
+        let of_keys = self.options.vary.len();
+        let keys = self.bounds.iter().zip(values).take(of_keys);
+        let mut sets: Vec<_> = keys.map(|(bound, &value)| format!("{}={}", bound.key, as_toml(value))).collect();
+        sets.extend(self.start(values.get(of_keys..).unwrap_or_default()));
+        if self.options.seeds > 1 {
+            sets.push(format!("noise.seed={}", self.noise_seed(k)));
+        }
+        sets
+    }
+
+    /// The seed of noise of a candidate's `k`-th flight, from 0.
+    #[must_use]
+    pub fn noise_seed(&self, k: u64) -> u64 {
+        self.base.own().noise_seed.saturating_add(k)
+    }
+
+    /// The flights of a candidate, one for each seed of noise.
+    ///
+    /// # Errors
+    /// Why the candidate is no attack: it cannot be flown, or two vehicles start nearer than asked.
+    pub fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
+        let flight = |k: u64| {
+            let scenario = self.scenario(values, k).map_err(|error| error.message().to_owned())?;
+            scenario.law().map_err(|error| error.to_string())?;
+            let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
+            match near_m {
+                Some((apart_m, near_m)) if near_m < apart_m => {
+                    Err(format!("two vehicles start {near_m} m apart, nearer than the {apart_m} m that were asked for"))
+                }
+                _ => Ok(scenario),
+            }
+        };
+        (0..self.options.seeds).map(flight).collect()
+    }
+
+    /// The flight of a candidate with the `k`-th seed of noise.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where it cannot be flown, as a start of two vehicles within delta.
+    pub fn scenario(&self, values: &[f64], k: u64) -> Result<Scenario, ScenarioError> {
+        self.base.with(&self.sets(values, k))
+    }
+
+    fn check_key(&self, key: &str) -> Result<(), Failure> {
+        let Options { start_m, velocity_m_s, .. } = self.options;
+        let same = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}.")) || b.starts_with(&format!("{a}."));
+        let twice = self.bounds.iter().any(|bound| same(&numbered(&bound.key), &numbered(key)));
+        let of_start = (start_m.is_some() || velocity_m_s.is_some()) && same(key, "start");
+        if twice || of_start {
+            return Err(Failure::input(
+                "attack/key-twice",
+                format!("{key} is varied twice"),
+                "vary each key once; --start and --velocity vary the whole of [start]",
+            ));
+        }
+        if key.rsplit('.').next() == Some("seed") {
+            return Err(Failure::input(
+                "attack/seed-varied",
+                format!("{key} is a seed: varying a seed does not make a scenario harder"),
+                "leave it out; --seeds K flies each candidate with K seeds of noise",
+            ));
+        }
+        Ok(())
+    }
+
+    /// The scenario itself must be a candidate: where it is none, hardly any is.
+    fn check_apart(&self) -> Result<(), Failure> {
+        let Some(apart_m) = self.options.apart_m else { return Ok(()) };
+        let (delta_m, own_m) = (self.base.own().delta_m, closest_start_m(self.base.own()));
+        let is_asked = apart_m.is_finite() && apart_m > delta_m && own_m >= apart_m;
+        if is_asked {
+            return Ok(());
+        }
+        Err(Failure::input(
+            "attack/out-of-range",
+            format!(
+                "starts are to be {apart_m} m apart, where delta is {delta_m} m and the scenario's own are {own_m} m apart"
+            ),
+            "give --apart a distance between the two, or leave it out",
+        ))
+    }
+
+    /// The bound of a key, and a scenario with a value within it.
+    ///
+    /// # Errors
+    /// [`Failure`] where neither a value between the bounds nor a bound can be read, and for a bound with a fraction of a key that
+    /// takes integers only.
+    fn bound(&self, variation: &Variation) -> Result<(Bound, Scenario), Failure> {
+        let Variation { ref key, low, high } = *variation;
+        let read = |value: f64| self.base.with(&[format!("{key}={}", as_toml(value))]);
+        let refused = |value: f64, error: ScenarioError| Failure::from(error).under(&format!("with {key} = {value}"));
+        let whole = self.base.takes_integers_only(key);
+        if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
+            read(end).map_err(|error| refused(end, error))?;
+        }
+        let bound = variation.bound(whole);
+        if let Ok(scenario) = read(bound.at(BETWEEN)) {
+            return Ok((bound, scenario));
+        }
+        // What cannot be flown at one end may be at the other.
+        let scenario = read(low).or_else(|error| read(high).map_err(|_| refused(low, error)))?;
+        Ok((bound, scenario))
+    }
+
+    /// What `--start` and `--velocity` leave free: each coordinate, positions before velocities.
+    fn start_bounds(&self) -> Vec<Bound> {
+        let of = |list: &str, rows: &Rows, by: Option<f64>| {
+            let Some(by) = by else { return Vec::new() };
+            let numbers =
+                (0..rows.nrows()).flat_map(|i| (0..self.base.own().space.dimensions()).map(move |axis| (i, axis)));
+            let bound = |(i, axis): (usize, usize)| Bound {
+                key: format!("start.{list}.{}.{}", i + 1, AXES[axis]),
+                low: rows[(i, axis)] - by,
+                high: rows[(i, axis)] + by,
+                whole: false,
+            };
+            numbers.map(bound).collect()
+        };
+        let start = &self.base.own().start;
+        let mut bounds = of("positions_m", &start.positions_m, self.options.start_m);
+        bounds.extend(of("velocities_m_s", &start.velocities_m_s, self.options.velocity_m_s));
+        bounds
+    }
+
+    /// The start as an override, where it is varied as a whole.
+    fn start(&self, values: &[f64]) -> Option<String> {
+        let Options { start_m, velocity_m_s, .. } = self.options;
+        (start_m.is_some() || velocity_m_s.is_some()).then(|| {
+            let axes = self.base.own().space.dimensions();
+            let count = self.base.own().count() * axes;
+            let split = if start_m.is_some() { count.min(values.len()) } else { 0 };
+            let start = &self.base.own().start;
+            let positions = self.list(start_m.map(|_| &values[..split]), &start.positions_m);
+            let velocities = self.list(velocity_m_s.map(|_| &values[split..]), &start.velocities_m_s);
+            let is_at_rest = velocity_m_s.is_none() && start.velocities_m_s.iter().all(|&speed_m_s| speed_m_s == 0.0);
+            let velocities = if is_at_rest { String::new() } else { format!(", velocities_m_s=[{velocities}]") };
+            format!("start={{positions_m=[{positions}]{velocities}}}")
+        })
+    }
+
+    /// Points as TOML: those of the values, or else the rows.
+    fn list(&self, values: Option<&[f64]>, rows: &Rows) -> String {
+        let axes = self.base.own().space.dimensions();
+        let value = |i: usize, axis: usize| values.and_then(|values| values.get(i * axes + axis).copied());
+        let point = |i: usize| {
+            let number = |axis: usize| as_toml(value(i, axis).unwrap_or(rows[(i, axis)]));
+            format!("[{}]", (0..axes).map(number).collect::<Vec<_>>().join(", "))
+        };
+        (0..rows.nrows()).map(point).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// A key with the numbers of axes for their names.
+fn numbered(key: &str) -> String {
+    let number = |part: &str| AXES.iter().position(|axis| *axis == part).map(|axis| (axis + 1).to_string());
+    key.split('.').map(|part| number(part).unwrap_or_else(|| part.to_owned())).collect::<Vec<_>>().join(".")
+}
+
+/// Smallest distance of two starts in the lengths that delta is one of \[m\].
+fn closest_start_m(scenario: &Scenario) -> f64 {
+    let places = scenario.metric().scaled_rows(&scenario.start.positions_m);
+    let count = places.nrows();
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+    pairs.map(|(i, j)| separation(&places, i, j)).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variation_is_a_key_and_two_numbers() {
+        let read = Variation::parse("start.positions_m.2.x = -1.5..0.25");
+        let expected = Variation::new("start.positions_m.2.x", -1.5, 0.25);
+        assert_eq!(read.expect("a variation"), expected.expect("a variation"));
+        for (text, said) in [
+            ("law.alpha", "is not KEY=LOW..HIGH"),
+            ("law.alpha=1", "is not KEY=LOW..HIGH"),
+            ("law.alpha=1..", "`` is not a number"),
+            ("law.alpha=a..2", "`a` is not a number"),
+            ("law.alpha=2..2", "not the smaller"),
+            ("law.alpha=3..2", "not the smaller"),
+            ("law.alpha=0..inf", "between 0 and inf"),
+            ("law.alpha=nan..1", "between NaN and 1"),
+            ("law.alpha=-1e308..1e308", "between"),
+        ] {
+            let refused = Variation::parse(text).expect_err(text);
+            assert!(refused.message().contains(said), "{text}: {refused}");
+        }
+    }
+
+    #[test]
+    fn values_have_few_digits_and_never_leave_their_bounds() {
+        let bound = Variation::new("key", -0.1, 2.0 / 3.0).expect("a variation").bound(false);
+        assert_eq!([bound.at(0.0), bound.at(1.0)], [bound.low, bound.high]);
+        for k in 0..=1000 {
+            let value = bound.at(f64::from(k) / 1000.0);
+            assert!((bound.low..=bound.high).contains(&value), "{value}");
+            assert!(k == 1000 || value.to_string().len() <= "-0.1234567".len(), "{value}");
+        }
+        let whole = Variation::new("key", 1.0, 3.0).expect("a variation").bound(true);
+        assert_eq!([0.0, 0.3, 0.34, 0.66, 0.67, 1.0].map(|place| whole.at(place)), [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+    }
+}

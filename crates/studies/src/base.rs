@@ -1,0 +1,174 @@
+//! The scenario that a study changes: its text with the overrides of the call, and the seeds of its runs.
+
+use serde::{Deserialize, Serialize};
+
+use crate::flight::{FlightSummary, Outcome};
+use crate::{MOST_RUNS, SEEDS};
+use tautline_core::text::metres;
+use tautline_report::request::{Failure, ScenarioRequest, in_range};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
+
+/// A start without randomness is moved by up to this part of delta along each axis.
+pub const JITTER: f64 = 0.05;
+
+/// The key of the jitter.
+pub(crate) const JITTER_KEY: &str = "start.jitter_m";
+
+/// A scenario as a study reads it again and again, each time with other keys.
+#[derive(Clone, Debug)]
+pub struct BaseScenario {
+    source: Source,
+    overrides: Vec<Override>,
+    template: Template,
+}
+
+impl BaseScenario {
+    /// Reads a scenario and its overrides.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where the scenario is wrong as it is.
+    pub fn read(source: Source, overrides: Vec<Override>) -> Result<Self, ScenarioError> {
+        let template = Template::read(&source, &overrides)?;
+        Ok(Self { source, overrides, template })
+    }
+
+    /// The scenario of a request.
+    ///
+    /// # Errors
+    /// [`Failure`] where an override or the scenario is wrong.
+    pub fn of(request: &ScenarioRequest) -> Result<Self, Failure> {
+        Ok(Self::read(request.source.clone(), request.parsed_overrides()?)?)
+    }
+
+    /// The scenario as it is.
+    #[must_use]
+    pub fn own(&self) -> &Scenario {
+        self.template.own()
+    }
+
+    /// The scenario as a pattern of flights under other laws.
+    #[must_use]
+    pub fn template(&self) -> &Template {
+        &self.template
+    }
+
+    /// Overrides of the call, as `--set` takes them.
+    pub fn sets(&self) -> impl Iterator<Item = String> + '_ {
+        self.overrides.iter().map(|set| set.text().to_owned())
+    }
+
+    /// The scenario with more overrides.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where the scenario cannot be flown with them.
+    pub fn with(&self, sets: &[String]) -> Result<Scenario, ScenarioError> {
+        let more = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>()?;
+        Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat())
+    }
+
+    /// Whether a key takes integers only.
+    #[must_use]
+    pub fn takes_integers_only(&self, key: &str) -> bool {
+        takes_integers_only(&self.source, &self.overrides, key)
+    }
+}
+
+/// Seeds of the flights of one value or point. A single flight has everything as the scenario says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Runs {
+    /// Number of flights.
+    pub count: u64,
+    /// Seed of the first; run k, from 0, has this plus k.
+    pub seed: u64,
+    /// Jitter of a start without randomness \[m\].
+    pub jitter_m: Option<f64>,
+}
+
+impl Runs {
+    /// Seeds from `seed` on. Several flights of which neither start nor flight is random get a jitter of 5 % of delta.
+    #[must_use]
+    pub fn new(count: u64, seed: u64, base: &BaseScenario, is_random: bool) -> Self {
+        let moves = count > 1 && !is_random && !base.template().start_is_random();
+        Self { count, seed, jitter_m: moves.then(|| JITTER * base.own().delta_m) }
+    }
+
+    /// Seed of a run, from 0.
+    #[must_use]
+    pub fn seed(&self, run: u64) -> u64 {
+        self.seed.saturating_add(run)
+    }
+
+    /// Overrides of a run, from 0. Overrides of keys that are varied follow them.
+    #[must_use]
+    pub fn sets(&self, run: u64) -> Vec<String> {
+        if self.count <= 1 {
+            return Vec::new();
+        }
+        let seed = self.seed(run);
+        let jitter = self.jitter_m.map(|jitter_m| format!("{JITTER_KEY}={jitter_m:?}"));
+        [format!("start.seed={seed}"), format!("noise.seed={seed}")].into_iter().chain(jitter).collect()
+    }
+}
+
+/// Refuses numbers of runs and seeds out of range.
+pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
+    in_range("--runs", &runs, &(1..=MOST_RUNS))?;
+    in_range("--seed", &seed, &SEEDS)
+}
+
+/// The note that a start without randomness is moved.
+pub(crate) fn jitter_note(jitter_m: f64) -> String {
+    format!(
+        "the start has no randomness: start.seed moves each coordinate by up to {} m ({} % of delta)",
+        metres(jitter_m),
+        100.0 * JITTER
+    )
+}
+
+/// What a flight has to show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Question {
+    /// No violation, proved to the end of the flight.
+    #[default]
+    Clear,
+    /// The formation is reached and kept to the end.
+    Reached,
+    /// Both, as far as the scenario asks.
+    Pass,
+}
+
+impl Question {
+    /// All questions.
+    pub const ALL: [Self; 3] = [Self::Pass, Self::Clear, Self::Reached];
+
+    /// Returns the name for `--verdict`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Clear => "clear",
+            Self::Reached => "reached",
+        }
+    }
+
+    /// Returns what a flight does that shows it, and what one does that does not.
+    #[must_use]
+    pub fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::Pass => ["passes", "fails"],
+            Self::Clear => ["stays clear", "does not stay clear"],
+            Self::Reached => ["reaches its formation", "does not reach its formation"],
+        }
+    }
+
+    /// Returns whether a flight shows it.
+    #[must_use]
+    pub fn holds(self, flight: &FlightSummary) -> bool {
+        match self {
+            Self::Pass => flight.pass,
+            Self::Clear => flight.outcome == Outcome::Clear,
+            Self::Reached => flight.reached,
+        }
+    }
+}

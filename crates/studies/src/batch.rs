@@ -1,0 +1,165 @@
+//! Many flights at once: on several threads, with progress, and with the same results for any number of threads.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use crate::THREADS;
+use crate::flight::{FlightSummary, fly};
+use tautline_report::request::{Failure, Monitor, in_range};
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim::SimError;
+
+/// Steps between two reports of progress.
+const PROGRESS_STEPS: u64 = 64;
+
+/// Flies scenarios on several threads. A [`Monitor`] receives the progress in steps and may interrupt the flights.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    threads: usize,
+    monitor: &'a dyn Monitor,
+    finishes_flights: bool,
+}
+
+impl<'a> Batch<'a> {
+    /// A batch on a number of threads, by default one a core.
+    ///
+    /// # Errors
+    /// [`Failure`] for a number of threads outside [`THREADS`].
+    pub fn new(threads: Option<usize>, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
+        let threads = threads.unwrap_or_else(|| rayon::current_num_threads().min(*THREADS.end()));
+        in_range("--threads", &threads, &THREADS)?;
+        Ok(Self { threads, monitor, finishes_flights: false })
+    }
+
+    /// The same batch, in which an interruption lets flights under way come to their end.
+    #[must_use]
+    pub fn finishing_flights(self) -> Self {
+        Self { finishes_flights: true, ..self }
+    }
+
+    /// Number of threads.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// The receiver of progress.
+    #[must_use]
+    pub fn monitor(&self) -> &'a dyn Monitor {
+        self.monitor
+    }
+
+    /// Returns whether the monitor has interrupted the batch.
+    #[must_use]
+    pub fn is_interrupted(&self) -> bool {
+        self.monitor.is_interrupted()
+    }
+
+    /// Calls `make` for 0, 1, ... below `count` on all threads and returns the results in this order. A result is `None`
+    /// where the batch was interrupted before or during the call.
+    ///
+    /// Within `make`, rayon has one thread: whole flights run side by side, never the parts of one flight, so that memory is that
+    /// of one flight a thread.
+    ///
+    /// # Errors
+    /// The error of the smallest number.
+    pub fn run<T: Send, E: Send>(
+        &self,
+        count: usize,
+        make: impl Fn(usize) -> Result<Option<T>, E> + Sync,
+    ) -> Result<Vec<Option<T>>, E> {
+        let next = AtomicUsize::new(0);
+        let take = || {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            (number < count).then(|| (number, if self.is_interrupted() { Ok(None) } else { make(number) }))
+        };
+        let work = || {
+            // Without a pool of its own, parts of a flight go to the global pool: slower, with the same bits.
+            let _single = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+            std::iter::from_fn(take).collect::<Vec<_>>()
+        };
+        let mut made: Vec<_> = thread::scope(|scope| {
+            let started =
+                (0..self.threads.min(count)).map_while(|_| thread::Builder::new().spawn_scoped(scope, work).ok());
+            let started: Vec<_> = started.collect();
+            let join = |thread: thread::ScopedJoinHandle<'_, Vec<_>>| {
+                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            started.into_iter().flat_map(join).collect()
+        });
+        // Where the system gives no thread at all, this thread does the work.
+        made.extend(std::iter::from_fn(take));
+        made.sort_by_key(|&(number, _)| number);
+        made.into_iter().map(|(_, made)| made).collect()
+    }
+
+    /// Flies a scenario to its end; `None` where the batch was interrupted.
+    ///
+    /// # Errors
+    /// [`SimError`] where the law or the judge cannot be built.
+    pub fn fly(&self, scenario: &Scenario, seed: u64) -> Result<Option<FlightSummary>, SimError> {
+        if self.is_interrupted() {
+            return Ok(None);
+        }
+        let mut reported = 0;
+        let flight = fly(scenario, seed, &mut self.carry_on(&mut reported, self.finishes_flights));
+        self.monitor.advance(scenario.time.steps().saturating_sub(reported));
+        flight
+    }
+
+    /// Returns a function that takes a number of steps, reports the progress and breaks after an interruption, unless flights
+    /// are finished.
+    pub fn carry_on<'b>(
+        &'b self,
+        reported: &'b mut u64,
+        finishes: bool,
+    ) -> impl FnMut(u64) -> ControlFlow<()> + use<'a, 'b> {
+        move |steps| {
+            if steps - *reported >= PROGRESS_STEPS {
+                self.monitor.advance(steps - *reported);
+                *reported = steps;
+            }
+            if !finishes && self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_report::request::Silent;
+
+    #[test]
+    fn results_come_in_order_once_each_for_any_number_of_threads() {
+        let monitor = Silent::default();
+        for threads in [1, 2, 7, 100] {
+            let batch = Batch::new(Some(threads), &monitor).expect("a batch");
+            let squares = batch.run(50, |number| Ok::<_, ()>(Some(number * number))).expect("squares");
+            assert_eq!(squares, (0..50).map(|number| Some(number * number)).collect::<Vec<_>>(), "{threads}");
+            assert_eq!(batch.run(0, |number| Ok::<_, ()>(Some(number))), Ok(Vec::new()));
+            let failed = batch.run(50, |number| if number % 20 == 9 { Err(number) } else { Ok(Some(())) });
+            assert_eq!(failed, Err(9));
+        }
+        assert!(Batch::new(Some(0), &monitor).is_err() && Batch::new(Some(257), &monitor).is_err());
+    }
+
+    #[test]
+    fn within_a_flight_there_is_one_thread() {
+        let monitor = Silent::default();
+        let batch = Batch::new(Some(2), &monitor).expect("a batch");
+        let threads = batch.run(8, |_| Ok::<_, ()>(Some(rayon::current_num_threads())));
+        assert_eq!(threads, Ok(vec![Some(1); 8]));
+    }
+
+    #[test]
+    fn an_interruption_ends_the_batch() {
+        let monitor = Silent::default();
+        let batch = Batch::new(Some(1), &monitor).expect("a batch");
+        let made = batch.run(5, |number| {
+            monitor.interruption.store(number == 1, Ordering::Relaxed);
+            Ok::<_, ()>(Some(number))
+        });
+        assert_eq!(made, Ok(vec![Some(0), Some(1), None, None, None]));
+    }
+}

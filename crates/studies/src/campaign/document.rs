@@ -1,0 +1,304 @@
+//! The answer of a campaign for people: a sentence, notes, tables and figures.
+
+use super::bins::{Bin, BinShares, Varied};
+use super::summary::{LawSummary, Pair, Quantiles, Summary};
+use super::tally::{BoundKind, Intervals};
+use crate::splitting::Repetitions;
+use crate::statistics::Proportion;
+use crate::study::{Block, Section, Study};
+use crate::table::{Kind, Table, percent_at_most, separated};
+use tautline_core::text::{counted, significant};
+use tautline_report::figures::{Figure, Histogram, Share as Point, histograms, shares};
+use tautline_report::report::page::{Badge, Tone};
+
+/// What the numbers rest on.
+const ASSUMED: [&str; 4] = [
+    "Runs are independent draws of what varies: a share is about that distribution, and about no other. Where only grids vary, \
+     runs are all of their points, and shares have no interval.",
+    "A flight violates where the independent judge finds two vehicles closer than delta, or one nearer to an obstacle than its \
+     clearance, between steps too. Flights that ended \
+     early, or that the judge cannot decide, count at the upper end of an interval.",
+    "Shares of a number of runs that was fixed beforehand have the two-sided interval of Clopper and Pearson, which leaves out 2.5 % on \
+     either side; the bound of the verdict is one-sided and leaves out 5 % above. Where flying stopped as soon as enough was known, \
+     both are those of a confidence sequence.",
+    "An interval holds the true value in at least 95 of 100 campaigns. Of many intervals on one page some will miss.",
+];
+/// What estimates of rare violations rest on.
+const ASSUMED_OF_SPLITTING: [&str; 2] = [
+    "Each estimate is without bias for any number of flights; their mean has Student's interval, which is that of normal values.",
+    "Flights from one start differ by their noise from step to step; a run draws its start, and whatever else is varied, anew.",
+];
+
+/// A p-value in words.
+fn p_value(p: f64) -> String {
+    const LEAST: f64 = 1e-4;
+    if p < LEAST { "below 0.0001".to_owned() } else { significant(p, 2) }
+}
+
+impl LawSummary {
+    /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence (one-sided)`.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        if let Some(splitting) = &self.splitting {
+            return rare(splitting);
+        }
+        let Proportion { count, of, confidence, .. } = self.violated;
+        if of == 0 {
+            return "no flight was flown: nothing is known".to_owned();
+        }
+        let unknown = match self.unknown {
+            0 => String::new(),
+            unknown => format!(", {} unknown", separated(unknown)),
+        };
+        // An upper bound of 1 bounds nothing.
+        let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
+            let kind = match bound.kind {
+                BoundKind::OneSided => "one-sided",
+                BoundKind::ConfidenceSequence => "confidence sequence",
+            };
+            let (below, confidence) = (percent_at_most(bound.share), 100.0 * bound.confidence);
+            format!(": below {below} with {confidence:.0} % confidence ({kind})")
+        });
+        let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
+        let flights = if of == 1 { "flight" } else { "flights" };
+        format!("{} of {} {flights} violated{unknown}{}", separated(count), separated(of), bound.unwrap_or_default())
+    }
+}
+
+/// The probability of a violation in a sentence.
+fn rare(splitting: &Repetitions) -> String {
+    let Repetitions { repetitions, probability, confidence, extinct, .. } = splitting;
+    let range = match (probability.low, probability.high) {
+        (Some(low), Some(high)) => {
+            format!(": between {low:.2e} and {high:.2e} with {:.0} % confidence", 100.0 * confidence)
+        }
+        _ => ", with an unknown error".to_owned(),
+    };
+    let estimates = counted(*repetitions, "estimate", "estimates");
+    match probability.value {
+        Some(0.0) => format!("no violation was found in {estimates}: nothing is known of how rare one is"),
+        Some(value) => format!(
+            "a flight is violated with a probability of {value:.2e}{range}, from {estimates}, of which {} came to nothing",
+            extinct.count
+        ),
+        None => "nothing was estimated".to_owned(),
+    }
+}
+
+impl Summary {
+    /// Whether runs are estimates of rare violations.
+    fn is_of_estimates(&self) -> bool {
+        self.laws.iter().any(|law| law.splitting.is_some())
+    }
+
+    fn shares_table(&self) -> Table {
+        Table::of("Flights, with two-sided 95 % intervals of their shares", &self.laws)
+            .column("law", "Law", Kind::Text, |law| law.name.clone())
+            .column("flown", "Flights", Kind::Count, |law| law.violated.of)
+            .column("violated", "Violated", Kind::Share, |law| law.violated)
+            .column("clear", "Clear", Kind::Share, |law| law.clear)
+            .column("unknown", "Unknown", Kind::Count, |law| law.unknown)
+            .column("reached", "Reached", Kind::Share, |law| law.reached)
+            .column("pass", "Passed", Kind::Share, |law| law.pass)
+            .build()
+    }
+
+    fn numbers_table(&self) -> Table {
+        let numbers = |law: &LawSummary| {
+            [
+                (format!("{}: smallest separation less delta [m]", law.name), law.clearance_m),
+                (format!("{}: formation reached at [s]", law.name), law.reached_at_s),
+                (format!("{}: path length of all vehicles [m]", law.name), law.path_length_m),
+            ]
+        };
+        let rows: Vec<(String, Quantiles)> = self.laws.iter().flat_map(numbers).collect();
+        Table::of("Numbers of flights: quantiles with 95 % intervals of order statistics", &rows)
+            .column("", "Number", Kind::Text, |(name, _)| name.clone())
+            .column("", "Least", Kind::Metres, |(_, of)| of.min)
+            .column("", "5 %", Kind::Metres, |(_, of)| of.p05)
+            .column("", "Median", Kind::Metres, |(_, of)| of.median)
+            .column("", "95 %", Kind::Metres, |(_, of)| of.p95)
+            .column("", "Most", Kind::Metres, |(_, of)| of.max)
+            .build()
+    }
+
+    fn pairs_table(&self) -> Table {
+        Table::of("Runs that two laws ended differently, with McNemar's exact test", &self.pairs)
+            .column("", "Two laws", Kind::Text, |pair: &Pair| pair.laws.join(" and "))
+            .column("", "Only the first clear", Kind::Count, |pair| pair.clear.only_first)
+            .column("", "Only the second clear", Kind::Count, |pair| pair.clear.only_second)
+            .column("", "p", Kind::Text, |pair| p_value(pair.clear.p_value))
+            .column("", "Only the first reached", Kind::Count, |pair| pair.reached.only_first)
+            .column("", "Only the second reached", Kind::Count, |pair| pair.reached.only_second)
+            .column("", "p", Kind::Text, |pair| p_value(pair.reached.p_value))
+            .build()
+    }
+
+    fn estimates_table(&self) -> Table {
+        let rows: Vec<_> = self.laws.iter().filter_map(|law| Some((&law.name, law.splitting.as_ref()?))).collect();
+        Table::of("By adaptive multilevel splitting, with 95 % intervals", &rows)
+            .column("law", "Law", Kind::Text, |(law, _)| (*law).clone())
+            .column("estimates", "Estimates", Kind::Count, |(_, of)| of.repetitions)
+            .column("probability", "Probability of a violation", Kind::Rare, |(_, of)| of.probability)
+            .column("extinct", "Came to nothing", Kind::Count, |(_, of)| of.extinct.count)
+            .column("steps", "Steps flown", Kind::Count, |(_, of)| of.steps)
+            .build()
+    }
+
+    fn histograms(&self) -> Vec<Figure> {
+        let of = |pick: fn(&LawSummary) -> &Option<Histogram>| {
+            self.laws.iter().filter_map(|law| Some((law.name.clone(), pick(law).clone()?))).collect::<Vec<_>>()
+        };
+        let (clearance, reached) = (of(|law| &law.clearance_histogram_m), of(|law| &law.reached_histogram_s));
+        let limit = Some((0.0, "delta"));
+        let drawn = (!clearance.is_empty())
+            .then(|| histograms("clearance", "Smallest separation less delta", "clearance [m]", &clearance, limit));
+        let arrived = (!reached.is_empty())
+            .then(|| histograms("reached", "When the formation was reached", "time [s]", &reached, None));
+        drawn.into_iter().chain(arrived).collect()
+    }
+
+    /// Shares over a varied key.
+    fn over(&self, varied: &Varied) -> Section {
+        let share = |bin: &Bin, law: usize, pick: fn(&BinShares) -> Proportion| bin.laws.get(law).map(pick);
+        let violated: fn(&BinShares) -> Proportion = |of| of.violated;
+        let reached: fn(&BinShares) -> Proportion = |of| of.reached;
+        let names = self.laws.iter().map(|law| law.name.as_str()).enumerate();
+        let key = Table::of("Shares with two-sided 95 % intervals", &varied.bins).column(
+            "",
+            &varied.key,
+            Kind::Text,
+            |bin: &Bin| bin.said.clone(),
+        );
+        let table = names.clone().fold(key, |table, (law, name)| {
+            table.column("", &format!("{name}: violated"), Kind::Share, |bin| share(bin, law, violated)).column(
+                "",
+                &format!("{name}: reached"),
+                Kind::Share,
+                |bin| share(bin, law, reached),
+            )
+        });
+        let figure = |name: &str, pick: fn(&BinShares) -> Proportion| {
+            let of_law = |law: usize| {
+                let point = |bin: &Bin| {
+                    let of = share(bin, law, pick)?;
+                    let value = f64::midpoint(bin.low?, bin.high?);
+                    Some(Point { value, share: of.share?, interval: Some([of.low, of.high]) })
+                };
+                varied.bins.iter().filter_map(point).collect::<Vec<_>>()
+            };
+            let series: Vec<_> = names.clone().map(|(law, name)| (name.to_owned(), of_law(law))).collect();
+            shares(name, &varied.key, name, &series, varied.logarithmic)
+        };
+        let are_numbers = varied.bins.iter().all(|bin| bin.low.is_some());
+        let figures =
+            are_numbers.then(|| Block::Figures(vec![figure("violated", violated), figure("reached", reached)]));
+        Section::detail(format!("Over {}", varied.key), figures.into_iter().chain([Block::Table(table.build())]))
+    }
+}
+
+impl Study for Summary {
+    fn kind(&self) -> &'static str {
+        if self.is_of_estimates() { "Rare violations" } else { "Campaign" }
+    }
+
+    fn title(&self) -> String {
+        self.name.clone()
+    }
+
+    fn badge(&self) -> Badge {
+        let violated = self.laws.iter().any(|law| law.violated.count > 0 || !law.bad.is_empty());
+        let (tone, word) = match (self.is_good(), violated) {
+            (true, _) => (Tone::Good, "no violation"),
+            (false, true) => (Tone::Bad, "violations"),
+            (false, false) if self.is_of_estimates() => (Tone::Bad, "nothing known"),
+            (false, false) => (Tone::Bad, "not all known"),
+        };
+        Badge { tone, word: word.to_owned() }
+    }
+
+    fn headline(&self) -> String {
+        match &self.laws[..] {
+            [law] => law.sentence(),
+            laws => laws.iter().map(|law| format!("{}: {}", law.name, law.sentence())).collect::<Vec<_>>().join("; "),
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for law in &self.laws {
+            let advice = law.splitting.iter().flat_map(|of| &of.advice);
+            notes.extend(advice.map(|advice| format!("{}: {advice}", law.name)));
+        }
+        notes.extend(self.stopped_early.then(|| {
+            let runs = counted(self.runs, "run", "runs");
+            format!("enough was known after {runs} of {}: later ones are left out", separated(self.runs_planned))
+        }));
+        notes.extend((self.intervals == Intervals::ConfidenceSequence).then(|| {
+            "the number of runs was not fixed beforehand: shares have the interval of a confidence sequence, which is wider, and \
+             quantiles have none"
+                .to_owned()
+        }));
+        let mut each = |count: fn(&LawSummary) -> u64, what: [&str; 2], rest: &dyn Fn(&LawSummary) -> String| {
+            for law in self.laws.iter().filter(|law| count(law) > 0) {
+                notes.push(format!("{}: {}{}", law.name, counted(count(law), what[0], what[1]), rest(law)));
+            }
+        };
+        each(|law| law.not_flown, ["run", "runs"], &|law| {
+            let why = law.not_flown_because.as_deref().unwrap_or("for no reason that was kept");
+            format!(" could not be flown as drawn and count nowhere ({why})")
+        });
+        each(|law| law.certificates_broken, ["flight", "flights"], &|_| {
+            ": CERTIFICATE BROKEN, two vehicles came closer than the law promised, by a step too long for it or a defect; \
+             column breaks_certificate of the table says where"
+                .to_owned()
+        });
+        each(|law| law.unknown, ["flight", "flights"], &|law| {
+            let them = if law.unknown == 1 { "it as a violation" } else { "them as violations" };
+            format!(
+                " ended early without a violation, or the judge cannot decide; the upper end of the interval counts {them}"
+            )
+        });
+        notes
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        if self.is_of_estimates() {
+            return vec![Section::new("How rare a violation is", [Block::Table(self.estimates_table())])];
+        }
+        let mut sections = vec![
+            Section::new("How flights ended", [Block::Table(self.shares_table()), Block::Figures(self.histograms())]),
+            Section::new("Numbers of flights", [Block::Table(self.numbers_table())]),
+        ];
+        if !self.pairs.is_empty() {
+            sections.push(Section::new("Laws on the same runs", [Block::Table(self.pairs_table())]));
+        }
+        sections.extend(self.varied.iter().map(|varied| self.over(varied)));
+        sections
+    }
+
+    fn records(&self) -> Table {
+        if self.is_of_estimates() { self.estimates_table() } else { self.shares_table() }
+    }
+
+    fn assumptions(&self) -> Vec<String> {
+        let assumed = if self.is_of_estimates() { &ASSUMED_OF_SPLITTING[..] } else { &ASSUMED };
+        assumed.iter().map(|&assumed| assumed.to_owned()).collect()
+    }
+
+    fn is_good(&self) -> bool {
+        self.laws.iter().all(|law| {
+            law.violated.count == 0 && law.unknown == 0 && law.certificates_broken == 0 && law.splitting.is_none()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_p_value_is_a_bound() {
+        assert_eq!([1e-30, 0.25].map(p_value), ["below 0.0001", "0.25"]);
+    }
+}

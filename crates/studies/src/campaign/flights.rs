@@ -1,0 +1,450 @@
+//! A campaign: the flights of every run, made from its manifest alone.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::error::CampaignError;
+use super::manifest::{Manifest, Program};
+use super::row::Row;
+use super::spec::{Method, Spec, Stop, refuse_overlaps};
+use super::summary::{Gathered, Summary};
+use super::vary::Variation;
+use crate::SCHEMA_VERSION;
+use crate::base::BaseScenario;
+use crate::batch::Batch;
+use crate::splitting::{self, Settings};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+
+/// Most runs of a campaign.
+pub const MOST_RUNS: u64 = 1_000_000_000;
+/// Runs of a shard, where the number of shards is not given: what a machine that dies loses, at most.
+const RUNS_OF_A_SHARD: u64 = 250;
+/// Most values of a list that are tried before anything is flown.
+const MOST_TRIED: usize = 1000;
+/// Runs among which one that can be flown is looked for beforehand.
+const FIRST_TRIED: u64 = 100;
+/// Seeds that are drawn by run where nobody says otherwise.
+const START_SEED: &str = "start.seed";
+const NOISE_SEED: &str = "noise.seed";
+/// Tables that bring chance into a flight.
+const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
+
+/// Flights whose rows are in memory at once.
+const AT_ONCE: u64 = 1024;
+
+/// The flights of every run.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    manifest: Manifest,
+    base: BaseScenario,
+    laws: Vec<Law>,
+    variations: BTreeMap<String, Variation>,
+    seed: u64,
+    stop: Option<Stop>,
+    splitting: Option<Settings>,
+    argument: String,
+}
+
+/// A law that flies every run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Law {
+    /// That of its kind, or of its table `[laws.NAME]`.
+    pub name: String,
+    /// What sets it, as `--set` takes it; nothing where it is the scenario's own.
+    pub overrides: Vec<String>,
+}
+
+impl Campaign {
+    /// Plans a campaign, whose name is that of its file, in `shards` parts, or as many as are sensible. A scenario is found from
+    /// `folder`.
+    ///
+    /// # Errors
+    /// [`CampaignError`] for numbers that make no campaign, and for the first value, law or run that cannot be flown.
+    pub fn plan(
+        spec: &Spec,
+        name: &str,
+        folder: &Path,
+        shards: Option<u64>,
+        program: Program,
+    ) -> Result<Self, CampaignError> {
+        let plain = |error| CampaignError::scenario("", "scenario", error);
+        let file = folder.join(&spec.scenario);
+        let source =
+            if file.is_file() { Source::File(file) } else { Source::resolve(&spec.scenario).map_err(plain)? };
+        let (called, text) = source.text().map_err(plain)?;
+        let scenario_name =
+            Path::new(&called).file_name().map_or(called.clone(), |name| name.to_string_lossy().into_owned());
+        let mut manifest = Manifest {
+            schema_version: SCHEMA_VERSION,
+            campaign: String::new(),
+            name: name.to_owned(),
+            tool: program,
+            scenario_name,
+            scenario: text,
+            spec: spec.to_toml()?,
+            runs: runs(spec)?,
+            first: Vec::new(),
+            shards: 1,
+            folder: std::path::absolute(source.folder()).unwrap_or_else(|_| source.folder().to_owned()),
+        };
+        manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
+        if manifest.shards == 0 || manifest.shards > manifest.runs {
+            return Err(CampaignError::plan(
+                format!("{} runs cannot be split into {} shards", manifest.runs, manifest.shards),
+                "give at least 1 shard and at most one a run",
+            ));
+        }
+        let mut campaign = Self::read(manifest, spec)?;
+        campaign.check()?;
+        campaign.manifest.first = campaign.first();
+        campaign.manifest = campaign.manifest.sealed();
+        Ok(campaign)
+    }
+
+    /// The campaign of a manifest.
+    ///
+    /// # Errors
+    /// [`CampaignError`] where it cannot be flown here, such as for a file that its scenario names and that is not there, or is
+    /// another one.
+    pub fn of(manifest: Manifest) -> Result<Self, CampaignError> {
+        let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
+        let campaign = Self::read(manifest, &spec)?;
+        let first = campaign.first();
+        if first != campaign.manifest.first {
+            return Err(CampaignError::Foreign {
+                path: campaign.manifest.folder.clone(),
+                why: format!(
+                    "run 0 is another flight here than where it was planned (SHA-256 {} here, {} there)",
+                    first.join(", "),
+                    campaign.manifest.first.join(", ")
+                ),
+                help: "the files that the scenario names must be the same everywhere".to_owned(),
+            });
+        }
+        Ok(campaign)
+    }
+
+    fn read(manifest: Manifest, spec: &Spec) -> Result<Self, CampaignError> {
+        let source = Source::Embedded {
+            name: manifest.scenario_name.clone(),
+            text: manifest.scenario.clone(),
+            folder: manifest.folder.clone(),
+        };
+        if let Some(stop) = spec.stop {
+            stop.check()?;
+        }
+        let sets = spec.sets();
+        let mut variations = spec.variations()?;
+        refuse_overlaps(&sets, &variations, !spec.laws.is_empty())?;
+        if spec.splitting.is_some() && spec.method != Method::Splitting {
+            return Err(CampaignError::plan(
+                "[splitting] without method = \"splitting\"",
+                "add it, or leave the table out",
+            )
+            .at("splitting"));
+        }
+        let written = |(key, value): (&String, &toml::Value)| Override::parse(&format!("{key}={value}"));
+        let written = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
+        let written = written.map_err(|error| CampaignError::scenario("[set] ", "set", error))?;
+        let base = BaseScenario::read(source, written);
+        let base = base.map_err(|error| CampaignError::scenario("", "scenario", error))?;
+        let template = base.template();
+        let laws = spec.laws.iter().map(|name| {
+            let law = template.law(name).map_err(|error| CampaignError::scenario("", "laws", error))?;
+            Ok(Law { name: law.name.clone(), overrides: law.overrides() })
+        });
+        let mut laws = laws.collect::<Result<Vec<_>, CampaignError>>()?;
+        if let Some((_, twice)) = laws.iter().enumerate().find(|&(k, law)| laws[..k].contains(law)) {
+            return Err(
+                CampaignError::plan(format!("the law {} is named twice", twice.name), "name each law once").at("laws")
+            );
+        }
+        if laws.is_empty() {
+            laws.push(Law { name: template.own_law().name, overrides: Vec::new() });
+        }
+        let is_open = |key: &str| !sets.contains_key(key) && !variations.contains_key(key);
+        let open = [
+            (START_SEED, template.start_is_random() || varies(&variations, &["start."])),
+            (NOISE_SEED, template.flight_is_random() || varies(&variations, &FLIGHT)),
+        ];
+        let drawn: Vec<_> = open.into_iter().filter(|&(key, is_random)| is_random && is_open(key)).collect();
+        variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
+        let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default().into());
+        let file = manifest.folder.join(&manifest.scenario_name);
+        let builtin = tautline_sim::scenario::builtin::find(&manifest.scenario_name);
+        let is_builtin = builtin.is_some_and(|builtin| builtin.toml == manifest.scenario);
+        let argument = if is_builtin { manifest.scenario_name.clone() } else { file.display().to_string() };
+        Ok(Self { manifest, base, laws, variations, seed: spec.seed, stop: spec.stop, splitting, argument })
+    }
+
+    /// Refuses keys that do not take what may be drawn, and runs that are all the same.
+    fn check(&self) -> Result<(), CampaignError> {
+        let grids = self.variations.values().any(|variation| variation.grid_len().is_some());
+        if grids && self.stop.is_some() {
+            return Err(CampaignError::plan(
+                "[stop] with a grid: the first runs are those of its first points",
+                "draw the values instead (list, uniform), or leave [stop] out",
+            )
+            .at("stop"));
+        }
+        if self.splitting.is_some() && self.stop.is_some() {
+            return Err(CampaignError::plan(
+                "[stop] is about shares of flights, and splitting estimates a probability",
+                "leave [stop] out and fix the number of runs, or leave method out",
+            )
+            .at("stop"));
+        }
+        if self.variations.is_empty() && self.manifest.runs > 1 && self.splitting.is_none() {
+            return Err(CampaignError::plan(
+                format!("all {} runs are the same flight", self.manifest.runs),
+                "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
+            ));
+        }
+        if self.variations.values().all(|variation| *variation == Variation::Seed {}) && self.splitting.is_none() {
+            let law = &self.laws[0];
+            let hash =
+                |run: u64| self.scenario(run, law).map_or_else(|error| error.to_string(), |run| run.sha256_hex());
+            let runs = self.manifest.runs.min(3);
+            if runs > 1 && (1..runs).all(|run| hash(run) == hash(0)) {
+                return Err(CampaignError::plan(
+                    format!(
+                        "all {} runs are the same flight: nothing depends on the seeds that are drawn",
+                        self.manifest.runs
+                    ),
+                    "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
+                ));
+            }
+        }
+        for law in &self.laws {
+            let run = self.first_flyable(law)?;
+            for (key, variation) in &self.variations {
+                let under = |value: &toml::Value| format!("under the law {}, {key} = {value}: ", law.name);
+                let tried = variation.samples().into_iter().take(MOST_TRIED).map(|value| {
+                    let mut drawn = self.drawn(run);
+                    drawn.insert(key, value.clone());
+                    let read = self.read_with(law, &drawn);
+                    read.map_err(|error| CampaignError::scenario(&under(&value), &format!("vary.{key}"), error))
+                });
+                let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
+                // What is listed is meant; of a range some may be impossible, which is counted as it is flown.
+                if (variation.is_listed() || flown.is_empty())
+                    && let Some(Err(error)) = refused.into_iter().next()
+                {
+                    return Err(error);
+                }
+            }
+            let flight = |error| CampaignError::Flight { run, law: law.name.clone(), error: Box::new(error) };
+            let built = self.scenario(run, law).map_err(plain_of(law))?.law();
+            built.map_err(|error| flight(error.into()))?;
+            if let Some(settings) = &self.splitting {
+                let ready = splitting::check(&self.scenario(run, law).map_err(plain_of(law))?, settings);
+                ready.map_err(|error| CampaignError::Splitting {
+                    run: 0,
+                    law: law.name.clone(),
+                    error: Box::new(error),
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The first run that can be flown under a law.
+    fn first_flyable(&self, law: &Law) -> Result<u64, CampaignError> {
+        let runs = 0..self.manifest.runs.min(FIRST_TRIED);
+        let flyable = runs.clone().find(|&run| self.scenario(run, law).is_ok());
+        flyable.map_or_else(|| self.scenario(0, law).map_err(plain_of(law)).map(|_| 0), Ok)
+    }
+
+    /// What run 0 is under each law: the hash of its scenario, or why there is none.
+    fn first(&self) -> Vec<String> {
+        let first = self.laws.iter().map(|law| self.scenario(0, law));
+        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
+    }
+
+    /// What it is made from.
+    #[must_use]
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The scenario without any drawn value.
+    #[must_use]
+    pub fn own(&self) -> &Scenario {
+        self.base.own()
+    }
+
+    /// The laws that fly every run, in their order.
+    #[must_use]
+    pub fn laws(&self) -> &[Law] {
+        &self.laws
+    }
+
+    /// What differs from run to run, in the order of the keys.
+    #[must_use]
+    pub fn variations(&self) -> &BTreeMap<String, Variation> {
+        &self.variations
+    }
+
+    /// When enough has been flown.
+    #[must_use]
+    pub fn stop(&self) -> Option<Stop> {
+        self.stop
+    }
+
+    /// How each run is split, where runs are no flights.
+    #[must_use]
+    pub fn splitting(&self) -> Option<&Settings> {
+        self.splitting.as_ref()
+    }
+
+    /// What all random numbers begin from.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Steps of all flights of so many runs, as far as they are flown to their end.
+    #[must_use]
+    pub fn steps(&self, runs: u64) -> u64 {
+        let flights = self.splitting.map_or(1, |settings| settings.flights as u64);
+        self.own().time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64).saturating_mul(flights)
+    }
+
+    /// What `tautline run` takes for its scenario: a built-in one's name, or a path.
+    #[must_use]
+    pub fn scenario_argument(&self) -> &str {
+        &self.argument
+    }
+
+    /// The drawn values of a run, in the order of the keys.
+    #[must_use]
+    pub fn values(&self, run: u64) -> Vec<Value> {
+        self.drawn(run).into_values().map(|value| serde_json::to_value(value).unwrap_or_default()).collect()
+    }
+
+    /// What flies a run under a law, each as `--set` takes it.
+    #[must_use]
+    pub fn sets(&self, run: u64, law: &Law) -> Vec<String> {
+        self.base.sets().chain(law.overrides.iter().cloned()).chain(written(&self.drawn(run))).collect()
+    }
+
+    /// The flight of a run under a law.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where what was drawn cannot be flown, such as a start of two vehicles too near each other.
+    pub fn scenario(&self, run: u64, law: &Law) -> Result<Scenario, ScenarioError> {
+        self.read_with(law, &self.drawn(run))
+    }
+
+    /// Flies a run under one of its laws, counted from 0; none where flying was interrupted before it. A flight that has begun
+    /// comes to its end, an estimate does not.
+    ///
+    /// # Errors
+    /// [`CampaignError::Flight`] for a law or a judge that cannot be built, and a law that is not one of the campaign's.
+    pub fn row(&self, run: u64, law: usize, batch: &Batch<'_>) -> Result<Option<Row>, CampaignError> {
+        let Some(named) = self.laws().get(law) else {
+            return Err(CampaignError::plan(format!("law {law} of {}", self.laws().len()), "laws are counted from 0"));
+        };
+        let mut row = Row { run, law, drawn: self.values(run), not_flown: None, flight: None, splitting: None };
+        let scenario = match self.scenario(run, named) {
+            Ok(scenario) => scenario,
+            Err(error) => {
+                batch.monitor().advance(self.own().time.steps());
+                row.not_flown = Some(error.message().to_owned());
+                return Ok(Some(row));
+            }
+        };
+        let name = || named.name.clone();
+        if let Some(settings) = self.splitting() {
+            let (seeds, mut reported) = ([self.seed(), run], 0);
+            let split = splitting::estimate(&scenario, settings, seeds, &mut batch.carry_on(&mut reported, false));
+            row.splitting =
+                split.map_err(|error| CampaignError::Splitting { run, law: name(), error: Box::new(error) })?;
+        } else {
+            let flown = batch.finishing_flights().fly(&scenario, run);
+            row.flight = flown.map_err(|error| CampaignError::Flight { run, law: name(), error: Box::new(error) })?;
+        }
+        Ok((row.flight.is_some() || row.splitting.is_some()).then_some(row))
+    }
+
+    /// Flies everything and keeps no file: the answer that [`super::Folder::merge`] gives, or none where it was interrupted.
+    ///
+    /// # Errors
+    /// As [`Campaign::row`].
+    pub fn fly(&self, batch: &Batch<'_>) -> Result<Option<Summary>, CampaignError> {
+        let (laws, runs) = (self.laws().len(), self.manifest().runs);
+        let mut gathered = Gathered::new(self);
+        let mut from = 0;
+        while from < runs && !gathered.is_enough() {
+            let to = runs.min(from + AT_ONCE);
+            let places: Vec<_> = (from..to).flat_map(|run| (0..laws).map(move |law| (run, law))).collect();
+            for row in batch.run(places.len(), |number| self.row(places[number].0, places[number].1, batch))? {
+                let Some(row) = row else { return Ok(None) };
+                gathered.take(&row);
+            }
+            from = to;
+        }
+        Ok(Some(gathered.finish(self)))
+    }
+
+    fn read_with(&self, law: &Law, drawn: &BTreeMap<&str, toml::Value>) -> Result<Scenario, ScenarioError> {
+        self.base.with(&law.overrides.iter().cloned().chain(written(drawn)).collect::<Vec<_>>())
+    }
+
+    fn drawn(&self, run: u64) -> BTreeMap<&str, toml::Value> {
+        // The last grid changes fastest, as digits do.
+        let mut rest = run;
+        let places = self.variations.iter().rev().map(|(key, variation)| {
+            let place = variation.grid_len().map_or(0, |len| {
+                let place = rest % len.max(1);
+                rest /= len.max(1);
+                place
+            });
+            (key.as_str(), variation.value(self.seed, key, run, place))
+        });
+        places.collect()
+    }
+}
+
+fn plain_of(law: &Law) -> impl Fn(ScenarioError) -> CampaignError {
+    let under = format!("under the law {}: ", law.name);
+    move |error| CampaignError::scenario(&under, "vary", error)
+}
+
+fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {
+    drawn.iter().map(|(key, value)| format!("{key}={value}"))
+}
+
+/// Whether a key of one of these tables is varied, which may bring chance into it.
+fn varies(variations: &BTreeMap<String, Variation>, tables: &[&str]) -> bool {
+    variations.keys().any(|key| tables.iter().any(|table| key.starts_with(table)))
+}
+
+/// The number of runs: what is asked for, or one for each point of the grids.
+fn runs(spec: &Spec) -> Result<u64, CampaignError> {
+    let points = spec.variations()?.values().filter_map(Variation::grid_len).try_fold(1_u64, u64::checked_mul);
+    let has_grid = spec.variations()?.values().any(|variation| variation.grid_len().is_some());
+    let points = points.filter(|&points| points <= MOST_RUNS).ok_or_else(|| {
+        CampaignError::plan(
+            format!("the grids have more than {MOST_RUNS} points together"),
+            "take fewer values, or draw them: { uniform = [low, high] } with as many runs as can be flown",
+        )
+        .at("vary")
+    })?;
+    match spec.runs {
+        None if has_grid => Ok(points),
+        None => Err(CampaignError::plan("the number of runs is not given", "add runs = 1000")),
+        Some(runs) if runs == 0 || runs > MOST_RUNS => {
+            let help = format!("fly at least 1 run and at most {MOST_RUNS}");
+            Err(CampaignError::plan(format!("runs = {runs}"), help).at("runs"))
+        }
+        Some(runs) if runs % points != 0 => Err(CampaignError::plan(
+            format!("{runs} runs do not fly each of the {points} points of the grids equally often"),
+            format!("give a multiple of {points}, or leave runs out to fly each once"),
+        )
+        .at("runs")),
+        Some(runs) => Ok(runs),
+    }
+}

@@ -1,0 +1,379 @@
+//! What came of a campaign: `campaign.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::bins::{KeyColumn, Varied};
+use super::flights::Campaign;
+use super::row::{Known, Row};
+use super::tally::{Intervals, Tally, UpperBound};
+use crate::Question;
+use crate::SCHEMA_VERSION;
+use crate::flight::Outcome;
+use crate::splitting::{Repetitions, Splitting};
+use crate::statistics::{Estimate, Paired, Proportion};
+use tautline_report::figures::Histogram;
+
+/// Intervals of a histogram.
+const HISTOGRAM_INTERVALS: usize = 30;
+/// Number of worst flights that are kept.
+const WORST: usize = 10;
+
+/// What came of a campaign. What does not apply is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// SHA-256 that tells this campaign from all others.
+    pub campaign: String,
+    /// Its name.
+    pub name: String,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Runs that count.
+    pub runs: u64,
+    /// Runs that were planned.
+    pub runs_planned: u64,
+    /// Whether enough was known before all of them.
+    pub stopped_early: bool,
+    /// Which intervals shares have.
+    pub intervals: Intervals,
+    /// Each law, in the order in which they were named.
+    pub laws: Vec<LawSummary>,
+    /// Each two laws, on the runs that both flew; none where the number of runs was not fixed beforehand.
+    pub pairs: Vec<Pair>,
+    /// Each varied number, and what flights showed over it.
+    pub varied: Vec<Varied>,
+}
+
+/// What flights of a law showed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LawSummary {
+    /// The law's name.
+    pub name: String,
+    /// What sets it, as `--set` takes it.
+    pub overrides: Vec<String>,
+    /// Flights that what was drawn made impossible; they count nowhere else.
+    pub not_flown: u64,
+    /// The first of them says why.
+    pub not_flown_because: Option<String>,
+    /// Flights that ended early without a violation, or of which the judge cannot tell.
+    pub unknown: u64,
+    /// With a violation. Flights of which it is not known count at the upper end of the interval.
+    pub violated: Proportion,
+    /// Bound that the share with a violation is below, those of which it is not known counted as violations; null where only grids
+    /// vary, and of no flight.
+    pub violated_below: Option<UpperBound>,
+    /// Flights in which two vehicles came closer than their law's certificate; each is a defect.
+    pub certificates_broken: u64,
+    /// Clear to the end.
+    pub clear: Proportion,
+    /// With the formation reached and kept.
+    pub reached: Proportion,
+    /// Passed, as `tautline run` says it.
+    pub pass: Proportion,
+    /// Smallest separation less delta of a flight \[m\].
+    pub clearance_m: Quantiles,
+    /// When the formation was reached, of the flights that reached it \[s\].
+    pub reached_at_s: Quantiles,
+    /// Ways flown, summed over the vehicles \[m\].
+    pub path_length_m: Quantiles,
+    /// Flights by their smallest separation less delta \[m\].
+    pub clearance_histogram_m: Option<Histogram>,
+    /// Those that reached the formation by when they did \[s\].
+    pub reached_histogram_s: Option<Histogram>,
+    /// The flights with the least clearance, the worst first.
+    pub worst: Vec<Worst>,
+    /// The probability of a violation, where runs are estimates of it and no flights; all numbers above are of none then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub splitting: Option<Repetitions>,
+    /// Flights that were violated in them, those furthest into a violation first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bad: Vec<BadRun>,
+}
+
+/// A flight of an estimate that was violated.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BadRun {
+    /// Number of the run.
+    pub run: u64,
+    /// Its number among the run's bad flights, from 0.
+    pub bad: usize,
+    /// Smallest separation less delta, up to the step in which it was violated \[m\].
+    pub clearance_m: f64,
+    /// The step, from 1.
+    pub violated_at_step: u64,
+    /// Hash over the state after that step.
+    pub state_hash: String,
+}
+
+/// What so many parts of all flights are not above. Intervals are those of order statistics; none where the number of runs
+/// was not fixed beforehand.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// The smallest.
+    pub min: Option<f64>,
+    /// A twentieth.
+    pub p05: Estimate,
+    /// Half of them.
+    pub median: Estimate,
+    /// All but a twentieth.
+    pub p95: Estimate,
+    /// The largest.
+    pub max: Option<f64>,
+}
+
+/// Two laws on the same runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pair {
+    /// Names of the two.
+    pub laws: [String; 2],
+    /// Runs in which one was clear and the other was not known to be.
+    pub clear: Paired,
+    /// Runs in which one reached the formation and the other did not.
+    pub reached: Paired,
+}
+
+/// Rows on their way to a summary. Memory is that of a few numbers a row.
+#[derive(Debug)]
+pub(super) struct Gathered {
+    intervals: Intervals,
+    tally: Tally,
+    numbers: Vec<Numbers>,
+    worst: Vec<WorstList>,
+    keys: Vec<KeyColumn>,
+    /// Clear and reached of each law in a run, as bits; none where it was not flown.
+    outcomes: Vec<Vec<Option<[bool; 2]>>>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Numbers {
+    clearance_m: Vec<f64>,
+    reached_at_s: Vec<f64>,
+    path_length_m: Vec<f64>,
+    not_flown_because: Option<String>,
+    estimates: Vec<Splitting>,
+    bad: Vec<BadRun>,
+}
+
+impl Gathered {
+    /// Nothing yet.
+    #[must_use]
+    pub(super) fn new(campaign: &Campaign) -> Self {
+        let laws = campaign.laws().len();
+        let is_drawn = campaign.variations().values().any(|variation| variation.grid_len().is_none());
+        let intervals = match (campaign.stop(), is_drawn) {
+            (Some(_), _) => Intervals::ConfidenceSequence,
+            (None, true) => Intervals::ClopperPearson,
+            (None, false) => Intervals::Exact,
+        };
+        Self {
+            intervals,
+            tally: Tally::new(laws, campaign.stop()),
+            numbers: vec![Numbers::default(); laws],
+            worst: vec![WorstList::default(); laws],
+            keys: campaign.variations().iter().map(|(key, variation)| KeyColumn::new(key, variation, laws)).collect(),
+            outcomes: vec![Vec::new(); laws],
+        }
+    }
+
+    /// Takes the next row in the order of runs and laws; says whether it counts, which none does once enough has been flown.
+    pub(super) fn take(&mut self, row: &Row) -> bool {
+        if !self.tally.take(row) {
+            return false;
+        }
+        let Some(numbers) = self.numbers.get_mut(row.law) else { return true };
+        let known = row.known();
+        if let Some(flight) = &row.flight {
+            numbers.clearance_m.extend(row.clearance_m());
+            numbers.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));
+            numbers.path_length_m.push(flight.path_length_m);
+            self.worst[row.law].take(row);
+        } else if let Some(splitting) = &row.splitting {
+            numbers.take_estimate(row.run, splitting);
+        } else if numbers.not_flown_because.is_none() {
+            numbers.not_flown_because.clone_from(&row.not_flown);
+        }
+        let reached = row.flight.as_ref().is_some_and(|flight| flight.reached);
+        let outcome = (known != Known::NotFlown).then_some([known == Known::Clear, reached]);
+        self.outcomes[row.law].push(outcome);
+        for (column, value) in std::iter::zip(&mut self.keys, &row.drawn) {
+            column.take(row.law, value, known, reached);
+        }
+        true
+    }
+
+    /// Whether enough has been flown.
+    #[must_use]
+    pub(super) fn is_enough(&self) -> bool {
+        self.tally.is_enough()
+    }
+
+    /// The summary of what was taken.
+    #[must_use]
+    pub(super) fn finish(self, campaign: &Campaign) -> Summary {
+        let Self { intervals, tally, numbers, worst, keys, outcomes } = self;
+        let names: Vec<_> = campaign.laws().iter().map(|law| law.name.clone()).collect();
+        let laws = std::iter::zip(campaign.laws(), tally.counts()).zip(std::iter::zip(numbers, worst));
+        let laws = laws.map(|((law, counts), (numbers, worst))| LawSummary {
+            name: law.name.clone(),
+            overrides: law.overrides.clone(),
+            not_flown: counts.not_flown,
+            not_flown_because: numbers.not_flown_because,
+            unknown: counts.unknown,
+            certificates_broken: counts.certificates_broken,
+            violated: counts.violated(intervals),
+            violated_below: counts.violated_below(intervals),
+            clear: counts.share(Question::Clear, intervals),
+            reached: counts.share(Question::Reached, intervals),
+            pass: counts.share(Question::Pass, intervals),
+            clearance_m: Quantiles::of(&numbers.clearance_m, intervals),
+            reached_at_s: Quantiles::of(&numbers.reached_at_s, intervals),
+            path_length_m: Quantiles::of(&numbers.path_length_m, intervals),
+            clearance_histogram_m: Histogram::of(&numbers.clearance_m, HISTOGRAM_INTERVALS),
+            reached_histogram_s: Histogram::of(&numbers.reached_at_s, HISTOGRAM_INTERVALS),
+            worst: worst.0,
+            splitting: campaign.splitting().map(|_| Repetitions::new(&numbers.estimates)),
+            bad: numbers.bad,
+        });
+        let manifest = campaign.manifest();
+        Summary {
+            schema_version: SCHEMA_VERSION,
+            campaign: manifest.campaign.clone(),
+            name: manifest.name.clone(),
+            scenario: campaign.own().name.clone(),
+            runs: tally.runs(),
+            runs_planned: manifest.runs,
+            stopped_early: tally.is_enough() && tally.runs() < manifest.runs,
+            intervals,
+            // Tests of pairs hold for a number of runs that was fixed beforehand.
+            pairs: if intervals == Intervals::ClopperPearson && campaign.splitting().is_none() {
+                pairs(&names, &outcomes)
+            } else {
+                Vec::new()
+            },
+            varied: keys.into_iter().filter_map(|column| column.finish(intervals)).collect(),
+            laws: laws.collect(),
+        }
+    }
+}
+
+impl Numbers {
+    fn take_estimate(&mut self, run: u64, splitting: &Splitting) {
+        self.bad.extend(splitting.bad.iter().enumerate().map(|(bad, flight)| BadRun {
+            run,
+            bad,
+            clearance_m: flight.clearance_m,
+            violated_at_step: flight.violated_at_step,
+            state_hash: flight.state_hash.clone(),
+        }));
+        self.bad.sort_by(|a, b| a.clearance_m.total_cmp(&b.clearance_m));
+        self.bad.truncate(WORST);
+        self.estimates.push(Splitting { bad: Vec::new(), ..splitting.clone() });
+    }
+}
+
+impl Quantiles {
+    fn of(values: &[f64], intervals: Intervals) -> Self {
+        let estimate = |part| {
+            let estimate = Estimate::quantile(values, part);
+            let is_fixed = intervals == Intervals::ClopperPearson;
+            if is_fixed { estimate } else { Estimate { value: estimate.value, low: None, high: None } }
+        };
+        Self {
+            min: values.iter().copied().reduce(f64::min),
+            p05: estimate(0.05),
+            median: estimate(0.5),
+            p95: estimate(0.95),
+            max: values.iter().copied().reduce(f64::max),
+        }
+    }
+}
+
+/// Each two laws on the runs that both flew.
+fn pairs(names: &[String], outcomes: &[Vec<Option<[bool; 2]>>]) -> Vec<Pair> {
+    let both = |first: usize, second: usize| {
+        let runs = std::iter::zip(&outcomes[first], &outcomes[second]);
+        runs.filter_map(|(first, second)| Some(((*first)?, (*second)?))).collect::<Vec<_>>()
+    };
+    let paired = |runs: &[([bool; 2], [bool; 2])], what: usize| {
+        let count = |of: [bool; 2]| runs.iter().filter(|run| [run.0[what], run.1[what]] == of).count() as u64;
+        Paired::new(count([true, false]), count([false, true]), runs.len() as u64)
+    };
+    let each_two = (0..names.len()).flat_map(|first| (first + 1..names.len()).map(move |second| (first, second)));
+    each_two
+        .map(|(first, second)| {
+            let runs = both(first, second);
+            let laws = [names[first].clone(), names[second].clone()];
+            Pair { laws, clear: paired(&runs, 0), reached: paired(&runs, 1) }
+        })
+        .collect()
+}
+
+impl Summary {
+    /// Whether no flight violated, and that is known of each; estimates of rare violations never say so.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        self.laws.iter().all(|law| {
+            law.violated.count == 0 && law.unknown == 0 && law.certificates_broken == 0 && law.splitting.is_none()
+        })
+    }
+
+    /// Flights that were impossible, by law.
+    #[must_use]
+    pub fn not_flown(&self) -> BTreeMap<&str, u64> {
+        self.laws.iter().map(|law| (law.name.as_str(), law.not_flown)).filter(|&(_, count)| count > 0).collect()
+    }
+}
+
+/// A flight to look at.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Worst {
+    /// Number of the run.
+    pub run: u64,
+    /// How it went.
+    pub outcome: Outcome,
+    /// Smallest separation less delta \[m\].
+    pub clearance_m: f64,
+    /// Smallest separation \[m\].
+    pub min_m: f64,
+    /// When that was \[s\].
+    pub min_at_s: Option<f64>,
+    /// Which two.
+    pub min_pair: Option<[usize; 2]>,
+    /// Whether the formation was reached.
+    pub reached: bool,
+    /// Hash over the bits of every recorded state.
+    pub state_hash: String,
+}
+
+/// The worst so far, the worst first; of equal ones the first flown.
+#[derive(Clone, Debug, Default)]
+struct WorstList(Vec<Worst>);
+
+impl WorstList {
+    /// Takes a row, if it is among the worst.
+    fn take(&mut self, row: &Row) {
+        let (Some(flight), Some(clearance_m)) = (&row.flight, row.clearance_m()) else { return };
+        // One that violated, an obstacle's clearance it may be, is worse than any that did not.
+        let rank = |outcome: Outcome| outcome != Outcome::Violated;
+        let own = (rank(flight.outcome), clearance_m);
+        let place = self.0.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
+        if place >= WORST {
+            return;
+        }
+        let worst = Worst {
+            run: row.run,
+            outcome: flight.outcome,
+            clearance_m,
+            min_m: flight.min_m.unwrap_or(f64::NAN),
+            min_at_s: flight.min_at_s,
+            min_pair: flight.min_pair,
+            reached: flight.reached,
+            state_hash: flight.state_hash.clone(),
+        };
+        self.0.insert(place, worst);
+        self.0.truncate(WORST);
+    }
+}

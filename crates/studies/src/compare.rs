@@ -1,0 +1,456 @@
+//! Laws side by side: the same starts, the same plant and the same audit under each of them.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::base::{BaseScenario, JITTER, check_runs, jitter_note};
+use crate::batch::Batch;
+use crate::flight::{FlightSummary, Outcome};
+use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use crate::study::{About, Block, Experiment, Section, Study};
+use crate::table::{Kind, Table};
+use tautline_core::text::{at_least, counted};
+use tautline_report::report::page::{self, Badge, Picture, Tone};
+use tautline_report::request::{Failure, PICTURES_BYTES, Pictures, ScenarioRequest};
+use tautline_sim::scenario::{Draw, NamedLaw, Scenario, Template};
+
+/// What the numbers rest on.
+const ASSUMED: [&str; 5] = [
+    "Every law is flown from the same starts, on the same plant, and judged by the same audit: a flight is proved clear where it \
+     was flown to its end, no two vehicles came closer than delta at any time, and both detectors agree.",
+    "Starts are draws, and intervals are about all starts that could have been drawn: they hold for a number of runs that was fixed \
+     before the first.",
+    "Shares have the interval of Clopper and Pearson, medians and percentiles that of order statistics, means that of Student.",
+    "Times to reach are over the flights that reached the formation and kept it to the end.",
+    "Path length and total control are sums over all vehicles and the whole flight.",
+];
+
+/// Options of a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Kinds of laws, or names of tables `[laws.NAME]`; those of all such tables by default, and where there are none,
+    /// every kind.
+    pub laws: Option<Vec<String>>,
+    /// Starts under each law: 1 to [`crate::MOST_RUNS`].
+    pub runs: u64,
+    /// Run k, from 0, has `start.seed` and, where the flight is random, `noise.seed` of this plus k. A start that does not
+    /// depend on its seed gets a jitter of 5 % of delta along each axis.
+    pub seed: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { laws: None, runs: 20, seed: 0 }
+    }
+}
+
+/// Laws side by side. Units are in the names; what does not apply is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
+    /// Starts that were flown under every law.
+    pub runs: u64,
+    /// Starts that were asked for.
+    pub runs_asked: u64,
+    /// `start.seed` of the first.
+    pub seed: u64,
+    /// Jitter along each axis of a start without randomness \[m\].
+    pub jitter_m: Option<f64>,
+    /// Confidence of all intervals.
+    pub confidence: f64,
+    /// A row a law, in the order in which they were named.
+    pub laws: Vec<LawRow>,
+    /// Wall-clock times, the only part that differs between two comparisons of the same.
+    pub performance: Performance,
+    /// Whether a seed of noise changes the flight.
+    #[serde(skip)]
+    flight_is_random: bool,
+}
+
+/// Results of a law.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LawRow {
+    /// Name of the law: its kind, or that of its table `[laws.NAME]`.
+    pub name: String,
+    /// Kind of the law.
+    pub kind: String,
+    /// Overrides that fly the law, one for its kind and one for each key.
+    pub overrides: Vec<String>,
+    /// Flights that were proved clear by both detectors.
+    pub clear: Proportion,
+    /// Flights with a violation.
+    pub violated: Proportion,
+    /// Flights without a violation that ended early.
+    pub ended_early: u64,
+    /// Flights that the judge cannot decide.
+    pub undecided: u64,
+    /// Flights, of any outcome, that `tautline check` refuses.
+    pub refused: u64,
+    /// Flights that reached the formation.
+    pub reached: Proportion,
+    /// Median of the time to reach it, over the flights that did \[s\].
+    pub reached_median_s: Estimate,
+    /// 95th percentile of that time \[s\].
+    pub reached_p95_s: Estimate,
+    /// Smallest separation of all flights \[m\].
+    pub min_smallest_m: Option<f64>,
+    /// Seed of the flight with the smallest separation.
+    pub min_smallest_seed: Option<u64>,
+    /// Median of the flights' smallest separations \[m\].
+    pub min_median_m: Estimate,
+    /// Mean path length, summed over the vehicles \[m\].
+    pub path_length_mean_m: Estimate,
+    /// Largest commanded acceleration of all flights \[m/s^2\].
+    pub peak_control_largest_m_s2: Option<f64>,
+    /// Median of the flights' largest commanded accelerations \[m/s^2\].
+    pub peak_control_median_m_s2: Estimate,
+    /// Mean integral of |u|, summed over the vehicles \[m/s\].
+    pub total_control_mean_m_s: Estimate,
+    /// The flights, in the order of their seeds.
+    pub flights: Vec<FlightSummary>,
+}
+
+/// Wall-clock times on the machine that flew.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Performance {
+    /// From first to last flight \[s\].
+    pub wall_s: f64,
+    /// Times of each law, in the order of the rows.
+    pub laws: Vec<LawPerformance>,
+}
+
+/// Wall-clock time of a law.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LawPerformance {
+    /// Name of the law.
+    pub name: String,
+    /// Time in the law over the steps of all its flights \[s\].
+    pub law_step_s: Option<f64>,
+}
+
+impl Experiment for Options {
+    type Study = Comparison;
+
+    const COMMAND: &'static str = "compare";
+
+    fn check(&self) -> Result<(), Failure> {
+        check_runs(self.runs, self.seed)
+    }
+
+    fn arguments(&self, study: &Comparison) -> Vec<String> {
+        let laws: Vec<_> = study.laws.iter().map(|law| law.name.as_str()).collect();
+        let (runs, seed) = (self.runs.to_string(), self.seed.to_string());
+        ["--laws", &laws.join(","), "--runs", &runs, "--seed", &seed].map(str::to_owned).to_vec()
+    }
+
+    fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Comparison>, Failure> {
+        let template = base.template();
+        let laws = self.laws(template)?;
+        let jitter_m = (!template.start_is_random()).then(|| JITTER * base.own().delta_m);
+        let seed = |run: u64| self.seed.saturating_add(run);
+        // Wrong starts and laws are refused before the first flight.
+        for law in &laws {
+            let law_exists = drawn(template, law, seed(0), jitter_m)?.law();
+            law_exists.map_err(|error| Failure::from(error).under(&under(law, seed(0))))?;
+        }
+        (1..self.runs).try_for_each(|run| drawn(template, &laws[0], seed(run), jitter_m).map(drop))?;
+
+        let flights = usize::try_from(self.runs).unwrap_or(usize::MAX).saturating_mul(laws.len());
+        batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
+        let began = Instant::now();
+        // All laws from one start before the next one: an interruption leaves few starts that cannot be compared.
+        let flown = batch.run(flights, |number| {
+            let (law, seed) = (&laws[number % laws.len()], seed((number / laws.len()) as u64));
+            let flight = batch.fly(&drawn(template, law, seed, jitter_m)?, seed);
+            flight.map_err(|error| Failure::from(error).under(&under(law, seed)))
+        })?;
+        let flights = by_law(flown, laws.len());
+        let runs = flights[0].len() as u64;
+        if runs == 0 {
+            return Ok(None);
+        }
+        let time = |(law, flights): (&NamedLaw, &Vec<FlightSummary>)| {
+            let steps: u64 = flights.iter().map(|flight| flight.steps).sum();
+            let law_s: f64 = flights.iter().map(|flight| flight.law_s).sum();
+            LawPerformance { name: law.name.clone(), law_step_s: (steps > 0).then(|| law_s / steps as f64) }
+        };
+        let performance =
+            Performance { wall_s: began.elapsed().as_secs_f64(), laws: laws.iter().zip(&flights).map(time).collect() };
+        Ok(Some(Comparison {
+            about: About::new(base.own()),
+            runs,
+            runs_asked: self.runs,
+            seed: self.seed,
+            jitter_m,
+            confidence: CONFIDENCE,
+            laws: laws.iter().zip(flights).map(|(law, flights)| LawRow::new(law, flights)).collect(),
+            performance,
+            flight_is_random: template.flight_is_random(),
+        }))
+    }
+
+    fn illustrate(&self, base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Vec<Section> {
+        let block = match worst_moments(base, study, pictures) {
+            Ok(pictures) => page::pictures(&pictures),
+            Err(failure) => page::list(&[format!("no pictures were taken: {}", failure.in_words())]),
+        };
+        vec![Section::new("The worst moment of each law", [Block::Page(block)])]
+    }
+}
+
+impl Options {
+    /// The laws to compare, each once.
+    fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
+        let names = self.laws.clone().unwrap_or_else(|| template.compared());
+        if names.is_empty() {
+            let help = "name one with --laws, such as edge-tension";
+            return Err(Failure::input("compare/no-law", "no law is named", help));
+        }
+        if let Some((_, twice)) = names.iter().enumerate().find(|&(k, name)| names[..k].contains(name)) {
+            return Err(Failure::input(
+                "compare/law-twice",
+                format!("the law `{twice}` is named twice"),
+                "name each once; two settings of one law have tables [laws.NAME] of two names, with the same `kind`",
+            ));
+        }
+        Ok(names.iter().map(|name| template.law(name)).collect::<Result<_, _>>()?)
+    }
+}
+
+fn under(law: &NamedLaw, seed: u64) -> String {
+    format!("under the law {}, start.seed = {seed}", law.name)
+}
+
+/// The flight of a law from the start of a seed.
+fn drawn(template: &Template, law: &NamedLaw, seed: u64, jitter_m: Option<f64>) -> Result<Scenario, Failure> {
+    let drawn = template.scenario(law, Draw { seed, jitter_m });
+    drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))
+}
+
+/// Flights by their law, of the starts that were flown under every law; `flown` has all laws of one start after the other.
+fn by_law<T>(flown: Vec<Option<T>>, laws: usize) -> Vec<Vec<T>> {
+    let mut flights: Vec<Vec<T>> = (0..laws).map(|_| Vec::new()).collect();
+    let mut flown = flown.into_iter().peekable();
+    while flown.peek().is_some() {
+        // All flights of a start are taken, whether they were flown or not.
+        let of_start: Vec<_> = flown.by_ref().take(laws).collect();
+        for (law, flight) in
+            flights.iter_mut().zip(of_start.into_iter().collect::<Option<Vec<_>>>().into_iter().flatten())
+        {
+            law.push(flight);
+        }
+    }
+    flights
+}
+
+/// One picture a law, of its flight with the smallest separation at that instant.
+fn worst_moments(base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Result<Vec<Picture>, Failure> {
+    let mut taken = Vec::new();
+    for law in &study.laws {
+        let Some(worst) = law.worst() else { continue };
+        let (Some(min_m), Some(min_at_s)) = (worst.min_m, worst.min_at_s) else { continue };
+        let named = base.template().law(&law.name)?;
+        let mut scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
+        scenario.name = format!("{}, {}", scenario.name, law.name);
+        let data_uri = pictures.shot(&scenario, min_at_s, PICTURES_BYTES / study.laws.len().max(1))?;
+        let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
+        let description = format!(
+            "{}: {} m apart at {min_at_s:.2} s{pair}, the closest of {} flights (start.seed {}).",
+            law.name,
+            at_least(min_m, 3),
+            study.runs,
+            worst.seed
+        );
+        taken.push(Picture { description, data_uri });
+    }
+    Ok(taken)
+}
+
+impl LawRow {
+    fn new(law: &NamedLaw, flights: Vec<FlightSummary>) -> Self {
+        let of = flights.len() as u64;
+        let count = |is: &dyn Fn(&FlightSummary) -> bool| flights.iter().filter(|flight| is(flight)).count() as u64;
+        let ended = |outcome: Outcome| count(&|flight| flight.outcome == outcome);
+        let known = |of: fn(&FlightSummary) -> Option<f64>| flights.iter().filter_map(of).collect::<Vec<_>>();
+        let reached_s = known(|flight| flight.reached_at_s.filter(|_| flight.reached));
+        let (min_m, peak_m_s2) = (known(|flight| flight.min_m), known(|flight| flight.peak_control_m_s2));
+        let worst = worst(&flights);
+        Self {
+            name: law.name.clone(),
+            kind: law.kind(),
+            overrides: law.overrides(),
+            clear: Proportion::new(ended(Outcome::Clear), of),
+            violated: Proportion::new(ended(Outcome::Violated), of),
+            ended_early: ended(Outcome::EndedEarly),
+            undecided: ended(Outcome::Undecided),
+            refused: count(&|flight| !flight.refused.is_empty()),
+            reached: Proportion::new(count(&|flight| flight.reached), of),
+            reached_median_s: Estimate::quantile(&reached_s, 0.5),
+            reached_p95_s: Estimate::quantile(&reached_s, 0.95),
+            min_smallest_m: worst.and_then(|flight| flight.min_m),
+            min_smallest_seed: worst.map(|flight| flight.seed),
+            min_median_m: Estimate::quantile(&min_m, 0.5),
+            path_length_mean_m: Estimate::mean(&known(|flight| Some(flight.path_length_m))),
+            peak_control_largest_m_s2: peak_m_s2.iter().copied().reduce(f64::max),
+            peak_control_median_m_s2: Estimate::quantile(&peak_m_s2, 0.5),
+            total_control_mean_m_s: Estimate::mean(&known(|flight| Some(flight.total_control_m_s))),
+            flights,
+        }
+    }
+
+    /// The flight with the smallest separation, the first of several.
+    #[must_use]
+    pub fn worst(&self) -> Option<&FlightSummary> {
+        worst(&self.flights)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let (name, of) = (&self.name, self.flights.len());
+        let refused = (self.refused > 0).then(|| {
+            let mut codes: Vec<_> =
+                self.flights.iter().flat_map(|flight| &flight.refused).map(String::as_str).collect();
+            codes.sort_unstable();
+            codes.dedup();
+            let (codes, refused) = (codes.join(", "), self.refused);
+            format!("{name}: {refused} of {of} flights are refused by `check` ({codes}) and were flown all the same")
+        });
+        let early: Vec<_> = self.flights.iter().filter(|flight| flight.ended_early.is_some()).collect();
+        let ended = early.first().map(|first| {
+            let violated = early.iter().filter(|flight| flight.outcome == Outcome::Violated).count();
+            let why = first.ended_early.as_deref().unwrap_or_default().trim_end_matches('.');
+            format!(
+                "{name}: {} of {of} flights ended early, {violated} of them after a violation; the first has start.seed {}: {why}",
+                early.len(),
+                first.seed
+            )
+        });
+        let reached = self.reached.count;
+        let censored = (reached > 0 && reached < self.reached.of).then(|| {
+            format!(
+                "{name}: the times to reach are over the {reached} of {of} flights that reached the formation, alone"
+            )
+        });
+        [refused, ended, censored].into_iter().flatten().collect()
+    }
+}
+
+fn worst(flights: &[FlightSummary]) -> Option<&FlightSummary> {
+    let known = flights.iter().filter_map(|flight| Some((flight.min_m?, flight)));
+    known.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, flight)| flight)
+}
+
+impl Study for Comparison {
+    fn kind(&self) -> &'static str {
+        "Laws side by side"
+    }
+
+    fn title(&self) -> String {
+        self.about.scenario.name.clone()
+    }
+
+    fn badge(&self) -> Badge {
+        Badge { tone: Tone::Neutral, word: "compared".to_owned() }
+    }
+
+    fn headline(&self) -> String {
+        let laws = counted(self.laws.len() as u64, "law", "laws");
+        let starts = match self.runs {
+            1 => format!("the same start (start.seed {})", self.seed),
+            runs => format!("the same {runs} starts (start.seed {} to {})", self.seed, self.seed + (runs - 1)),
+        };
+        format!("{}: {laws} from {starts}, delta {} m", self.about.scenario.name, self.about.delta_m)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let interrupted = (self.runs < self.runs_asked).then(|| {
+            format!(
+                "interrupted: of {} starts, {} were flown under every law, and these are compared",
+                self.runs_asked, self.runs
+            )
+        });
+        let jitter = self.jitter_m.map(jitter_note);
+        interrupted.into_iter().chain(jitter).chain(self.laws.iter().flat_map(LawRow::notes)).collect()
+    }
+
+    fn records(&self) -> Table {
+        Table::of("Laws", &self.laws)
+            .column("law", "Law", Kind::Text, |law| law.name.clone())
+            .column("kind", "", Kind::Text, |law| law.kind.clone())
+            .column("runs", "", Kind::Count, |law| law.clear.of)
+            .column("clear", "Proved clear [%]", Kind::Share, |law| law.clear)
+            .column("violated", "Violated [%]", Kind::Share, |law| law.violated)
+            .column("undecided_count", "Undecided", Kind::Count, |law| law.undecided)
+            .column("ended_early_count", "Ended early", Kind::Count, |law| law.ended_early)
+            .column("refused_count", "Refused by check", Kind::Count, |law| law.refused)
+            .column("reached", "Reached [%]", Kind::Share, |law| law.reached)
+            .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |law| law.reached_median_s)
+            .column("reached_p95", "Time to reach, 95 % [s]", Kind::Estimate, |law| law.reached_p95_s)
+            .column("min_smallest", "Separation, smallest [m]", Kind::AtLeast, |law| law.min_smallest_m)
+            .column("min_smallest_seed", "", Kind::Integer, |law| law.min_smallest_seed)
+            .column("min_median", "Separation, median [m]", Kind::Estimate, |law| law.min_median_m)
+            .column("path_length_mean", "Path length, mean [m]", Kind::Estimate, |law| law.path_length_mean_m)
+            .column("peak_control_largest", "Peak control, largest [m/s^2]", Kind::Measured, |law| {
+                law.peak_control_largest_m_s2
+            })
+            .column("peak_control_median", "Peak control, median [m/s^2]", Kind::Estimate, |law| {
+                law.peak_control_median_m_s2
+            })
+            .column("total_control_mean", "Total control, mean [m/s]", Kind::Estimate, |law| law.total_control_mean_m_s)
+            .build()
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let records = self.records();
+        let part = |caption: &str, columns: std::ops::Range<usize>| {
+            Block::Table(records.part(caption, |place| place == 0 || columns.contains(&place)))
+        };
+        let keys = Table::of("The keys of each law", &self.laws)
+            .column("", "Law", Kind::Text, |law| law.name.clone())
+            .column("", "Keys", Kind::Text, |law| law.overrides.join(", "))
+            .build();
+        vec![
+            Section::new(
+                "Laws side by side",
+                [
+                    part("How flights ended, with 95 % intervals", 1..9),
+                    part("How soon they reached the formation, and how near two vehicles came", 9..14),
+                    part("What it cost", 14..18),
+                ],
+            ),
+            Section::detail("Keys", [Block::Table(keys)]),
+        ]
+    }
+
+    fn assumptions(&self) -> Vec<String> {
+        ASSUMED.map(str::to_owned).to_vec()
+    }
+
+    fn is_good(&self) -> bool {
+        self.runs == self.runs_asked
+    }
+
+    fn performance(&self) -> Option<Table> {
+        let table = Table::of("Measured on the machine that flew", &self.performance.laws)
+            .column("", "Law", Kind::Text, |law| law.name.clone())
+            .column("", "A step of the law [us]", Kind::Measured, |law| law.law_step_s.map(|step_s| 1e6 * step_s));
+        Some(table.build())
+    }
+
+    fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
+        let jitter = self.jitter_m.map(|jitter_m| format!("start.jitter_m={jitter_m:?}"));
+        let repeat = |law: &LawRow| {
+            let seed = law.worst()?.seed;
+            let noise = self.flight_is_random.then(|| format!("noise.seed={seed}"));
+            let seed = format!("start.seed={seed}");
+            let sets = law.overrides.iter().chain([&seed]).chain(&noise).chain(&jitter);
+            Some((format!("The worst flight of {}:", law.name), scenario.command("run", [], sets)))
+        };
+        self.laws.iter().filter_map(repeat).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

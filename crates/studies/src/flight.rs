@@ -1,0 +1,267 @@
+//! The summary of one flight, which all studies share.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use tautline_core::record::{Event, RecordError, Sample, Sink, Step};
+use tautline_core::swarm::{Rows, row};
+use tautline_report::report::{INTERRUPTED, Report, Status};
+use tautline_report::run::run_while;
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::Scenario;
+use tautline_sim::sim::SimError;
+
+/// How a flight ended; the first of these that applies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Two vehicles came closer than delta, or one came nearer to an obstacle than its clearance.
+    Violated,
+    /// The flight ended early without a violation.
+    EndedEarly,
+    /// The judge cannot decide, or its two detectors disagree.
+    Undecided,
+    /// Flown to its end and proved clear by both detectors.
+    Clear,
+}
+
+/// Summary of one flight. Every number but `law_s` is the same for any number of threads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlightSummary {
+    /// Seed of the run: of start and noise, or of the noise alone where the study keeps the start.
+    pub seed: u64,
+    /// How the flight ended.
+    pub outcome: Outcome,
+    /// Whether `tautline run` passes the flight.
+    pub pass: bool,
+    /// Codes by which `tautline check` refuses the scenario, which is flown all the same.
+    pub refused: Vec<String>,
+    /// Why the flight ended early.
+    pub ended_early: Option<String>,
+    /// Whether the formation of every leg was reached, and the last one kept to the end.
+    pub reached: bool,
+    /// Time from which the last formation was kept \[s\].
+    pub reached_at_s: Option<f64>,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+    /// Smallest distance of two centres \[m\].
+    pub min_m: Option<f64>,
+    /// Time of the smallest distance \[s\].
+    pub min_at_s: Option<f64>,
+    /// Vehicles of the smallest distance, counted from 1.
+    pub min_pair: Option<[usize; 2]>,
+    /// Separation that the law's certificate promises \[m\].
+    pub certified_m: Option<f64>,
+    /// Whether two vehicles came closer than certified, by more than the error of integration: a defect.
+    #[serde(default)]
+    pub breaks_certificate: bool,
+    /// Path length, summed over the vehicles \[m\].
+    pub path_length_m: f64,
+    /// Largest commanded acceleration of a vehicle \[m/s^2\].
+    pub peak_control_m_s2: Option<f64>,
+    /// Integral of |u|, summed over the vehicles \[m/s\].
+    pub total_control_m_s: f64,
+    /// Largest energy over the initial energy.
+    pub energy_max_over_initial: Option<f64>,
+    /// Number of steps.
+    pub steps: u64,
+    /// Steps that were flown in parts.
+    pub refined_steps: u64,
+    /// Steps whose shortest part was longer than the law allows: the motion is not that of the law.
+    pub overlong_steps: u64,
+    /// SHA-256 of the resolved scenario.
+    pub scenario_sha256: String,
+    /// Hash over the bits of every recorded state.
+    pub state_hash: String,
+    /// Wall-clock time in the law \[s\].
+    #[serde(skip)]
+    pub law_s: f64,
+}
+
+/// Flies a scenario to its end and summarises the flight; memory does not grow with the length of the flight.
+///
+/// `carry_on` is called after each step with the number of steps. [`ControlFlow::Break`] ends the flight without a summary.
+///
+/// # Errors
+/// [`SimError`] where the law or the judge cannot be built.
+pub fn fly(
+    scenario: &Scenario,
+    seed: u64,
+    carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<Option<FlightSummary>, SimError> {
+    let mut effort = Effort::default();
+    let report = run_while(scenario, &Preflight::of(scenario)?, &mut effort, carry_on)?;
+    let is_whole = report.run.ended_early.as_deref() != Some(INTERRUPTED);
+    Ok(is_whole.then(|| FlightSummary::new(report, seed, &effort)))
+}
+
+impl FlightSummary {
+    /// Returns whether the flight is worse than another: a violation is worse than none, then the smaller separation counts.
+    #[must_use]
+    pub fn is_worse_than(&self, other: &Self) -> bool {
+        let rank = |flight: &Self| (flight.outcome != Outcome::Violated, flight.min_m.unwrap_or(f64::INFINITY));
+        rank(self) < rank(other)
+    }
+
+    /// Smallest separation less delta \[m\].
+    #[must_use]
+    pub fn clearance_m(&self) -> Option<f64> {
+        self.min_m.map(|min_m| min_m - self.delta_m)
+    }
+
+    fn new(report: Report, seed: u64, effort: &Effort) -> Self {
+        let breaks_certificate = report.breaks_certificate();
+        Self {
+            seed,
+            outcome: Outcome::of(&report),
+            pass: report.verdict.pass,
+            refused: report.verdict.refused,
+            ended_early: report.run.ended_early,
+            reached: report.formation.reached && report.legs.iter().all(|leg| leg.reached_at_s.is_some()),
+            reached_at_s: report.formation.reached_at_s,
+            delta_m: report.separation.delta_m,
+            min_m: report.separation.min_m,
+            min_at_s: report.separation.min_at_s,
+            min_pair: report.separation.min_pair,
+            certified_m: report.separation.certified_m,
+            breaks_certificate,
+            path_length_m: effort.path_length_m(),
+            peak_control_m_s2: report.control.peak_m_s2,
+            total_control_m_s: effort.total_control_m_s(),
+            energy_max_over_initial: report.energy.max_over_initial,
+            steps: report.run.steps,
+            refined_steps: report.run.refined_steps,
+            overlong_steps: report.run.overlong_steps,
+            scenario_sha256: report.scenario.sha256,
+            state_hash: report.run.state_hash,
+            law_s: report.performance.map_or(0.0, |times| times.law_s),
+        }
+    }
+}
+
+impl Outcome {
+    /// Returns the stable name, such as `ended_early`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Violated => "violated",
+            Self::EndedEarly => "ended_early",
+            Self::Undecided => "undecided",
+            Self::Clear => "clear",
+        }
+    }
+
+    fn of(report: &Report) -> Self {
+        match report.audit.status {
+            Status::Violation => Self::Violated,
+            _ if report.run.ended_early.is_some() => Self::EndedEarly,
+            Status::Clear if report.audit.parry.disagreements == 0 => Self::Clear,
+            Status::Clear | Status::Undecided => Self::Undecided,
+        }
+    }
+}
+
+/// Path length and control effort of a swarm, accumulated over every step of a flight. Memory is that of one state.
+///
+/// The path within a step counts as straight.
+#[derive(Clone, Debug, Default)]
+pub struct Effort {
+    before: Option<Before>,
+    path_length_m: f64,
+    total_control_m_s: f64,
+}
+
+/// State after the previous step.
+#[derive(Clone, Debug)]
+struct Before {
+    time_s: f64,
+    positions_m: Rows,
+    control_m_s2: f64,
+}
+
+impl Effort {
+    /// Returns the path length, summed over the vehicles \[m\].
+    #[must_use]
+    pub fn path_length_m(&self) -> f64 {
+        self.path_length_m
+    }
+
+    /// Returns the integral of |u| over the flight by the trapezoidal rule over its steps, summed over the vehicles \[m/s\].
+    #[must_use]
+    pub fn total_control_m_s(&self) -> f64 {
+        self.total_control_m_s
+    }
+}
+
+impl Sink for Effort {
+    fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn event(&mut self, _event: &Event) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        let (time_s, positions_m) = (step.time_s, &step.swarm.positions_m);
+        let command = (step.control.nrows() > 0).then(|| sum_of_norms(step.control, None));
+        let Some(before) = &mut self.before else {
+            let control_m_s2 = command.unwrap_or(0.0);
+            self.before = Some(Before { time_s, positions_m: positions_m.clone(), control_m_s2 });
+            return;
+        };
+        // Without an answer of the law the previous command holds.
+        let control_m_s2 = command.unwrap_or(before.control_m_s2);
+        self.path_length_m += sum_of_norms(positions_m, Some(&before.positions_m));
+        self.total_control_m_s += f64::midpoint(before.control_m_s2, control_m_s2) * (time_s - before.time_s);
+        before.positions_m.copy_from(positions_m);
+        (before.time_s, before.control_m_s2) = (time_s, control_m_s2);
+    }
+}
+
+/// Sums the norms of all rows, or of their differences from another table, in the order of the rows.
+fn sum_of_norms(rows: &Rows, from: Option<&Rows>) -> f64 {
+    (0..rows.nrows()).map(|i| from.map_or_else(|| row(rows, i), |from| row(rows, i) - row(from, i)).norm()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tautline_core::swarm::Swarm;
+
+    /// Two vehicles on circles of 1 m and 2 m, commanded t and 2 t m/s^2.
+    fn seen(steps: u32) -> Effort {
+        let mut effort = Effort::default();
+        for k in 0..=steps {
+            let time_s = f64::from(k) / f64::from(steps);
+            let (y, x) = (std::f64::consts::TAU * time_s).sin_cos();
+            let swarm = Swarm::at_rest(Rows::from_row_slice(&[x, y, 0.0, 2.0 * x, 2.0 * y, 0.0]));
+            let control = Rows::from_row_slice(&[0.0, time_s, 0.0, 0.0, 0.0, -2.0 * time_s]);
+            effort.step(&Step { time_s, swarm: &swarm, control: &control });
+        }
+        effort
+    }
+
+    #[test]
+    fn ways_and_commands_of_all_vehicles_are_summed() {
+        let effort = seen(1000);
+        // Chords of 1000 parts are shorter than their arcs by a part of 1.6e-6.
+        assert!((effort.path_length_m() / (3.0 * std::f64::consts::TAU) - 1.0).abs() < 2e-6);
+        assert!((effort.total_control_m_s() - 1.5).abs() < 1e-12, "the trapezoidal rule is exact for a line");
+        assert!(seen(4).path_length_m() < 0.91 * effort.path_length_m(), "few looks see less of a way");
+    }
+
+    #[test]
+    fn an_end_that_is_told_twice_counts_once_and_a_law_without_an_answer_leaves_the_last_command() {
+        let mut effort = seen(10);
+        let (way_m, control_m_s) = (effort.path_length_m(), effort.total_control_m_s());
+        let swarm = Swarm::at_rest(Rows::from_row_slice(&[1.0, 0.0, 0.0, 2.0, 0.0, 0.0]));
+        let none = Rows::zeros(0);
+        effort.step(&Step { time_s: 1.0, swarm: &swarm, control: &none });
+        assert!((effort.path_length_m() - way_m).abs() < 1e-12 && effort.total_control_m_s() == control_m_s);
+        effort.step(&Step { time_s: 1.5, swarm: &swarm, control: &none });
+        assert!((effort.total_control_m_s() - control_m_s - 1.5).abs() < 1e-12);
+        assert_eq!(Effort::default().path_length_m(), 0.0);
+    }
+}

@@ -1,0 +1,455 @@
+//! How much of one key a verdict survives: the two values between which it turns, by bisection over seeded flights.
+
+use std::ops::RangeInclusive;
+
+use serde::Serialize;
+
+use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
+use crate::batch::Batch;
+use crate::flight::FlightSummary;
+use crate::statistics::{CONFIDENCE, Proportion};
+use crate::study::{About, Block, Experiment, Section, Study};
+use crate::table::{Kind, Table};
+use tautline_core::text::{as_toml, counted, significant};
+use tautline_report::figures::{Share, margin as figure};
+use tautline_report::report::page::{Badge, Tone};
+use tautline_report::request::{Failure, ScenarioRequest, in_range};
+use tautline_sim::preflight::{Bound, Near, PredictedMargin, Preflight};
+use tautline_sim::scenario::Scenario;
+
+/// Values that may be scanned first.
+const SCANS: RangeInclusive<usize> = 2..=1000;
+/// Halvings that may be asked for.
+const HALVINGS: RangeInclusive<u32> = 0..=50;
+
+/// What the numbers rest on.
+const ASSUMED: [&str; 3] = [
+    "A value of the key holds where every run of it does. One run that does not is enough, so more runs find a smaller margin.",
+    "The range is scanned at a few values first, and the first interval in which the verdict turns is halved. A turn and back \
+     between two neighbouring values is not seen.",
+    "Shares have the interval of Clopper and Pearson for a number of runs that was fixed before the first.",
+];
+
+/// Options of a search for a margin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// The key that is changed, such as `time.control_hz`.
+    pub key: String,
+    /// Its values.
+    pub range: Range,
+    /// What every run has to show.
+    pub question: Question,
+    /// Runs of each value: 1 to [`crate::MOST_RUNS`]. A single run has everything but the key as the scenario says.
+    pub runs: u64,
+    /// Seed of the first run; run k, from 0, has this plus k for start and noise.
+    pub seed: u64,
+}
+
+/// The values between which a verdict is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The first.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+    /// Number of values, evenly spaced with both ends, that are scanned first: 2 to 1000.
+    pub scan: usize,
+    /// Number of times that the interval in which the verdict turns is halved: 0 to 50.
+    pub halvings: u32,
+    /// Whether values are spaced and halved by their ratio.
+    pub logarithmic: bool,
+}
+
+/// One value of the key.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Probe {
+    /// The value.
+    pub value: f64,
+    /// Runs that showed what was asked.
+    pub held: Proportion,
+    /// Smallest separation of all its runs \[m\].
+    pub min_m: Option<f64>,
+    /// Its runs, in the order of their seeds.
+    pub flights: Vec<FlightSummary>,
+}
+
+/// Where the verdict turns.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Turn {
+    /// The two values that the verdict turns between, the smaller one first.
+    pub bracket: [f64; 2],
+    /// Whether the verdict holds at the smaller one.
+    pub holds_below: bool,
+    /// Number of turns among the values that were scanned first.
+    pub turns: u64,
+}
+
+/// How much of a key a verdict survives. What does not apply is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Margin {
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
+    /// The key that was changed.
+    pub key: String,
+    /// The first and the last value, as they were asked for.
+    pub range: [f64; 2],
+    /// Whether values were spaced and halved by their ratio.
+    pub logarithmic: bool,
+    /// What every run of a value had to show.
+    pub question: Question,
+    /// Runs of each value.
+    pub runs: u64,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Whether a start without randomness was moved.
+    pub jittered: bool,
+    /// Confidence of all intervals.
+    pub confidence: f64,
+    /// Where the verdict turns; none where it was the same at every value.
+    pub turn: Option<Turn>,
+    /// What linear theory predicts for this key near the first formation, as `check` says it; empty where there is no theory.
+    pub predicted: Vec<PredictedMargin>,
+    /// Whether the search was interrupted before the bracket was as narrow as asked.
+    pub interrupted: bool,
+    /// Every value that was tried, in increasing order.
+    pub probes: Vec<Probe>,
+    #[serde(skip)]
+    seeds: Runs,
+}
+
+impl Options {
+    /// Whether single flights pass between two values of a key: 5 values and 6 halvings.
+    #[must_use]
+    pub fn new(key: &str, from: f64, to: f64) -> Self {
+        let range = Range { from, to, scan: 5, halvings: 6, logarithmic: false };
+        Self { key: key.to_owned(), range, question: Question::Pass, runs: 1, seed: 0 }
+    }
+
+    /// The scenario with a value of the key and the overrides of a run.
+    fn scenario(&self, base: &BaseScenario, value: f64, sets: Vec<String>) -> Result<Scenario, Failure> {
+        let key = format!("{}={}", self.key, as_toml(value));
+        let sets: Vec<_> = sets.into_iter().chain([key]).collect();
+        base.with(&sets).map_err(|error| Failure::from(error).under(&self.under(value)))
+    }
+
+    fn under(&self, value: f64) -> String {
+        format!("with {} = {value}", self.key)
+    }
+}
+
+impl Experiment for Options {
+    type Study = Margin;
+
+    const COMMAND: &'static str = "margin";
+
+    fn check(&self) -> Result<(), Failure> {
+        check_runs(self.runs, self.seed)?;
+        in_range("--scan", &self.range.scan, &SCANS)?;
+        in_range("--halvings", &self.range.halvings, &HALVINGS)?;
+        let Range { from, to, logarithmic, .. } = self.range;
+        let why = if !from.is_finite() || !to.is_finite() {
+            format!("a range from {from} to {to}")
+        } else if from == to {
+            format!("both ends of the range are {from}")
+        } else if logarithmic && (from <= 0.0 || to <= 0.0) {
+            format!("a logarithmic range from {from} to {to}")
+        } else {
+            return Ok(());
+        };
+        let help = "give --from and --to two different finite numbers, both more than 0 where --log is given";
+        Err(Failure::input("margin/range", why, help))
+    }
+
+    fn arguments(&self, _study: &Margin) -> Vec<String> {
+        let Self { key, range, question, runs, seed } = self;
+        let mut arguments: Vec<_> = [
+            ("--key", key.clone()),
+            ("--from", format!("{:?}", range.from)),
+            ("--to", format!("{:?}", range.to)),
+            ("--runs", runs.to_string()),
+            ("--seed", seed.to_string()),
+            ("--verdict", question.name().to_owned()),
+            ("--scan", range.scan.to_string()),
+            ("--halvings", range.halvings.to_string()),
+        ]
+        .into_iter()
+        .flat_map(|(option, value)| [option.to_owned(), value])
+        .collect();
+        arguments.extend(range.logarithmic.then(|| "--log".to_owned()));
+        arguments
+    }
+
+    fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Margin>, Failure> {
+        let (own, range) = (base.own(), self.range);
+        let [from, to] = [range.from, range.to].map(|end| self.scenario(base, end, Vec::new()));
+        let ends = [from?, to?];
+        let is_random = ends.iter().any(Scenario::is_random_in_flight) || self.key == JITTER_KEY;
+        let runs = Runs::new(self.runs, self.seed, base, is_random);
+        // Where the law cannot be built, the flight says so.
+        let predicted = Preflight::of(own).map(|preflight| preflight.margins).unwrap_or_default();
+        let values = range.scan as u64 + u64::from(range.halvings);
+        let steps = own.time.steps().saturating_mul(values.saturating_mul(self.runs));
+        batch.monitor().begin(Self::COMMAND, Some(steps));
+        let mut probes: Vec<Probe> = Vec::new();
+        let found = search(range, base.takes_integers_only(&self.key), &mut |value| {
+            let flown = batch.run(usize::try_from(self.runs).unwrap_or(usize::MAX), |run| {
+                let scenario = self.scenario(base, value, runs.sets(run as u64))?;
+                let flight = batch.fly(&scenario, runs.seed(run as u64));
+                flight.map_err(|error| Failure::from(error).under(&self.under(value)))
+            })?;
+            let probe =
+                flown.into_iter().collect::<Option<Vec<_>>>().map(|flights| Probe::new(value, self.question, flights));
+            let holds = probe.as_ref().map(Probe::holds);
+            probes.extend(probe);
+            Ok::<_, Failure>(holds)
+        })?;
+        let interrupted = batch.is_interrupted();
+        probes.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let Some(found) = found.filter(|found| !matches!(found, Found::Even(_)) || !interrupted) else {
+            return Ok(None);
+        };
+        let turn = match found {
+            Found::Even(_) => None,
+            Found::Turn { before, after, was, turns } => Some(Turn {
+                bracket: [before.min(after), before.max(after)],
+                holds_below: was == (before < after),
+                turns: turns as u64,
+            }),
+        };
+        Ok(Some(Margin {
+            about: About::new(own),
+            key: self.key.clone(),
+            range: [range.from, range.to],
+            logarithmic: range.logarithmic,
+            question: self.question,
+            runs: self.runs,
+            seed: self.seed,
+            jittered: runs.jitter_m.is_some(),
+            confidence: CONFIDENCE,
+            turn,
+            predicted: predicted.into_iter().filter(|margin| is_same(margin.key, &self.key)).collect(),
+            interrupted,
+            probes,
+            seeds: runs,
+        }))
+    }
+}
+
+/// Whether two keys are one: the rate of commands has two names.
+fn is_same(key: &str, other: &str) -> bool {
+    let name = |key: &str| if key == "time.control_hz" { "actuation.control_hz".to_owned() } else { key.to_owned() };
+    name(key) == name(other)
+}
+
+impl Probe {
+    fn new(value: f64, question: Question, flights: Vec<FlightSummary>) -> Self {
+        let held = flights.iter().filter(|flight| question.holds(flight)).count();
+        let min_m = flights.iter().filter_map(|flight| flight.min_m).reduce(f64::min);
+        Self { value, held: Proportion::new(held as u64, flights.len() as u64), min_m, flights }
+    }
+
+    /// Whether every run showed what was asked.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.held.count == self.held.of
+    }
+
+    /// The number of the first run, from 0, that did not show what was asked; of the first of all where all did.
+    #[must_use]
+    pub fn worst_run(&self, question: Question) -> u64 {
+        self.flights.iter().position(|flight| !question.holds(flight)).unwrap_or_default() as u64
+    }
+}
+
+impl Margin {
+    /// Whether the verdict held at every value that was tried.
+    #[must_use]
+    pub fn holds_everywhere(&self) -> bool {
+        self.probes.iter().all(Probe::holds)
+    }
+
+    /// The values on either side of the turn, the one that holds first.
+    #[must_use]
+    pub fn sides(&self) -> Option<[&Probe; 2]> {
+        let Turn { bracket, holds_below, .. } = self.turn?;
+        let [low, high] = bracket.map(|value| self.probes.iter().find(|probe| probe.value == value));
+        if holds_below { Some([low?, high?]) } else { Some([high?, low?]) }
+    }
+}
+
+/// A prediction of linear theory in words.
+fn prediction(margin: &PredictedMargin) -> String {
+    let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
+    let state = if margin.state == Near::Free { "where nobody pushes" } else { "where the nearest are in contact" };
+    margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
+}
+
+impl Study for Margin {
+    fn kind(&self) -> &'static str {
+        "Margin"
+    }
+
+    fn title(&self) -> String {
+        format!("{}: {}", self.about.scenario.name, self.key)
+    }
+
+    fn badge(&self) -> Badge {
+        let flights: u64 = self.probes.iter().map(|probe| probe.held.of).sum();
+        let values = counted(self.probes.len() as u64, "value", "values");
+        Badge { tone: Tone::Neutral, word: format!("{values}, {}", counted(flights, "flight", "flights")) }
+    }
+
+    fn headline(&self) -> String {
+        let (key, name) = (&self.key, &self.about.scenario.name);
+        let [does, does_not] = self.question.words();
+        let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
+        match (self.turn, self.sides()) {
+            (Some(turn), Some([holds, fails])) => {
+                let [up, from] = if turn.holds_below { ["up to", "from"] } else { ["from", "up to"] };
+                let runs = match self.runs {
+                    1 => "the flight".to_owned(),
+                    _ => format!("{} of {}", fails.held.of - fails.held.count, fails.held.of),
+                };
+                format!("{name} {does} with {key} {up} {}; {runs} {does_not} {from} {}", holds.value, fails.value)
+            }
+            _ if self.holds_everywhere() => {
+                format!("{name} {does} at every value of {key} tried, from {low} to {high}")
+            }
+            _ => format!("{name} {does_not} at any value of {key} tried, from {low} to {high}"),
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let predicted =
+            self.predicted.iter().map(|margin| format!("predicted by linear theory: {}", prediction(margin)));
+        let interrupted = self.interrupted.then(|| "interrupted: the bracket is wider than was asked".to_owned());
+        let turns = self.turn.filter(|turn| turn.turns > 1).map(|turn| {
+            format!(
+                "the verdict turns {} times among the values scanned first: the bracket is that of the first turn from {}, \
+                 and nothing is known beyond it",
+                turn.turns, self.range[0]
+            )
+        });
+        let jitter = self.seeds.jitter_m.map(jitter_note);
+        predicted.chain([interrupted, turns, jitter].into_iter().flatten()).collect()
+    }
+
+    fn records(&self) -> Table {
+        let does = self.question.words()[0];
+        let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
+        Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.probes)
+            .column(&self.key, &self.key, Kind::Exact, |probe| probe.value)
+            .column("runs", "", Kind::Count, |probe| probe.held.of)
+            .column("held", &does, Kind::Share, |probe| probe.held)
+            .column("min", "Smallest separation [m]", Kind::Metres, |probe| probe.min_m)
+            .build()
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let shares = self.probes.iter().map(|probe| Share {
+            value: probe.value,
+            share: probe.held.share.unwrap_or(f64::NAN),
+            interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
+        });
+        let chart = figure(
+            &shares.collect::<Vec<_>>(),
+            &self.key,
+            self.question.words()[0],
+            self.turn.map(|turn| turn.bracket),
+            &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
+            self.logarithmic,
+        );
+        vec![
+            Section::new("Where the verdict turns", [Block::Figures(vec![chart])]),
+            Section::new("Every value tried", [Block::Table(self.records())]),
+        ]
+    }
+
+    fn assumptions(&self) -> Vec<String> {
+        ASSUMED.map(str::to_owned).to_vec()
+    }
+
+    fn is_good(&self) -> bool {
+        !self.interrupted && (self.turn.is_some() || self.holds_everywhere())
+    }
+
+    fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
+        let side = |(probe, what): (&Probe, &str)| {
+            let key = format!("{}={}", self.key, as_toml(probe.value));
+            let sets: Vec<_> = self.seeds.sets(probe.worst_run(self.question)).into_iter().chain([key]).collect();
+            (format!("A flight that {what}:"), scenario.command("run", [], &sets))
+        };
+        self.sides().into_iter().flat_map(|sides| sides.into_iter().zip(self.question.words())).map(side).collect()
+    }
+}
+
+/// Result of a search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Found {
+    /// The answer is the same at every value that was tried.
+    Even(bool),
+    /// The answer turns between two values.
+    Turn {
+        /// The last value with the answer of the range's beginning.
+        before: f64,
+        /// The first value with the other answer.
+        after: f64,
+        /// The answer of the range's beginning.
+        was: bool,
+        /// Number of turns among the values that were scanned first.
+        turns: usize,
+    },
+}
+
+/// Calls `ask` at evenly spaced values, then halves the first interval in which the answer turns; only at integers, each of them
+/// once, where `integers`. A missing answer ends the search with what is known then: `None` without an answer at both ends of an
+/// interval.
+fn search<E>(
+    range: Range,
+    integers: bool,
+    ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>,
+) -> Result<Option<Found>, E> {
+    let between = |from: f64, to: f64, share: f64| {
+        let ratio = || from * libm::pow(to / from, share);
+        let value = if range.logarithmic { ratio() } else { from + (to - from) * share };
+        if integers { value.round() } else { value }
+    };
+    let last = range.scan.max(2) - 1;
+    let value = |k: usize| match k {
+        0 => range.from,
+        _ if k == last => range.to,
+        _ => between(range.from, range.to, k as f64 / last as f64),
+    };
+    let mut values: Vec<_> = (0..=last).map(value).collect();
+    values.dedup();
+    let mut scanned: Vec<(f64, bool)> = Vec::with_capacity(values.len());
+    for &value in &values {
+        match ask(value)? {
+            Some(answer) => scanned.push((value, answer)),
+            None => break,
+        }
+    }
+    let Some(&(_, was)) = scanned.first() else { return Ok(None) };
+    let turns = || scanned.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let Some(turn) = turns().next() else {
+        return Ok(Some(Found::Even(was)).filter(|_| scanned.len() == values.len()));
+    };
+    let (mut before, mut after) = (turn[0].0, turn[1].0);
+    for _ in 0..range.halvings {
+        let middle = between(before, after, 0.5);
+        // Nothing lies between neighbours.
+        if middle == before || middle == after {
+            break;
+        }
+        match ask(middle)? {
+            Some(answer) if answer == was => before = middle,
+            Some(_) => after = middle,
+            None => break,
+        }
+    }
+    Ok(Some(Found::Turn { before, after, was, turns: turns().count() }))
+}
+
+#[cfg(test)]
+mod tests;

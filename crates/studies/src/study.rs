@@ -1,0 +1,371 @@
+//! A study: scenarios that are flown, what is measured, and how the answer is written.
+//!
+//! An [`Experiment`] holds the options of a study and flies it. Its answer is a [`Study`]: a headline, notes and tables, from which
+//! text, JSON, CSV, LaTeX and a page follow. [`answer`] does everything that a command of the command line does.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::base::BaseScenario;
+use crate::batch::Batch;
+use crate::table::Table;
+use tautline_report::figures::Figure;
+use tautline_report::report::page::{self, Badge, Markup, Page, section};
+use tautline_report::report::{ScenarioIdentity, Tool};
+use tautline_report::request::outputs::{self, Called, is_standard_output, write};
+use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
+use tautline_sim::scenario::Scenario;
+
+/// Version of the keys of every JSON file of this crate: raised when a key is renamed, removed or changes its meaning.
+pub const SCHEMA_VERSION: u32 = 3;
+
+/// The answer of a study.
+pub trait Study: Serialize {
+    /// Kind of the page, such as `Margin`.
+    fn kind(&self) -> &'static str;
+
+    /// Title of the page.
+    fn title(&self) -> String;
+
+    /// The word beside the verdict of the page.
+    fn badge(&self) -> Badge;
+
+    /// The answer in a sentence.
+    fn headline(&self) -> String;
+
+    /// What a reader must know to read the answer, a sentence each.
+    fn notes(&self) -> Vec<String>;
+
+    /// Tables and figures. Tables are also in the text and in LaTeX, unless their section is a detail.
+    fn sections(&self) -> Vec<Section>;
+
+    /// A row a unit of the study, such as a law or a value of a key: the CSV file.
+    fn records(&self) -> Table;
+
+    /// What the numbers rest on, a sentence each.
+    fn assumptions(&self) -> Vec<String>;
+
+    /// Whether the command exits with 0.
+    fn is_good(&self) -> bool;
+
+    /// Wall-clock times, which are the only part that differs between two answers to the same question.
+    fn performance(&self) -> Option<Table> {
+        None
+    }
+
+    /// Commands that fly single flights of the study again, each with what it flies.
+    fn repeats(&self, _scenario: &ScenarioRequest) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    /// The answer as JSON.
+    ///
+    /// # Errors
+    /// None in practice: every value has a JSON form.
+    fn to_json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
+
+    /// The records as CSV with a line of names.
+    ///
+    /// # Errors
+    /// None in practice: the table is written to memory.
+    fn to_csv(&self) -> Result<Vec<u8>, csv::Error> {
+        self.records().csv()
+    }
+
+    /// The tables as LaTeX, each a `tabular`.
+    fn to_latex(&self) -> String {
+        let lines = std::iter::once(self.headline()).chain(self.notes());
+        let comments = lines.fold(String::new(), |text, line| text + "% " + &line + "\n");
+        let tables: Vec<_> = tables(self).iter().map(Table::latex).collect();
+        format!("{comments}% In brackets: 95 % intervals.\n{}", tables.join("\n"))
+    }
+
+    /// The tables for a terminal.
+    fn text(&self) -> String {
+        let tables: Vec<_> = tables(self).iter().chain(&self.performance()).map(Table::text).collect();
+        tables.join("\n")
+    }
+
+    /// The answer as a self-contained page. Two answers to the same question give the same bytes, but for the part on performance,
+    /// which is the last.
+    fn to_html(&self, page: &StudyPage) -> String {
+        let mut sections: Vec<_> = self.sections().into_iter().map(Section::html).collect();
+        let mut add = |heading: &str, blocks: Vec<Markup>| {
+            if !blocks.is_empty() {
+                sections.push(section(heading, &blocks));
+            }
+        };
+        let list = |items: Vec<String>| if items.is_empty() { Vec::new() } else { vec![page::list(&items)] };
+        add("What to know", list(self.notes()));
+        for Section { heading, blocks, .. } in page.sections.clone() {
+            add(&heading, blocks.into_iter().map(Block::html).collect());
+        }
+        add("What was assumed", list(self.assumptions()));
+        add("Repeat it", page.commands.iter().map(|command| page::command(command)).collect());
+        let repeat = |(what, command): &(String, String)| [page::list(&[what]), page::command(command)];
+        add("Fly it again", page.repeats.iter().flat_map(repeat).collect());
+        add("Performance", self.performance().iter().map(Table::html).collect());
+        let whole = Page {
+            title: self.title(),
+            kind: self.kind(),
+            badge: self.badge(),
+            verdict: self.headline(),
+            reasons: Vec::new(),
+            warnings: Vec::new(),
+            sections,
+        };
+        if page.has_replays { whole.render_with_replays() } else { whole.render() }
+    }
+}
+
+/// Tables that are no details.
+fn tables(study: &(impl Study + ?Sized)) -> Vec<Table> {
+    let blocks = study.sections().into_iter().filter(|section| !section.is_detail).flat_map(|section| section.blocks);
+    let table = |block| if let Block::Table(table) = block { Some(table) } else { None };
+    blocks.filter_map(table).collect()
+}
+
+/// A part of an answer under a heading.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// The heading.
+    pub heading: String,
+    /// Tables, figures and other blocks.
+    pub blocks: Vec<Block>,
+    /// Whether the section is on the page alone.
+    pub is_detail: bool,
+}
+
+/// A block of a section.
+#[derive(Clone, Debug)]
+pub enum Block {
+    /// A table.
+    Table(Table),
+    /// Figures side by side.
+    Figures(Vec<Figure>),
+    /// Any other part of a page.
+    Page(Markup),
+}
+
+impl Section {
+    /// A section of an answer.
+    #[must_use]
+    pub fn new(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
+        Self { heading: heading.into(), blocks: blocks.into_iter().collect(), is_detail: false }
+    }
+
+    /// A section that is on the page alone.
+    #[must_use]
+    pub fn detail(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
+        Self { is_detail: true, ..Self::new(heading, blocks) }
+    }
+
+    fn html(self) -> Markup {
+        section(&self.heading, &self.blocks.into_iter().map(Block::html).collect::<Vec<_>>())
+    }
+}
+
+impl Block {
+    fn html(self) -> Markup {
+        match self {
+            Self::Table(table) => table.html(),
+            Self::Figures(figures) => page::figures(&figures),
+            Self::Page(markup) => markup,
+        }
+    }
+}
+
+/// What a page shows beside the answer.
+#[derive(Clone, Debug, Default)]
+pub struct StudyPage {
+    /// Commands, and specifications, that make the study again.
+    pub commands: Vec<String>,
+    /// What a command flies, and the command.
+    pub repeats: Vec<(String, String)>,
+    /// More sections, such as pictures.
+    pub sections: Vec<Section>,
+    /// Whether a section replays a flight, which takes a script.
+    pub has_replays: bool,
+}
+
+/// The options of a study, which fly it.
+pub trait Experiment {
+    /// The answer.
+    type Study: Study;
+
+    /// Name of the command.
+    const COMMAND: &'static str;
+
+    /// Refuses options out of range, before anything is read or written.
+    ///
+    /// # Errors
+    /// [`Failure`] that names the option.
+    fn check(&self) -> Result<(), Failure>;
+
+    /// Options of the command line that ask for `study` again.
+    fn arguments(&self, study: &Self::Study) -> Vec<String>;
+
+    /// Flies the study. `None` where it was interrupted before anything was known.
+    ///
+    /// # Errors
+    /// [`Failure`] where the options or the scenario are wrong.
+    fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Self::Study>, Failure>;
+
+    /// Makes ready what is written beside the files of the study, before anything is flown.
+    ///
+    /// # Errors
+    /// [`Failure`] where it cannot be written.
+    fn prepare(&self, _force: bool) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Sections that only a page has, such as pictures.
+    fn illustrate(&self, _base: &BaseScenario, _study: &Self::Study, _pictures: &dyn Pictures) -> Vec<Section> {
+        Vec::new()
+    }
+
+    /// Writes what is written beside the files of the study.
+    ///
+    /// # Errors
+    /// [`Failure`] where it cannot be written.
+    fn conclude(
+        &self,
+        _request: &ScenarioRequest,
+        _study: &Self::Study,
+        _pictures: &dyn Pictures,
+        _monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        Ok(())
+    }
+}
+
+/// A scenario, the options of a study of it, and the files to write.
+#[derive(Clone, Debug)]
+pub struct StudyRequest<E> {
+    /// The scenario.
+    pub scenario: ScenarioRequest,
+    /// The options.
+    pub options: E,
+    /// Files to write.
+    pub files: StudyFiles,
+    /// Number of threads, by default one a core. The answer is the same for any number.
+    pub threads: Option<usize>,
+}
+
+/// Files of a study. `-` is standard output.
+#[derive(Clone, Debug, Default)]
+pub struct StudyFiles {
+    /// Every number.
+    pub json: Option<PathBuf>,
+    /// A row a unit of the study.
+    pub csv: Option<PathBuf>,
+    /// The tables as LaTeX.
+    pub latex: Option<PathBuf>,
+    /// A page.
+    pub html: Option<PathBuf>,
+    /// Whether existing files are overwritten.
+    pub force: bool,
+}
+
+impl StudyFiles {
+    /// Options of the files, and the files that are asked for.
+    pub fn outputs(&self) -> impl Iterator<Item = Called<'_>> {
+        let all = [("--json", &self.json), ("--csv", &self.csv), ("--latex", &self.latex), ("--html", &self.html)];
+        all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
+    }
+
+    /// Whether standard output carries a file.
+    #[must_use]
+    pub fn are_piped(&self) -> bool {
+        self.outputs().any(|(_, file)| is_standard_output(file))
+    }
+}
+
+impl<E> StudyRequest<E> {
+    /// A study without files, on all cores.
+    #[must_use]
+    pub fn new(scenario: ScenarioRequest, options: E) -> Self {
+        Self { scenario, options, files: StudyFiles::default(), threads: None }
+    }
+}
+
+/// Flies a study, hands its answer to the monitor and writes its files. `None` where the monitor interrupted before anything was
+/// known.
+///
+/// # Errors
+/// [`Failure`] where the request or the scenario is wrong, or a file cannot be written.
+pub fn answer<E: Experiment>(
+    request: &StudyRequest<E>,
+    pictures: &dyn Pictures,
+    monitor: &dyn Monitor,
+) -> Result<Option<E::Study>, Failure> {
+    let StudyRequest { scenario, options, files, threads } = request;
+    options.check()?;
+    let batch = Batch::new(*threads, monitor)?;
+    outputs::check_new(&scenario.argument, files.outputs(), files.force)?;
+    let base = BaseScenario::of(scenario)?;
+    options.prepare(files.force)?;
+    let flown = options.fly(&base, &batch);
+    monitor.finish();
+    let Some(study) = flown? else {
+        monitor.warn("interrupted before anything was known: there is no answer");
+        return Ok(None);
+    };
+    for note in study.notes() {
+        monitor.warn(&format!("note: {note}"));
+    }
+    let repeats = study.repeats(scenario);
+    let repeated: Vec<_> = repeats.iter().map(|(what, command)| format!("{what}\n  {command}")).collect();
+    monitor.say(&format!("{}\n\n{}\n{}", study.headline(), study.text(), repeated.join("\n")));
+    let not_written = |error: &dyn std::error::Error| {
+        Failure::machine("files/cannot-write", format!("cannot write the result: {error}"))
+    };
+    if let Some(file) = &files.json {
+        write(file, study.to_json().map_err(|error| not_written(&error))?.as_bytes(), monitor)?;
+    }
+    if let Some(file) = &files.csv {
+        write(file, &study.to_csv().map_err(|error| not_written(&error))?, monitor)?;
+    }
+    if let Some(file) = &files.latex {
+        write(file, study.to_latex().as_bytes(), monitor)?;
+    }
+    if let Some(file) = &files.html {
+        let sections = options.illustrate(&base, &study, pictures);
+        let arguments = options.arguments(&study);
+        let command = scenario.command(E::COMMAND, arguments.iter().map(String::as_str), []);
+        let page = StudyPage { commands: vec![command], repeats, sections, has_replays: false };
+        write(file, study.to_html(&page).as_bytes(), monitor)?;
+    }
+    for (_, file) in files.outputs().filter(|(_, file)| !is_standard_output(file)) {
+        monitor.say(&format!("wrote {}", file.display()));
+    }
+    options.conclude(scenario, &study, pictures, monitor)?;
+    Ok(Some(study))
+}
+
+/// What every answer says of the flown scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct About {
+    /// [`SCHEMA_VERSION`].
+    pub schema_version: u32,
+    /// The scenario as its file has it.
+    pub scenario: ScenarioIdentity,
+    /// The program.
+    pub tool: Tool,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+}
+
+impl About {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
+            tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
+            delta_m: scenario.delta_m,
+        }
+    }
+}

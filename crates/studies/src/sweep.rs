@@ -1,0 +1,448 @@
+//! How flights depend on one or two keys: shares and separations over a grid of their values.
+
+use serde::Serialize;
+
+use crate::attack::{Bound, FLIGHTS};
+use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
+use crate::batch::Batch;
+use crate::flight::{FlightSummary, Outcome};
+use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use crate::study::{About, Block, Experiment, Section, Study};
+use crate::table::{Kind, Table};
+use tautline_core::text::{as_toml, at_least, counted, metres_below};
+use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
+use tautline_report::report::page::{Badge, Tone};
+use tautline_report::request::{Failure, ScenarioRequest};
+
+/// Most points of a grid.
+pub const MOST_POINTS: usize = 2500;
+
+/// What the numbers rest on.
+const ASSUMED: [&str; 3] = [
+    "Every point of the grid is flown with the same seeds. Nothing is known between points.",
+    "Shares have the interval of Clopper and Pearson and medians that of order statistics, for a number of runs that was fixed before \
+     the first. Of many intervals some miss the true value.",
+    "A refused run is one whose scenario cannot be flown, such as a start of two vehicles within delta; it counts in no share.",
+];
+
+/// A key, and the values that it takes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SweptKey {
+    /// The key, as for `--set`.
+    pub key: String,
+    /// Its values, in the order in which they were given.
+    pub values: Vec<f64>,
+}
+
+/// Options of a sweep.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// One key or two.
+    pub keys: Vec<SweptKey>,
+    /// What a flight has to show to count in the share.
+    pub question: Question,
+    /// Runs of each point: 1 to [`crate::MOST_RUNS`]. A single run has everything but the keys as the scenario says.
+    pub runs: u64,
+    /// Seed of the first run; run k, from 0, has this plus k for start and noise.
+    pub seed: u64,
+}
+
+/// The flights of one point of the grid.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Values of the keys.
+    pub values: Vec<f64>,
+    /// Runs that showed what was asked, of those that were flown.
+    pub held: Proportion,
+    /// Runs with a violation, of those that were flown.
+    pub violated: Proportion,
+    /// Smallest separation of all runs \[m\].
+    pub min_smallest_m: Option<f64>,
+    /// Median of the runs' smallest separations \[m\].
+    pub min_median_m: Estimate,
+    /// Median of the time to reach the formation, over the runs that did \[s\].
+    pub reached_median_s: Estimate,
+    /// Runs whose scenario is refused: they are not flown.
+    pub refused: u64,
+    /// Why the first of them is refused.
+    pub first_refusal: Option<String>,
+    /// The runs that were flown, in the order of their seeds.
+    pub flights: Vec<FlightSummary>,
+}
+
+/// Flights over a grid of one key or two. What does not apply is null.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sweep {
+    /// The scenario, the program and the safety distance.
+    #[serde(flatten)]
+    pub about: About,
+    /// The keys that were changed.
+    #[serde(rename = "grid")]
+    pub keys: Vec<SweptKey>,
+    /// What a flight had to show.
+    pub question: Question,
+    /// Runs of each point.
+    pub runs: u64,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Jitter along each axis of a start without randomness \[m\].
+    pub jitter_m: Option<f64>,
+    /// Confidence of all intervals.
+    pub confidence: f64,
+    /// Points of the grid.
+    pub points_asked: u64,
+    /// Whether the sweep was interrupted before all points were flown.
+    pub interrupted: bool,
+    /// The points that were flown: the last key changes fastest.
+    pub points: Vec<Point>,
+}
+
+fn wrong(why: &str) -> Failure {
+    let help = "write KEY=FROM:TO:COUNT with two different finite numbers and at least 2 values, or KEY=V1,V2,... with finite numbers";
+    Failure::input("sweep/key", why, help)
+}
+
+impl SweptKey {
+    /// Parses `KEY=FROM:TO:COUNT` or `KEY=V1,V2,...`.
+    ///
+    /// # Errors
+    /// [`Failure`] `sweep/key`.
+    pub fn parse(text: &str) -> Result<Self, Failure> {
+        let Some((key, values)) = text.split_once('=') else {
+            return Err(wrong(&format!("--key: `{text}` is not KEY=VALUES")));
+        };
+        let number = |text: &str| {
+            let number = text.trim().parse::<f64>();
+            number.map_err(|_| wrong(&format!("--key {key}: `{}` is not a number", text.trim())))
+        };
+        match values.split(':').collect::<Vec<_>>()[..] {
+            [list] => Self::new(key, list.split(',').map(number).collect::<Result<_, _>>()?),
+            [from, to, count] => {
+                let most = MOST_POINTS;
+                let count =
+                    count.trim().parse::<usize>().ok().filter(|count| (1..=most).contains(count)).ok_or_else(|| {
+                        wrong(&format!("--key {key}: the count `{}` is not an integer from 1 to {most}", count.trim()))
+                    })?;
+                let (from, to) = (number(from)?, number(to)?);
+                if (count > 1) == (from == to) || !(to - from).is_finite() {
+                    return Err(wrong(&format!("--key {key}: {count} values from {from} to {to}")));
+                }
+                let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
+                let part = |k: usize| k as f64 / (count - 1).max(1) as f64;
+                let value = |k: usize| range.at(if from <= to { part(k) } else { 1.0 - part(k) });
+                Self::new(key, if count == 1 { vec![from] } else { (0..count).map(value).collect() })
+            }
+            _ => Err(wrong(&format!("--key {key}: `{values}` is neither FROM:TO:COUNT nor a list"))),
+        }
+    }
+
+    /// A key with these values.
+    ///
+    /// # Errors
+    /// [`Failure`] `sweep/key` for no values, the same value twice, and values that are not finite.
+    pub fn new(key: &str, values: Vec<f64>) -> Result<Self, Failure> {
+        let key = key.trim().to_owned();
+        let twice = values.iter().enumerate().find(|(k, value)| values[..*k].contains(value));
+        match (values.iter().find(|value| !value.is_finite()), twice) {
+            (Some(value), _) => Err(wrong(&format!("--key {key}: {value} is not finite"))),
+            (None, Some((_, value))) => Err(wrong(&format!("--key {key}: {value} is given twice"))),
+            (None, None) if values.is_empty() || key.is_empty() => Err(wrong("--key: the grid is empty")),
+            (None, None) => Ok(Self { key, values }),
+        }
+    }
+}
+
+impl Options {
+    /// Refuses grids that cannot be drawn or flown.
+    fn check_grid(&self) -> Result<(), Failure> {
+        let grid = |why: String, help: &str| Err(Failure::input("sweep/grid", why, help));
+        if self.keys.is_empty() || self.keys.len() > 2 {
+            let why = format!("--key: a sweep has one key or two, got {}", self.keys.len());
+            return grid(why, "give --key once or twice; other keys are set with --set");
+        }
+        if self.keys.len() == 2 && self.keys[0].key == self.keys[1].key {
+            return grid(format!("--key: {} is given twice", self.keys[0].key), "give all its values in one --key");
+        }
+        let points = self.keys.iter().map(|key| key.values.len()).fold(1, usize::saturating_mul);
+        let flights = (points as u64).saturating_mul(self.runs);
+        if points > MOST_POINTS || flights > *FLIGHTS.end() {
+            let why = format!("--key: {points} points with {} runs each are {flights} flights", self.runs);
+            let help = format!("give at most {MOST_POINTS} points and {} flights", FLIGHTS.end());
+            return grid(why, &help);
+        }
+        Ok(())
+    }
+
+    /// Values of the keys at each point.
+    fn points(&self) -> Vec<Vec<f64>> {
+        self.keys.iter().fold(vec![Vec::new()], |points, SweptKey { values, .. }| {
+            let each = |point: Vec<f64>| values.iter().map(move |&value| [point.as_slice(), &[value]].concat());
+            points.into_iter().flat_map(each).collect()
+        })
+    }
+}
+
+/// Overrides of a point.
+fn sets(keys: &[SweptKey], values: &[f64]) -> Vec<String> {
+    keys.iter().zip(values).map(|(of, &value)| format!("{}={}", of.key, as_toml(value))).collect()
+}
+
+impl Experiment for Options {
+    type Study = Sweep;
+
+    const COMMAND: &'static str = "sweep";
+
+    fn check(&self) -> Result<(), Failure> {
+        check_runs(self.runs, self.seed)?;
+        self.check_grid()
+    }
+
+    fn arguments(&self, _study: &Sweep) -> Vec<String> {
+        let keys = self.keys.iter().flat_map(|SweptKey { key, values }| {
+            let values: Vec<_> = values.iter().copied().map(as_toml).collect();
+            ["--key".to_owned(), format!("{key}={}", values.join(","))]
+        });
+        let (verdict, runs, seed) = (self.question.name(), self.runs.to_string(), self.seed.to_string());
+        let rest = ["--verdict", verdict, "--runs", &runs, "--seed", &seed].map(str::to_owned);
+        keys.chain(rest).collect()
+    }
+
+    fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Sweep>, Failure> {
+        for SweptKey { key, values } in &self.keys {
+            let fraction = values.iter().find(|value| value.fract() != 0.0 && base.takes_integers_only(key));
+            if let Some(value) = fraction {
+                let why = format!("--key {key}: the key takes integers only, got {value}");
+                return Err(Failure::input(
+                    "sweep/grid",
+                    why,
+                    "give integers, or a count that divides the range evenly",
+                ));
+            }
+        }
+        let points = self.points();
+        let scenario = |values: &Vec<f64>| base.with(&sets(&self.keys, values));
+        let Some(is_random) = points
+            .iter()
+            .filter_map(|values| scenario(values).ok())
+            .map(|of| of.is_random_in_flight())
+            .reduce(|a, b| a | b)
+        else {
+            // Nothing can be flown, such as with an unknown key.
+            let refused =
+                |error| Failure::from(error).under(&format!("with {}", sets(&self.keys, &points[0]).join(", ")));
+            return Err(scenario(&points[0])
+                .map_err(refused)
+                .err()
+                .unwrap_or_else(|| wrong("--key: the grid is empty")));
+        };
+        let is_random = is_random || self.keys.iter().any(|of| of.key == JITTER_KEY);
+        let runs = Runs::new(self.runs, self.seed, base, is_random);
+        let count = usize::try_from(self.runs).unwrap_or(usize::MAX);
+        let flights = points.len() * count;
+        batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
+        let flown = batch.run(flights, |number| {
+            let (values, run) = (&points[number / count], (number % count) as u64);
+            let scenario = base.with(&[runs.sets(run), sets(&self.keys, values)].concat());
+            let scenario = scenario.map_err(|error| error.message().to_owned());
+            let flight = scenario.and_then(|of| batch.fly(&of, runs.seed(run)).map_err(|error| error.to_string()));
+            Ok::<_, Failure>(flight.transpose())
+        })?;
+        let mut flown = flown.into_iter();
+        let of_point = |values: Vec<f64>| {
+            let runs: Option<Vec<_>> = flown.by_ref().take(count).collect();
+            runs.map(|runs| Point::new(values, self.question, runs))
+        };
+        let flown: Vec<_> = points.iter().cloned().filter_map(of_point).collect();
+        let own = base.own();
+        let sweep = Sweep {
+            about: About::new(own),
+            keys: self.keys.clone(),
+            question: self.question,
+            runs: self.runs,
+            seed: self.seed,
+            jitter_m: runs.jitter_m,
+            confidence: CONFIDENCE,
+            points_asked: points.len() as u64,
+            interrupted: flown.len() < points.len(),
+            points: flown,
+        };
+        Ok((!sweep.points.is_empty()).then_some(sweep))
+    }
+}
+
+impl Point {
+    fn new(values: Vec<f64>, question: Question, runs: Vec<Result<FlightSummary, String>>) -> Self {
+        let (flights, refusals): (Vec<_>, Vec<_>) = runs.into_iter().partition(Result::is_ok);
+        let flights: Vec<_> = flights.into_iter().flatten().collect();
+        let of = flights.len() as u64;
+        let share = |is: &dyn Fn(&FlightSummary) -> bool| {
+            Proportion::new(flights.iter().filter(|flight| is(flight)).count() as u64, of)
+        };
+        let known = |of: fn(&FlightSummary) -> Option<f64>| flights.iter().filter_map(of).collect::<Vec<_>>();
+        let min_m = known(|flight| flight.min_m);
+        let reached_s = known(|flight| flight.reached_at_s.filter(|_| flight.reached));
+        Self {
+            values,
+            held: share(&|flight| question.holds(flight)),
+            violated: share(&|flight| flight.outcome == Outcome::Violated),
+            min_smallest_m: min_m.iter().copied().reduce(f64::min),
+            min_median_m: Estimate::quantile(&min_m, 0.5),
+            reached_median_s: Estimate::quantile(&reached_s, 0.5),
+            refused: refusals.len() as u64,
+            first_refusal: refusals.into_iter().find_map(Result::err),
+            flights,
+        }
+    }
+}
+
+impl Sweep {
+    /// The point with the smallest separation, of violated ones first.
+    fn worst(&self) -> Option<(&Point, &FlightSummary)> {
+        let flights = self.points.iter().flat_map(|point| point.flights.iter().map(move |flight| (point, flight)));
+        flights.reduce(|worst, next| if next.1.is_worse_than(worst.1) { next } else { worst })
+    }
+
+    /// Curves over one key, or heat maps over two.
+    fn figures(&self) -> Vec<Figure> {
+        let does = self.question.words()[0];
+        match &self.keys[..] {
+            [key] => {
+                let share = |point: &Point| {
+                    let interval = (point.held.of > 1).then_some([point.held.low, point.held.high]);
+                    Some(Share { value: point.values[0], share: point.held.share?, interval })
+                };
+                let separation = |point: &Point| {
+                    let Estimate { value, low, high } = point.min_median_m;
+                    let interval_m = low.zip(high).map(|(low, high)| [low, high]);
+                    let (smallest_m, median_m) = (point.min_smallest_m?, value?);
+                    Some(Separation { value: point.values[0], smallest_m, median_m, interval_m })
+                };
+                let mut points: Vec<_> = self.points.iter().collect();
+                points.sort_by(|a, b| a.values[0].total_cmp(&b.values[0]));
+                let series = [(does.to_owned(), points.iter().filter_map(|point| share(point)).collect())];
+                let lengths: Vec<_> = points.iter().filter_map(|point| separation(point)).collect();
+                vec![
+                    shares("share", &key.key, does, &series, false),
+                    separations("separation", &key.key, &lengths, self.about.delta_m),
+                ]
+            }
+            [y, x] => {
+                let axes = [x, y].map(|SweptKey { key, values }| GridAxis { key, values });
+                let at = |y: f64, x: f64| self.points.iter().find(|point| point.values == [y, x]);
+                let map = |name: &str, label: &str, range, of: fn(&Point) -> Option<f64>| {
+                    let cells = y.values.iter().flat_map(|&y| x.values.iter().map(move |&x| at(y, x).and_then(of)));
+                    heat_map(name, label, axes, &cells.collect::<Vec<_>>(), range)
+                };
+                vec![
+                    map("share", &format!("share that {does}"), Some([0.0, 1.0]), |point| point.held.share),
+                    map("separation", "smallest separation [m]", None, |point| point.min_smallest_m),
+                ]
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl Study for Sweep {
+    fn kind(&self) -> &'static str {
+        "Sweep"
+    }
+
+    fn title(&self) -> String {
+        let keys: Vec<_> = self.keys.iter().map(|of| of.key.as_str()).collect();
+        format!("{}: {}", self.about.scenario.name, keys.join(" and "))
+    }
+
+    fn badge(&self) -> Badge {
+        let flights: u64 = self.points.iter().map(|point| point.held.of).sum();
+        let points = counted(self.points.len() as u64, "point", "points");
+        Badge { tone: Tone::Neutral, word: format!("{points}, {}", counted(flights, "flight", "flights")) }
+    }
+
+    fn headline(&self) -> String {
+        let holds = |point: &&Point| point.held.of == self.runs && point.held.count == self.runs;
+        let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
+        let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
+            let shown =
+                if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
+            format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
+        });
+        format!(
+            "{} {}{every} at {} of {}{}",
+            self.about.scenario.name,
+            self.question.words()[0],
+            self.points.iter().filter(holds).count(),
+            counted(self.points.len() as u64, "point", "points"),
+            worst.unwrap_or_default()
+        )
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let flown = self.points.len();
+        let interrupted =
+            self.interrupted.then(|| format!("interrupted: of {} points {flown} were flown", self.points_asked));
+        let refused = self.points.iter().find_map(|point| Some((point, point.first_refusal.as_ref()?)));
+        let refused = refused.map(|(point, why)| {
+            let runs = self.points.iter().map(|point| point.refused).sum();
+            let (runs, with) = (counted(runs, "run", "runs"), sets(&self.keys, &point.values).join(", "));
+            format!("{runs} could not be flown and count in no share, the first with {with}: {why}")
+        });
+        [interrupted, refused, self.jitter_m.map(jitter_note)].into_iter().flatten().collect()
+    }
+
+    fn records(&self) -> Table {
+        let does = self.question.words()[0];
+        let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
+        let table = Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.points);
+        let keys = self.keys.iter().enumerate();
+        let table = keys.fold(table, |table, (k, SweptKey { key, .. })| {
+            table.column(key, key, Kind::Exact, |point| point.values.get(k).copied())
+        });
+        let table = table
+            .column("held", &does, Kind::Share, |point| point.held)
+            .column("violated", "Violated", Kind::Share, |point| point.violated)
+            .column("min_smallest", "Separation, smallest [m]", Kind::AtLeast, |point| point.min_smallest_m)
+            .column("min_median", "Separation, median [m]", Kind::Estimate, |point| point.min_median_m)
+            .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |point| point.reached_median_s);
+        table
+            .column("refused_count", "Refused", Kind::Count, |point| point.refused)
+            .column("first_refusal", "", Kind::Text, |point| point.first_refusal.clone())
+            .build()
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let mut sections = vec![
+            Section::new("Over the grid", [Block::Figures(self.figures())]),
+            Section::new("Every point", [Block::Table(self.records())]),
+        ];
+        let refused: Vec<_> = self.points.iter().filter(|point| point.refused > 0).collect();
+        if !refused.is_empty() {
+            let table = Table::of("Runs that could not be flown", &refused)
+                .column("", "Point", Kind::Text, |point| sets(&self.keys, &point.values).join(", "))
+                .column("", "Why", Kind::Text, |point| point.first_refusal.clone())
+                .build();
+            sections.push(Section::new("Refused points", [Block::Table(table)]));
+        }
+        sections
+    }
+
+    fn assumptions(&self) -> Vec<String> {
+        ASSUMED.map(str::to_owned).to_vec()
+    }
+
+    fn is_good(&self) -> bool {
+        !self.interrupted
+    }
+
+    fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
+        let repeat = |(point, flight): (&Point, &FlightSummary)| {
+            let runs = Runs { count: self.runs, seed: self.seed, jitter_m: self.jitter_m };
+            let sets = [runs.sets(flight.seed - self.seed), sets(&self.keys, &point.values)].concat();
+            ("The flight with the smallest separation:".to_owned(), scenario.command("run", [], &sets))
+        };
+        self.worst().map(repeat).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,251 @@
+//! Commands that fly many flights of one scenario: `compare`, `margin`, `sweep` and `attack`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValue, TypedValueParser};
+
+use super::Exit;
+use super::console::{Console, Terminal};
+use super::pictures::pictures;
+use super::reading::one_of;
+use super::scenario::ScenarioArguments;
+use tautline_report::request::Failure;
+use tautline_studies::attack::{FLIGHTS, SEEDS_OF_A_CANDIDATE, Variation};
+use tautline_studies::margin::Range;
+use tautline_studies::sweep::SweptKey;
+use tautline_studies::{
+    Experiment, MOST_RUNS, Question, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, margin,
+    sweep,
+};
+
+/// The scenario, files and threads of a study.
+#[derive(Debug, Args)]
+pub(super) struct StudyArguments {
+    #[command(flatten)]
+    what: ScenarioArguments,
+    /// Write every number as JSON; - is standard output, for this and the next three.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a table as CSV: a row a law, a value, a point, or a candidate that was worse than all before it.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the tables as LaTeX.
+    #[arg(long, value_name = "FILE")]
+    latex: Option<PathBuf>,
+    /// Write a page with tables and figures.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Overwrite files that exist, and a folder that holds a finished run.
+    #[arg(long)]
+    force: bool,
+    /// What draws pictures: best, hardware, software, or a part of an adapter's name.
+    #[arg(long, value_name = "NAME", default_value = "best")]
+    adapter: String,
+    /// Print no table and no progress.
+    #[arg(long)]
+    quiet: bool,
+    /// Threads to use, by default one a core; the result is the same for any number.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+impl StudyArguments {
+    /// Flies a study and writes its files.
+    fn answer<E: Experiment>(&self, options: E) -> Result<Exit, Failure> {
+        let files = StudyFiles {
+            json: self.json.clone(),
+            csv: self.csv.clone(),
+            latex: self.latex.clone(),
+            html: self.html.clone(),
+            force: self.force,
+        };
+        let monitor = Terminal::new(Console { data_on_stdout: files.are_piped(), quiet: self.quiet })?;
+        let threads = self.threads.map(usize::from);
+        let request = StudyRequest { scenario: self.what.request()?, options, files, threads };
+        let study = answer(&request, &*pictures(&self.adapter, true), &monitor)?;
+        Ok(Exit::good_if(study.is_some_and(|study| study.is_good())))
+    }
+}
+
+/// Number of runs and seed of the first.
+#[derive(Debug, Args)]
+struct RunArguments {
+    /// Runs of each law [default: 20], or of each value or point [default: 1].
+    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u64).range(1..=MOST_RUNS))]
+    runs: Option<u64>,
+    /// Run k, from 0, has `start.seed` and `noise.seed` of S + k; a single run of a value or point keeps those of the scenario.
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(SEEDS))]
+    seed: u64,
+}
+
+/// Arguments of `tautline compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 0 once the comparison is made, whatever the laws did; with 1 where it was interrupted. A law's keys stand in \
+[laws.NAME] of the scenario; NAME is its kind, or any name with a `kind` inside. docs/compare.md says what each number means.")]
+pub(super) struct CompareArguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    #[command(flatten)]
+    runs: RunArguments,
+    /// Laws to compare, by their kind or by the NAME of a table [laws.NAME]: edge-tension,laplacian. Those of all such
+    /// tables unless given, and where there are none, every kind.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    laws: Option<Vec<String>>,
+}
+
+impl CompareArguments {
+    /// Whether pictures are taken.
+    #[cfg(all(feature = "viewer", target_os = "linux"))]
+    pub(super) fn draws(&self) -> bool {
+        self.study.html.is_some()
+    }
+
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
+        let default = compare::Options::default();
+        let runs = self.runs.runs.unwrap_or(default.runs);
+        self.study.answer(compare::Options { laws: self.laws.clone(), runs, seed: self.runs.seed })
+    }
+}
+
+/// Arguments of `tautline margin`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 0 where the verdict turns or holds everywhere, with 1 where it holds nowhere or the search was interrupted. Flown \
+once (--runs 1) everything but the key is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and \
+where nothing is random the start is moved a little. docs/margins.md says more.")]
+pub(super) struct MarginArguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    #[command(flatten)]
+    runs: RunArguments,
+    /// The key that is changed, such as `time.control_hz`.
+    #[arg(long, value_name = "KEY.PATH")]
+    key: String,
+    /// Its first value.
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    from: f64,
+    /// Its last value.
+    #[arg(long, value_name = "B", allow_negative_numbers = true)]
+    to: f64,
+    /// What every run has to show.
+    #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
+    verdict: Question,
+    /// Values, evenly spaced with both ends, that are scanned first.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    scan: u16,
+    /// Times that the interval in which the verdict turns is halved.
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=50))]
+    halvings: u32,
+    /// Space and halve values by their ratio.
+    #[arg(long)]
+    log: bool,
+}
+
+fn verdict() -> impl TypedValueParser<Value = Question> {
+    let help = |question| match question {
+        Question::Pass => "It passes: clear, and its formation reached as far as asked",
+        Question::Clear => "No two vehicles come closer than delta, to the end of the flight",
+        Question::Reached => "The formation is reached and kept to the end",
+    };
+    one_of(Question::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
+}
+
+impl MarginArguments {
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
+        let (scan, halvings, logarithmic) = (self.scan.into(), self.halvings, self.log);
+        self.study.answer(margin::Options {
+            key: self.key.clone(),
+            range: Range { from: self.from, to: self.to, scan, halvings, logarithmic },
+            question: self.verdict,
+            runs: self.runs.runs.unwrap_or(1),
+            seed: self.runs.seed,
+        })
+    }
+}
+
+/// Arguments of `tautline sweep`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 0 once the sweep is made, whatever the flights did; with 1 where it was interrupted. Flown once (--runs 1) everything \
+but the keys is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and where nothing is random the \
+start is moved a little. docs/sweeps.md says more.")]
+pub(super) struct SweepArguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    #[command(flatten)]
+    runs: RunArguments,
+    /// A key and its values, evenly spaced or listed: `network.loss=0:0.5:11`, `law.alpha=0.5,1,2`; given twice, the grid of both.
+    #[arg(long = "key", value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...", required = true)]
+    keys: Vec<String>,
+    /// What a run has to show to count in the share.
+    #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
+    verdict: Question,
+}
+
+impl SweepArguments {
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
+        self.study.answer(sweep::Options {
+            keys: self.keys.iter().map(|text| SweptKey::parse(text)).collect::<Result<_, _>>()?,
+            question: self.verdict,
+            runs: self.runs.runs.unwrap_or(1),
+            seed: self.runs.seed,
+        })
+    }
+}
+
+/// Arguments of `tautline attack`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 0 where the search found no violation, with 1 where it found one or was interrupted. What it did not find may be \
+there all the same: it is a search, not a proof. docs/attack.md says more.")]
+pub(super) struct AttackArguments {
+    #[command(flatten)]
+    study: StudyArguments,
+    /// A key that is a number, and the values between which it may be: `network.loss=0..0.3`; may be given several times.
+    #[arg(long, value_name = "KEY=LOW..HIGH")]
+    vary: Vec<String>,
+    /// Every start may be up to R metres from that of the scenario, along each axis.
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    start: Option<f64>,
+    /// Every velocity at the start may be up to V m/s from that of the scenario, along each axis.
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    velocity: Option<f64>,
+    /// No two start nearer than this many metres to each other, more than delta; without it any start that can be flown will do.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    apart: Option<f64>,
+    /// Flights of the whole search.
+    #[arg(long, value_name = "F", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(FLIGHTS))]
+    flights: u64,
+    /// Fly each candidate with K seeds of noise, that of the scenario and those that follow; the worst counts.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(SEEDS_OF_A_CANDIDATE))]
+    seeds: u64,
+    /// Seed of the search; noise has that of the scenario.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+    /// Fly the worst again and leave its recording, report and pictures in this folder, as `tautline run` does.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl AttackArguments {
+    /// Whether pictures are taken.
+    #[cfg(all(feature = "viewer", target_os = "linux"))]
+    pub(super) fn draws(&self) -> bool {
+        self.out.is_some()
+    }
+
+    pub(super) fn run(&self) -> Result<Exit, Failure> {
+        self.study.answer(attack::Options {
+            vary: self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>()?,
+            start_m: self.start,
+            velocity_m_s: self.velocity,
+            apart_m: self.apart,
+            flights: self.flights,
+            seeds: self.seeds,
+            seed: self.seed,
+            out: self.out.clone(),
+        })
+    }
+}
