@@ -102,6 +102,7 @@ mod point {
 mod vehicles {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
+    #[expect(clippy::ref_option, reason = "serde asks for a reference to the field")]
     pub(super) fn serialize<S: Serializer>(met: &Option<Vec<usize>>, serializer: S) -> Result<S::Ok, S::Error> {
         met.as_ref().map(|met| met.iter().map(|&vehicle| vehicle as u64 + 1).collect::<Vec<_>>()).serialize(serializer)
     }

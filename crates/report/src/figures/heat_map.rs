@@ -1,8 +1,8 @@
 //! A number over a grid of two keys.
 
+use super::Figure;
 use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
-use super::Figure;
 use tautline_core::text::at_least;
 
 use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};

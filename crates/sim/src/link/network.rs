@@ -98,8 +98,6 @@ impl NetworkSpec {
 }
 
 impl ImperfectionSpec for NetworkSpec {
-    /// Whether everything that is sent is heard at once.
-
     fn is_exact(&self) -> bool {
         Self { missing: Missing::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
     }

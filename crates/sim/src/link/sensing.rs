@@ -59,8 +59,6 @@ impl SensingSpec {
 }
 
 impl ImperfectionSpec for SensingSpec {
-    /// Whether vehicles know their own present state and that of whoever is near.
-
     fn is_exact(&self) -> bool {
         *self == Self::default() || (Self { near_latency_s: None, ..*self } == Self::default() && self.near_s() == 0.0)
     }

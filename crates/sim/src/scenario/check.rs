@@ -27,13 +27,13 @@ pub(super) struct Misfit {
 }
 
 impl Misfit {
-    fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Box<Self> {
+    fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
         let error = ScenarioError::new(message).coded(code).with_help(help);
-        Box::new(Self { error, span, path: Vec::new() })
+        Self { error, span, path: Vec::new() }
     }
 
-    fn below(mut self: Box<Self>, key: impl ToString) -> Box<Self> {
-        self.path.push(key.to_string());
+    fn below(mut self, key: impl Into<String>) -> Self {
+        self.path.push(key.into());
         self
     }
 
@@ -46,7 +46,7 @@ impl Misfit {
 
 /// Checks a file against the schema and nests its choices. Spans from `overridden_from` on are those of overrides: a choice that an
 /// override makes drops the keys of the file that belong to another choice.
-pub(super) fn conform(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), Box<Misfit>> {
+pub(super) fn conform(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), Misfit> {
     Check { overridden_from }.value(file, Node::root(), "scenario", None)
 }
 
@@ -61,13 +61,13 @@ impl Check {
         value: &mut Spanned<DeValue<'_>>,
         node: Node,
         name: &str,
-        own_name: Option<(&str, Range<usize>)>,
-    ) -> Result<(), Box<Misfit>> {
+        own_name: Option<&(&str, Range<usize>)>,
+    ) -> Result<(), Misfit> {
         let span = value.span();
         if let (Some(node), DeValue::Table(table)) = (node.values(), value.get_mut()) {
             return table.iter_mut().try_for_each(|(key, value)| {
                 let name = &**key.get_ref();
-                self.value(value, node, name, Some((name, key.span()))).map_err(|misfit| misfit.below(name))
+                self.value(value, node, name, Some(&(name, key.span()))).map_err(|misfit| misfit.below(name))
             });
         }
         if node.is_table() {
@@ -105,7 +105,7 @@ impl Check {
             DeValue::Array(list) => {
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
-                    self.value(value, node, name, None).map_err(|misfit| misfit.below(entry + 1))
+                    self.value(value, node, name, None).map_err(|misfit| misfit.below((entry + 1).to_string()))
                 })
             }
             number @ (DeValue::Integer(_) | DeValue::Float(_)) => in_range(name, node, number, span),
@@ -118,8 +118,8 @@ impl Check {
         table: &mut DeTable<'_>,
         node: Node,
         span: &Range<usize>,
-        own_name: Option<(&str, Range<usize>)>,
-    ) -> Result<(), Box<Misfit>> {
+        own_name: Option<&(&str, Range<usize>)>,
+    ) -> Result<(), Misfit> {
         let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
         let chosen = match alternatives.first().and_then(|part| part.tag()) {
             Some((tag, _)) => self.chosen(table, tag, &alternatives, span, own_name, node)?,
@@ -134,7 +134,7 @@ impl Check {
             };
             // The tag is known already.
             if node.keyword("const").is_null() {
-                self.value(value, node, name, None).map_err(|misfit| misfit.below(name))?;
+                self.value(value, node, name, None).map_err(|misfit| misfit.below(&**name))?;
             }
         }
         let required = node.required().chain(chosen.into_iter().flat_map(Node::required));
@@ -156,19 +156,19 @@ impl Check {
         tag: &'static str,
         alternatives: &[Node],
         span: &Range<usize>,
-        own_name: Option<(&str, Range<usize>)>,
+        own_name: Option<&(&str, Range<usize>)>,
         node: Node,
-    ) -> Result<Option<Node>, Box<Misfit>> {
+    ) -> Result<Option<Node>, Misfit> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
-        let (name, at) = match (table.get(tag), &own_name, default) {
-            (Some(value), ..) => match value.get_ref().as_str() {
-                Some(name) => (name.to_owned(), value.span()),
-                None => {
+        let (name, at) = match (table.get(tag), own_name, default) {
+            (Some(value), ..) => {
+                let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
                     return Err(Misfit::new("scenario/wrong-type", message, about(node), value.span()).below(tag));
-                }
-            },
+                };
+                (name.to_owned(), value.span())
+            }
             (None, Some((own, at)), _) => ((*own).to_owned(), at.clone()),
             (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
             // A table may do without, as `[[leg]]` does.
@@ -238,7 +238,7 @@ fn admits(node: Node, value: &DeValue<'_>) -> bool {
 }
 
 /// Refuses a number that is not finite, too large or small to compute with, or out of the bounds of the schema.
-fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), Box<Misfit>> {
+fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), Misfit> {
     let (written, number) = match number {
         DeValue::Integer(written) => {
             let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
@@ -282,7 +282,7 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
     Ok(())
 }
 
-fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> Box<Misfit> {
+fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> Misfit {
     known.sort_unstable();
     known.dedup();
     let help = match tables_with(name)[..] {
@@ -292,12 +292,12 @@ fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> Box<Misf
     Misfit::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).below(name)
 }
 
-fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> Box<Misfit> {
+fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> Misfit {
     let message = format!("unknown choice `{}`", short(name));
     Misfit::new("scenario/unknown-choice", message, suggest(name, known), span)
 }
 
-fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> Box<Misfit> {
+fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> Misfit {
     let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
     Misfit::new("scenario/wrong-type", message, about(node), span)
 }

@@ -96,7 +96,7 @@ impl Columns {
                 return Err(refused(line, &said));
             }
             let numbers = numbers(&fields, &columns).map_err(|said| refused(line, &said))?;
-            if let Some(number) = numbers.iter().find(|number| !(number.abs() <= LARGEST)) {
+            if let Some(number) = numbers.iter().find(|number| !(-LARGEST..=LARGEST).contains(*number)) {
                 return Err(refused(line, &format!("{number:e} must be finite and at most {LARGEST:e} in magnitude")));
             }
             rows.push((line, numbers));

@@ -4,6 +4,7 @@
 //! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
 
 use super::spec::{PlantSpec, Scenario};
+use crate::link::ImperfectionSpec;
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::law::{Certificate, Law, Void, certificate_through};
 use tautline_laws::target::BreathingMode;
@@ -90,7 +91,7 @@ impl Scenario {
     pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
         let of_time = self.time.control_hz.map(|_| Void::CommandsHeld);
         let of_body = (!self.airframe.is_point()).then_some(Void::NotAPoint);
-        let of_links = self.imperfections().into_iter().flat_map(|imperfection| imperfection.voids());
+        let of_links = self.imperfections().into_iter().flat_map(ImperfectionSpec::voids);
         let voids = of_time.into_iter().chain(of_links).chain(of_body);
         let promised = voids.fold(promised, |promised, void| promised.void_where(true, void));
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));

@@ -1,6 +1,6 @@
 //! What a scenario must be for it to be flown.
 
-use super::check::conform;
+use super::check::{Misfit, conform};
 use super::error::ScenarioError;
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
@@ -41,7 +41,7 @@ impl Scenario {
         let resolved = self.resolved_toml();
         let mut tree = Text { name: &self.name, toml: &resolved, overrides: &[] }.tree()?;
         self.check_lengths()?;
-        conform(&mut tree, resolved.len() + 1).map_err(|misfit| misfit.without_text())?;
+        conform(&mut tree, resolved.len() + 1).map_err(Misfit::without_text)?;
         self.check()
     }
 
@@ -358,16 +358,16 @@ impl Scenario {
             .at("swarm.a22_per_s")
             .at("time.dt_s"));
         }
-        if let Some(control_hz) = control_hz {
-            if control_hz * dt_s > 1.0 + 1e-6 {
-                return Err(ScenarioError::new(format!(
-                    "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
-                ))
-                .coded("scenario/step-too-long")
-                .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
-                .at("time.control_hz")
-                .at("time.dt_s"));
-            }
+        if let Some(control_hz) = control_hz
+            && control_hz * dt_s > 1.0 + 1e-6
+        {
+            return Err(ScenarioError::new(format!(
+                "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
+            ))
+            .coded("scenario/step-too-long")
+            .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
+            .at("time.control_hz")
+            .at("time.dt_s"));
         }
         Ok(())
     }
