@@ -341,8 +341,23 @@ fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
     assert!(exported.exit == Some(0) && exported.err.contains("the run's audit of every step is not in drawn.csv"));
     let drawn = ran_by(TAUTLINE, folder.path(), &["audit", "drawn.csv", "--delta", "2"]);
     assert_eq!(drawn.exit, Some(0), "straight lines show the opposite: {drawn:?}");
-    let part = audit(folder.path(), &["flown", "--from", "0"]);
-    assert!(part.exit == Some(0) && part.err.contains("another question (VIOLATION: "), "{part:?}");
+    // Another question is not clear either where the run found two closer between the samples.
+    let found = &report["audit"]["violations"][0];
+    let ids = format!("{},{}", found["pair"][0], found["pair"][1]);
+    for more in [&["--from", "0"][..], &["--ids", &ids], &["--delta", "1.99"], &["--motion", "linear"]] {
+        let part = audit(folder.path(), &[&["flown"], more].concat());
+        let said = "UNDECIDED: the run's audit of every step found ";
+        assert!(part.exit == Some(1) && part.out.starts_with(said), "{more:?}: {part:?}");
+        assert!(part.err.contains("another question (VIOLATION: "), "{more:?}: {part:?}");
+    }
+    let before = (0.5 * found["from_s"].as_f64().expect("a time")).to_string();
+    let deepest = report["audit"]["violations"].as_array().into_iter().flatten();
+    let deepest = deepest.map(|of| of["min_m"].as_f64().expect("a distance")).fold(f64::INFINITY, f64::min);
+    let least = (0.99 * deepest).to_string();
+    for more in [&["--ids", &ids, "--delta", &least][..], &["--to", &before], &["--delta", &least], &["--independent"]] {
+        let part = audit(folder.path(), &[&["flown"], more].concat());
+        assert!(part.exit == Some(0) && part.out.starts_with("CLEAR if straight"), "{more:?}: {part:?}");
+    }
 }
 
 #[test]

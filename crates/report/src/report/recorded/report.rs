@@ -130,9 +130,9 @@ pub struct RecordedReport {
     /// Verdict and finding up to there, where nothing was wrong.
     #[serde(skip)]
     pub(super) until_then: Option<String>,
-    /// Whether the run of the recording answers the same question by undecided.
+    /// Why the run's own audit leaves the question undecided.
     #[serde(skip)]
-    pub is_run_undecided: bool,
+    pub run_objection: Option<String>,
     /// Whether it was asked how close two came, and not single vehicles alone.
     #[serde(skip)]
     pub(super) separation_asked: bool,
@@ -270,7 +270,7 @@ impl RecordedReport {
             limits,
             ended_early: None,
             until_then: None,
-            is_run_undecided: false,
+            run_objection: None,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
             gaps: outcome

@@ -133,8 +133,8 @@ impl RecordedReport {
         if self.audit.flight.parry.disagreements > 0 {
             return "the two detectors disagree".to_owned();
         }
-        if self.is_run_undecided {
-            return "the run's own audit of every step is undecided (see its report.json)".to_owned();
+        if let Some(why) = &self.run_objection {
+            return why.clone();
         }
         if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
             return format!(

@@ -411,7 +411,7 @@ impl<'a> AuditRequest<'a> {
 
     /// Returns what is taken to happen between samples, for a recording of curves alone or one of `tautline run`. Nothing is
     /// proved where the samples themselves are assumed.
-    fn between(&self, curves: bool, holds_every_step: bool, answer: RunAnswer, assumed: Option<&str>) -> Between {
+    fn between(&self, curves: bool, holds_every_step: bool, answer: &RunAnswer, assumed: Option<&str>) -> Between {
         let most = || {
             let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
             let by_name =
@@ -422,7 +422,7 @@ impl<'a> AuditRequest<'a> {
             Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
             Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
             _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
-            _ if answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
+            _ if *answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
             _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
@@ -476,7 +476,7 @@ impl ConfiguredAudit<'_> {
         let answer = own.as_ref().map(|own| own.answer(&mut outcome, &settings, request, &mut notes));
         let answer = answer.unwrap_or(RunAnswer::Samples);
         let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
-        let between = request.between(curves, holds_every_step, answer, assumed.as_deref());
+        let between = request.between(curves, holds_every_step, &answer, assumed.as_deref());
         notes.extend(taken.notes(request, own.as_ref()));
         notes.extend(notes_on_alone(&outcome));
         notes.extend(self.asked_by.clone());
@@ -489,7 +489,9 @@ impl ConfiguredAudit<'_> {
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
         let mut report = RecordedReport::new(&outcome, &settings, source, between);
-        report.is_run_undecided = answer == RunAnswer::Undecided;
+        if let RunAnswer::Undecided(why) = answer {
+            report.run_objection = Some(why);
+        }
         let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
         let shortened = report.shortened();
         for note in &shortened {

@@ -38,6 +38,8 @@ pub struct OwnRecording {
     is_independent: bool,
     /// Whether positions and times are read as the run wrote them.
     is_read_as_written: bool,
+    /// Metres of a length as the run wrote it.
+    scale: f64,
     /// Times of the samples \[s\].
     samples_s: Vec<f64>,
     /// The law that was flown, where it is not the scenario's.
@@ -45,12 +47,12 @@ pub struct OwnRecording {
 }
 
 /// How the run's audit takes part in the audit of its recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum RunAnswer {
     /// The samples were judged.
     Samples,
-    /// The samples were judged, and the run, which answers the same question, is undecided.
-    Undecided,
+    /// The samples were judged and are clear, but the run's audit leaves the question undecided, for this reason.
+    Undecided(String),
     /// The answer of the run's audit.
     Repeated,
 }
@@ -124,6 +126,7 @@ impl OwnRecording {
             audit: StoredAudit::None,
             is_independent: false,
             is_read_as_written: true,
+            scale,
             samples_s: Vec::new(),
             other_law: None,
         }
@@ -235,7 +238,10 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return RunAnswer::Samples;
+            return match self.objection(outcome, settings, audit) {
+                Some(why) => undecided(outcome, why),
+                None => RunAnswer::Samples,
+            };
         }
         if self.is_contradicted(outcome, audit, status) {
             note("they show vehicles closer than the run's audit says");
@@ -256,11 +262,60 @@ impl OwnRecording {
                 RunAnswer::Samples
             }
             Status::Undecided => {
-                outcome.status = outcome.status.and(Status::Undecided);
-                outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));
-                RunAnswer::Undecided
+                undecided(outcome, "the run's own audit of every step is undecided (see its report.json)".to_owned())
             }
         }
+    }
+
+    /// Why a clear answer to a question that the run's audit does not answer is not certain: the run found two closer, between
+    /// samples, than the question allows. Distances in another metric, and motion that is shifted in time, are not compared.
+    fn objection(&self, outcome: &Outcome, settings: &Settings, audit: &RunAudit) -> Option<String> {
+        let is_shifted = settings.vehicles.values().any(|of| of.offset_s != 0.0);
+        if outcome.separation != Some(Status::Clear) || is_shifted {
+            return None;
+        }
+        let given_m = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS)).unwrap_or(0.0);
+        let limit_m = outcome.closest.iter().map(|of| of.limit_m).fold(given_m, f64::max);
+        let same_metric = settings.ellipsoid_m == self.ellipsoid_m;
+        let length_scale = if self.ellipsoid_m.is_some() { 1.0 } else { self.scale };
+        let is_judged =
+            |vehicle: usize| settings.only.as_ref().is_none_or(|only| only.contains(&(vehicle + 1).to_string()));
+        let in_window = |found: &RunFinding| {
+            !self.is_read_as_written
+                || (settings.from_s.is_none_or(|from_s| found.to_s >= from_s)
+                    && settings.to_s.is_none_or(|to_s| found.from_s <= to_s))
+        };
+        let is_closer = |found: &&RunFinding| match object_pair(found) {
+            Some(ObjectPair::Vehicles(pair)) => {
+                same_metric
+                    && is_judged(pair.first())
+                    && is_judged(pair.second())
+                    && found.min_m * length_scale < limit_m
+                    && in_window(found)
+            }
+            Some(ObjectPair::Obstacle { vehicle, .. }) => {
+                settings.obstacles == self.obstacles
+                    && is_judged(vehicle)
+                    && found.min_m < found.limit_m
+                    && in_window(found)
+            }
+            None => false,
+        };
+        let found = audit.violations.iter().chain(&audit.closest).filter(is_closer);
+        let deepest = found.min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
+        if let Some(found) = deepest {
+            let other = match found.obstacle {
+                0 => found.other_vehicle.to_string(),
+                obstacle => format!("obstacle {obstacle}"),
+            };
+            let (min_m, at_s) = (found.min_m * length_scale, found.min_at_s);
+            return Some(format!(
+                "the run's audit of every step found {} and {other} {min_m:.3} apart at {at_s:.2} s",
+                found.vehicle
+            ));
+        }
+        let is_listed = audit.violations_count == audit.violations.len() as u64;
+        (!is_listed).then(|| format!("the run's audit of every step found {} violations", audit.violations_count))
     }
 
     /// Whether a question is the one that the run's audit answers: its limit and obstacles, all vehicles, the whole flight,
@@ -301,6 +356,13 @@ impl OwnRecording {
     pub(super) fn note_on_law(&self) -> Option<String> {
         self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"))
     }
+}
+
+/// Leaves the answer of the samples undecided, for a reason that the run's audit gives.
+fn undecided(outcome: &mut Outcome, why: String) -> RunAnswer {
+    outcome.status = outcome.status.and(Status::Undecided);
+    outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));
+    RunAnswer::Undecided(why)
 }
 
 const UNDECIDED_RUN: &str =
