@@ -58,7 +58,7 @@ impl<'a> Text<'a> {
                 .with_place(Place::new(self.name, self.toml, 0..0)));
         }
         conform(&mut root, self.toml.len() + 1).map_err(|misfit| misfit.error.with_place(self.locate(misfit.span)))?;
-        // The schema describes what serde reads: an error here is one of the schema.
+        // `conform` accepts only what serde reads. An error of serde is a defect of the schema.
         Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             ScenarioError::new(error.message())
                 .coded("scenario/wrong-type")
@@ -67,7 +67,7 @@ impl<'a> Text<'a> {
         })
     }
 
-    /// Whether the text or an override gives a key, by its dotted path.
+    /// Returns whether the text or an override gives a key, by its dotted path.
     pub(super) fn gives(&self, path: &str) -> bool {
         let tree = self.tree();
         tree.is_ok_and(|tree| path.split('.').try_fold(&tree, |value, key| value.get_ref().get(key)).is_some())
@@ -98,7 +98,7 @@ impl<'a> Text<'a> {
         error.with_place(self.locate(span))
     }
 
-    /// The text as a tree with its overrides applied.
+    /// Returns the text as a tree with its overrides applied.
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
