@@ -278,7 +278,11 @@ impl Ages {
     /// Counts an age \[s\].
     pub(super) fn take(&mut self, age_s: f64) {
         let class = (libm::log(age_s.max(LEAST_S) / LEAST_S) / libm::log(RATIO)).ceil();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; larger values saturate")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at least 0; larger values saturate"
+        )]
         let class = (class as usize).min(CLASSES - 1);
         self.counts[class] += 1;
         self.total += 1;

@@ -197,7 +197,8 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "{rate_hz} messages a second are more than {MESSAGES_A_STEP} messages in a step of {} s",
                 self.time.dt_s
-            )).coded("scenario/step-too-long")
+            ))
+            .coded("scenario/step-too-long")
             .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
             .at("network.rate_hz")
             .at("sensing.rate_hz"));

@@ -75,12 +75,10 @@ impl ImperfectionSpec for SensingSpec {
         ];
         for (key, what, noise) in noises {
             if noise > 0.0 && rate_hz.is_none() {
-                return Err(ScenarioError::new(format!(
-                    "{what} needs a rate of measurements"
-                ))
-                .coded("scenario/missing-key")
-                .with_help("set sensing.rate_hz, such as 100")
-                .at(key));
+                return Err(ScenarioError::new(format!("{what} needs a rate of measurements"))
+                    .coded("scenario/missing-key")
+                    .with_help("set sensing.rate_hz, such as 100")
+                    .at(key));
             }
         }
         if rate_hz.is_some() {

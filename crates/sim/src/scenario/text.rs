@@ -115,7 +115,7 @@ impl<'a> Text<'a> {
         Ok(root)
     }
 
-    /// The place of a span of the common address space.
+    /// Returns the place of a span of the common address space.
     fn locate(&self, span: Range<usize>) -> Place {
         let mut base = self.toml.len() + 1;
         if span.start >= base {
@@ -131,13 +131,13 @@ impl<'a> Text<'a> {
     }
 }
 
-/// The tables `[laws.NAME]`.
+/// Returns the tables `[laws.NAME]`.
 fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
     root.get_ref().get("laws")?.get_ref().as_table()
 }
 
-/// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
-/// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
+/// Returns the span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its
+/// table if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
     let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
@@ -157,7 +157,7 @@ fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<
     first_span_from(value, overridden).unwrap_or_else(|| value.span())
 }
 
-/// The first span within a list, or of the value, that starts at `least` or later.
+/// Returns the first span within a list, or of the value, that starts at `least` or later.
 fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<usize>> {
     if value.span().start >= least {
         return Some(value.span());

@@ -1,4 +1,4 @@
-//! What a recording of `tautline run` holds beside positions: its limit, its obstacles and the run's own audit.
+//! Contents of a recording of `tautline run` besides positions: limit, obstacles and the run's own audit.
 
 use std::path::Path;
 
@@ -19,43 +19,43 @@ use tautline_recordings::read::ReadOptions;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::{scenario, sim};
 
-/// Relative difference of two distances of the same instant that were computed in two ways.
+/// Relative rounding difference of two distances at the same instant, computed in two ways.
 const SAME: f64 = 1e-9;
 
-/// What a flight of `tautline run` holds beside positions.
+/// Contents of a recording of `tautline run` besides positions.
 #[derive(Clone, Debug)]
 pub struct OwnRecording {
-    /// Safety distance \[m\]; 2, as a scaled distance, where the scenario has ellipsoids.
+    /// Safety distance \[m\]; 2, as a scaled distance, if the scenario has ellipsoids.
     pub(super) limit_m: f64,
     /// Half axes of the ellipsoid around each vehicle \[m\].
     pub(super) ellipsoid_m: Option<Vector3<f64>>,
     /// Obstacles of the scenario.
     pub(super) obstacles: Vec<Obstacle>,
-    /// Where the flight ended before its time.
+    /// Early end of the flight, if it has one.
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
-    /// Whether the run's audit is not to be used.
+    /// Whether the audit ignores the run's audit.
     is_independent: bool,
-    /// Whether positions and times are read as the run wrote them.
+    /// Whether positions and times are read unchanged.
     is_read_as_written: bool,
     /// Times of the samples \[s\].
     samples_s: Vec<f64>,
-    /// The law that was flown, where it is not the scenario's.
+    /// The flown law, if it differs from the law of the scenario.
     other_law: Option<String>,
 }
 
-/// How the run's audit takes part in the audit of its recording.
+/// Use of the run's audit in the audit of its recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RunAnswer {
-    /// The samples were judged.
+    /// The verdict is that of the samples.
     Samples,
-    /// The samples were judged, and the run, which answers the same question, is undecided.
+    /// The verdict is undecided, as that of the run for the same question.
     Undecided,
-    /// The answer of the run's audit.
+    /// The verdict is that of the run's audit.
     Repeated,
 }
 
-/// Returns the audit that a run writes into its recording when it closes it.
+/// Returns the audit that a run writes at the end of its recording.
 #[must_use]
 pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
     let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
@@ -101,7 +101,7 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
 }
 
 impl OwnRecording {
-    /// Returns what the recording of a flight that is in memory holds.
+    /// Returns the contents for a flight in memory.
     #[must_use]
     pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>) -> Self {
         let early_end = report.run.ended_early.clone().map(|reason| EarlyEnd {
@@ -113,7 +113,7 @@ impl OwnRecording {
         Self { early_end, audit, other_law, ..Self::of(scenario, scenario.delta_m, 1.0) }
     }
 
-    /// Returns the limits of a scenario, with lengths that are multiplied by `scale`.
+    /// Returns the limits of a scenario, with lengths multiplied by `scale`.
     fn of(scenario: &Scenario, delta_m: f64, scale: f64) -> Self {
         let ellipsoid_m = scenario.half_axes_m().map(|axes| Vector3::from(axes) * scale);
         Self {
@@ -129,11 +129,11 @@ impl OwnRecording {
         }
     }
 
-    /// Reads what the recording holds beside positions; `None` where the file is no recording of `tautline run`. A damaged
-    /// recording is read up to the damage.
+    /// Reads the contents of a recording besides positions; `None` if the file is not a recording of `tautline run`.
+    /// Reads a damaged recording up to the damage.
     ///
     /// # Errors
-    /// [`Failure`] where the scenario of the recording cannot be read: then its obstacles are not known.
+    /// [`Failure`] if the scenario of the recording cannot be read, because its obstacles are then unknown.
     pub fn read(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
         let Some(mut recording) = read::open_run(path) else { return Ok(None) };
         let header = recording.header();
@@ -187,18 +187,18 @@ impl OwnRecording {
         }
     }
 
-    /// Whether the recording is as the run wrote it, so that every sample contains every vehicle.
+    /// Returns whether the recording is unchanged, so that every sample contains every vehicle.
     pub(super) fn is_unaltered(&self) -> bool {
         self.run_audit().is_some()
     }
 
-    /// Whether the samples are known to be all steps of the run, each of them straight.
+    /// Returns whether the samples are all steps of the run, each with straight motion.
     pub(crate) fn holds_every_step(&self) -> bool {
         self.run_audit().is_some_and(|audit| audit.holds_every_step)
     }
 
-    /// Replaces the findings of the samples by those of the run's audit where the question is the one that the run answered.
-    /// Adds a note where the samples are judged although the recording is one of a run.
+    /// Replaces the findings of the samples by those of the run's audit if the question is the same. Otherwise adds a
+    /// note with the reason.
     pub(super) fn answer(
         &self,
         outcome: &mut Outcome,
@@ -210,11 +210,11 @@ impl OwnRecording {
         let audit = match &self.audit {
             _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
-                note("the recording holds no audit of its run, which an ended run writes last");
+                note("the recording holds no audit of its run; a run writes its audit at its end");
                 return RunAnswer::Samples;
             }
             StoredAudit::Altered => {
-                note("the recording is not as the run wrote it, so that the run's audit is not of these samples");
+                note("the recording is not as the run wrote it, so the run's audit may be of other samples");
                 return RunAnswer::Samples;
             }
             StoredAudit::AsWritten(audit) => audit,
@@ -223,7 +223,7 @@ impl OwnRecording {
             [Status::Clear, Status::Violation, Status::Undecided].into_iter().find(|of| of.name() == audit.status);
         let status = status.unwrap_or_default();
         if audit.holds_every_step {
-            // The samples are all that the run judged: their own verdict is a proof.
+            // The run judged exactly these samples, so the verdict of the samples is a proof.
             if status == Status::Undecided && outcome.status == Status::Violation {
                 notes.push(UNDECIDED_RUN.to_owned());
             }
@@ -244,7 +244,7 @@ impl OwnRecording {
         match status {
             Status::Clear | Status::Undecided if !audit.ended_early.is_empty() => RunAnswer::Samples,
             Status::Clear if !settings.envelope.is_empty() => {
-                note("the run's audit of every step says nothing of limits of single vehicles");
+                note("the run's audit of every step does not cover limits of single vehicles");
                 RunAnswer::Samples
             }
             Status::Clear | Status::Violation => {
@@ -263,8 +263,9 @@ impl OwnRecording {
         }
     }
 
-    /// Whether a question is the one that the run's audit answers: its limit and obstacles, all vehicles, the whole flight,
-    /// its own clock, and no assumption on the motion. Limits of single vehicles are a question of their own.
+    /// Returns whether the run's audit answers a question. The question must have the limit and obstacles of the run,
+    /// all vehicles, the whole flight, the run's clock, and no assumption on the motion. Limits of single vehicles are
+    /// checked separately.
     fn is_same_question(&self, settings: &Settings, request: &AuditRequest<'_>) -> bool {
         let limit_m = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS));
         self.is_read_as_written
@@ -277,8 +278,8 @@ impl OwnRecording {
             && (request.settings.motion, request.settings.max_gap_s) == (None, None)
     }
 
-    /// Whether the samples themselves show two closer than the run's audit says. Straight lines between samples show nothing of
-    /// the run.
+    /// Returns whether the samples contradict the run's audit with a smaller distance. Distances between samples are
+    /// ignored: straight lines there may differ from the motion of the run.
     fn is_contradicted(&self, outcome: &Outcome, audit: &RunAudit, status: Status) -> bool {
         let has_sample = |from_s: f64, to_s: f64| {
             let rounding_s = SAME * (1.0 + to_s.abs());
@@ -297,16 +298,16 @@ impl OwnRecording {
             || (status == Status::Clear && outcome.violations.iter().any(|of| has_sample(of.from_s, of.to_s)))
     }
 
-    /// Returns a note where another law was flown than the scenario's.
+    /// Returns a note if the flown law differs from the law of the scenario.
     pub(super) fn note_on_law(&self) -> Option<String> {
-        self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"))
+        self.other_law.as_ref().map(|name| format!("flown under the law {name} instead of the scenario's"))
     }
 }
 
 const UNDECIDED_RUN: &str =
     "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)";
 
-/// The pair of a finding; `None` where its numbers name none.
+/// Returns the pair of a finding; `None` if its numbers name no pair.
 fn object_pair(found: &RunFinding) -> Option<ObjectPair> {
     let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
     let vehicle = index(found.vehicle)?;
@@ -334,7 +335,8 @@ fn repeat(audit: &RunAudit, status: Status, outcome: &mut Outcome) {
     outcome.undecided.clear();
     outcome.tallies.undecided = Tally::all(0);
     outcome.deciding_rate_hz = None;
-    // The figure of the smallest distance over time shows samples; between them no pair is closer than the run's closest.
+    // The figure of the smallest distance over time has samples. Between samples no pair is closer than the run's
+    // closest approach.
     if let Some(nearest) = of_pairs.first() {
         for slice in &mut outcome.smallest {
             let drawn = &mut slice.closest;
