@@ -250,13 +250,6 @@ class Question:
         independent: bool,
     ) -> Question: ...
 
-class Outputs(TypedDict):
-    csv: str | None
-    latex: str | None
-    html: str | None
-    force: bool
-    threads: int | None
-
 def attack(
     scenario: Scenario,
     start: float | None,
@@ -267,7 +260,7 @@ def attack(
     seeds: int,
     seed: int,
     out: str | None,
-    outputs: Outputs,
+    outputs: dict[str, str | bool | int | None],
 ) -> _Answered: ...
 def audit_arrays(
     question: Question,
@@ -297,7 +290,7 @@ def compare(
     laws: Sequence[str] | None,
     runs: int,
     seed: int,
-    outputs: Outputs,
+    outputs: dict[str, str | bool | int | None],
 ) -> _Answered: ...
 def export(
     paths: Sequence[str],
@@ -322,7 +315,7 @@ def margin(
     scan: int,
     halvings: int,
     logarithmic: bool,
-    outputs: Outputs,
+    outputs: dict[str, str | bool | int | None],
 ) -> _Answered: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
@@ -332,6 +325,6 @@ def sweep(
     runs: int,
     seed: int,
     verdict: str,
-    outputs: Outputs,
+    outputs: dict[str, str | bool | int | None],
 ) -> _Answered: ...
 def validate(out: str, force: bool, threads: int | None) -> _Answered: ...

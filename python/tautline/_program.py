@@ -94,7 +94,7 @@ def asked(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _nati
     return found._native
 
 
-def outputs(csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None) -> _native.Outputs:
+def outputs(csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None) -> dict[str, str | bool | int | None]:
     """Files and threads of a study."""
     return {
         "csv": maybe_path(csv, "csv"),

@@ -354,7 +354,8 @@ fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
     let deepest = report["audit"]["violations"].as_array().into_iter().flatten();
     let deepest = deepest.map(|of| of["min_m"].as_f64().expect("a distance")).fold(f64::INFINITY, f64::min);
     let least = (0.99 * deepest).to_string();
-    for more in [&["--ids", &ids, "--delta", &least][..], &["--to", &before], &["--delta", &least], &["--independent"]] {
+    for more in [&["--ids", &ids, "--delta", &least][..], &["--to", &before], &["--delta", &least], &["--independent"]]
+    {
         let part = audit(folder.path(), &[&["flown"], more].concat());
         assert!(part.exit == Some(0) && part.out.starts_with("CLEAR if straight"), "{more:?}: {part:?}");
     }

@@ -141,7 +141,7 @@ class Scenarios(Case):
     def test_a_wrong_scenario_says_place_value_and_remedy(self) -> None:
         for says, do in (
             ("did you mean `pentagon`?", lambda: tl.Scenario("pentagn")),
-            ("--set:1:11: invalid type", lambda: tl.Scenario(set={"time.dt_s": "x"})),
+            ("--set:1:11: `dt_s` must be a number, got the text", lambda: tl.Scenario(set={"time.dt_s": "x"})),
             ("is not a key of an override", lambda: tl.Scenario(set={"a b": 1})),
             ("unknown key `nope`", lambda: tl.Scenario(set={"law.nope": 1})),
             ("TOML:1:1: unknown key `x`", lambda: tl.Scenario.from_toml("x = 3")),

@@ -45,19 +45,19 @@ pub fn exact(limit: f64) -> String {
     (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
 }
 
-/// Formats `number` \[m\], which is below `limit_m` \[m\], with at least three decimals and as many as it takes to differ
-/// from the limit; `just below ...` within 1e-9 of it.
+/// Formats `number` \[m\], which is below `limit_m` \[m\], rounded down as [`at_least`] does, with at least three decimals and
+/// as many as it takes to differ from the limit; `just below ...` within 1e-9 of it.
 #[must_use]
 pub fn metres_below(number: f64, limit_m: f64) -> String {
     const JUST: f64 = 1e-9;
     if number >= limit_m * (1.0 - JUST) {
         return format!("just below {}", exact(limit_m));
     }
-    let is_told = |&decimals: &usize| {
-        let shown = fixed(number, decimals);
-        shown != fixed(limit_m, decimals) && (number == 0.0 || shown.parse() != Ok(0.0))
+    let is_told = |&decimals: &u8| {
+        let shown = at_least(number, decimals);
+        shown != fixed(limit_m, usize::from(decimals)) && (number == 0.0 || shown.parse() != Ok(0.0))
     };
-    (3..=17).find(is_told).map_or_else(|| format!("{number:e}"), |decimals| fixed(number, decimals))
+    (3..=17).find(is_told).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
 }
 
 /// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.

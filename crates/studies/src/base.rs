@@ -8,13 +8,16 @@ use tautline_core::text::metres;
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
 
-/// A start without randomness is moved by up to this part of delta along each axis.
+/// Jitter of a start without randomness along each axis, as a part of delta.
 pub const JITTER: f64 = 0.05;
 
-/// The key of the jitter.
+/// Key of the jitter.
 pub(crate) const JITTER_KEY: &str = "start.jitter_m";
+/// Keys of the seeds of start and flight.
+const START_SEED: &str = "start.seed";
+const NOISE_SEED: &str = "noise.seed";
 
-/// A scenario as a study reads it again and again, each time with other keys.
+/// A scenario that a study reads many times, each time with other overrides.
 #[derive(Clone, Debug)]
 pub struct BaseScenario {
     source: Source,
@@ -26,79 +29,97 @@ impl BaseScenario {
     /// Reads a scenario and its overrides.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the scenario is wrong as it is.
+    /// [`ScenarioError`] if the unchanged scenario is wrong.
     pub fn read(source: Source, overrides: Vec<Override>) -> Result<Self, ScenarioError> {
         let template = Template::read(&source, &overrides)?;
         Ok(Self { source, overrides, template })
     }
 
-    /// The scenario of a request.
+    /// Returns the scenario of a request.
     ///
     /// # Errors
-    /// [`Failure`] where an override or the scenario is wrong.
+    /// [`Failure`] if an override or the scenario is wrong.
     pub fn of(request: &ScenarioRequest) -> Result<Self, Failure> {
         Ok(Self::read(request.source.clone(), request.parsed_overrides()?)?)
     }
 
-    /// The scenario as it is.
+    /// Returns the unchanged scenario.
     #[must_use]
     pub fn own(&self) -> &Scenario {
         self.template.own()
     }
 
-    /// The scenario as a pattern of flights under other laws.
+    /// Returns the template for flights under other laws.
     #[must_use]
     pub fn template(&self) -> &Template {
         &self.template
     }
 
-    /// Overrides of the call, as `--set` takes them.
+    /// Returns the overrides of the call, as `--set` takes them.
     pub fn sets(&self) -> impl Iterator<Item = String> + '_ {
         self.overrides.iter().map(|set| set.text().to_owned())
     }
 
-    /// The scenario with more overrides.
+    /// Returns the scenario with more overrides.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the scenario cannot be flown with them.
+    /// [`ScenarioError`] if the scenario cannot be flown with these overrides.
     pub fn with(&self, sets: &[String]) -> Result<Scenario, ScenarioError> {
         let more = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>()?;
         Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat())
     }
 
-    /// Whether a key takes integers only.
+    /// Returns whether a key takes integers only.
     #[must_use]
     pub fn takes_integers_only(&self, key: &str) -> bool {
         takes_integers_only(&self.source, &self.overrides, key)
     }
 }
 
-/// Seeds of the flights of one value or point. A single flight has everything as the scenario says.
+/// Seeds of the flights of one value or point. A single flight keeps the seeds of the scenario.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Runs {
     /// Number of flights.
     pub count: u64,
-    /// Seed of the first; run k, from 0, has this plus k.
+    /// Seed of the first flight; flight k, from 0, has this seed plus k.
     pub seed: u64,
     /// Jitter of a start without randomness \[m\].
     pub jitter_m: Option<f64>,
 }
 
 impl Runs {
-    /// Seeds from `seed` on. Several flights of which neither start nor flight is random get a jitter of 5 % of delta.
+    /// Returns seeds from `seed` on. Several flights get a jitter of 5 % of delta if neither start nor flight is
+    /// random.
     #[must_use]
     pub fn new(count: u64, seed: u64, base: &BaseScenario, is_random: bool) -> Self {
         let moves = count > 1 && !is_random && !base.template().start_is_random();
         Self { count, seed, jitter_m: moves.then(|| JITTER * base.own().delta_m) }
     }
 
-    /// Seed of a run, from 0.
+    /// Refuses several flights of each value of `keys` that are equal: those of which a key is the seed of all randomness.
+    ///
+    /// # Errors
+    /// [`Failure`] with the remedy.
+    pub fn check_seeds(&self, keys: &[&str], base: &BaseScenario, flight_is_random: bool) -> Result<(), Failure> {
+        let start_is_random =
+            base.template().start_is_random() || self.jitter_m.is_some() || keys.contains(&JITTER_KEY);
+        let differ =
+            (start_is_random && !keys.contains(&START_SEED)) || (flight_is_random && !keys.contains(&NOISE_SEED));
+        let Some(key) = keys.iter().find(|key| [START_SEED, NOISE_SEED].contains(key)) else { return Ok(()) };
+        if self.count <= 1 || differ {
+            return Ok(());
+        }
+        let message = format!("--runs: must be 1 for values of {key}, got {}", self.count);
+        Err(Failure::input("study/equal-runs", message, "leave --runs out: all runs of one seed are the same flight"))
+    }
+
+    /// Returns the seed of a run, from 0.
     #[must_use]
     pub fn seed(&self, run: u64) -> u64 {
         self.seed.saturating_add(run)
     }
 
-    /// Overrides of a run, from 0. Overrides of keys that are varied follow them.
+    /// Returns the overrides of a run, from 0. Overrides of varied keys come after these overrides.
     #[must_use]
     pub fn sets(&self, run: u64) -> Vec<String> {
         if self.count <= 1 {
@@ -116,7 +137,7 @@ pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
     in_range("--seed", &seed, &SEEDS)
 }
 
-/// The note that a start without randomness is moved.
+/// Returns the note on the jitter of a start without randomness.
 pub(crate) fn jitter_note(jitter_m: f64) -> String {
     format!(
         "the start has no randomness: start.seed moves each coordinate by up to {} m ({} % of delta)",
@@ -125,16 +146,16 @@ pub(crate) fn jitter_note(jitter_m: f64) -> String {
     )
 }
 
-/// What a flight has to show.
+/// Verdict that a flight must show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Question {
-    /// No violation, proved to the end of the flight.
+    /// The flight is proved clear to its end.
     #[default]
     Clear,
     /// The formation is reached and kept to the end.
     Reached,
-    /// Both, as far as the scenario asks.
+    /// The flight is clear and reaches its formation, as far as the scenario requires.
     Pass,
 }
 
@@ -152,7 +173,7 @@ impl Question {
         }
     }
 
-    /// Returns what a flight does that shows it, and what one does that does not.
+    /// Returns the predicates of a flight that shows the verdict and of one that does not.
     #[must_use]
     pub fn words(self) -> [&'static str; 2] {
         match self {
@@ -162,7 +183,7 @@ impl Question {
         }
     }
 
-    /// Returns whether a flight shows it.
+    /// Returns whether a flight shows the verdict.
     #[must_use]
     pub fn holds(self, flight: &FlightSummary) -> bool {
         match self {

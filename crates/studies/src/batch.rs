@@ -1,4 +1,4 @@
-//! Many flights at once: on several threads, with progress, and with the same results for any number of threads.
+//! Flights on several threads, with progress. The results are the same for any number of threads.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,7 +22,7 @@ pub struct Batch<'a> {
 }
 
 impl<'a> Batch<'a> {
-    /// A batch on a number of threads, by default one a core.
+    /// Returns a batch on a number of threads, by default one for each core.
     ///
     /// # Errors
     /// [`Failure`] for a number of threads outside [`THREADS`].
@@ -32,19 +32,19 @@ impl<'a> Batch<'a> {
         Ok(Self { threads, monitor, finishes_flights: false })
     }
 
-    /// The same batch, in which an interruption lets flights under way come to their end.
+    /// Returns the same batch, whose flights under way end normally after an interruption.
     #[must_use]
     pub fn finishing_flights(self) -> Self {
         Self { finishes_flights: true, ..self }
     }
 
-    /// Number of threads.
+    /// Returns the number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.threads
     }
 
-    /// The receiver of progress.
+    /// Returns the receiver of progress.
     #[must_use]
     pub fn monitor(&self) -> &'a dyn Monitor {
         self.monitor
@@ -56,14 +56,14 @@ impl<'a> Batch<'a> {
         self.monitor.is_interrupted()
     }
 
-    /// Calls `make` for 0, 1, ... below `count` on all threads and returns the results in this order. A result is `None`
-    /// where the batch was interrupted before or during the call.
+    /// Calls `make` for 0, 1, ... below `count` on all threads and returns the results in this order. A result is
+    /// `None` if the batch was interrupted before or during the call.
     ///
-    /// Within `make`, rayon has one thread: whole flights run side by side, never the parts of one flight, so that memory is that
-    /// of one flight a thread.
+    /// Within `make`, rayon has one thread. Each thread holds the memory of one flight, because parts of a flight do
+    /// not run on several threads.
     ///
     /// # Errors
-    /// The error of the smallest number.
+    /// The error of the smallest number that failed.
     pub fn run<T: Send, E: Send>(
         &self,
         count: usize,
@@ -75,7 +75,8 @@ impl<'a> Batch<'a> {
             (number < count).then(|| (number, if self.is_interrupted() { Ok(None) } else { make(number) }))
         };
         let work = || {
-            // Without a pool of its own, parts of a flight go to the global pool: slower, with the same bits.
+            // If the pool of one thread cannot be built, the global pool runs the parts of a flight: slower, with equal
+            // bits.
             let _single = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
             std::iter::from_fn(take).collect::<Vec<_>>()
         };
@@ -88,16 +89,16 @@ impl<'a> Batch<'a> {
             };
             started.into_iter().flat_map(join).collect()
         });
-        // Where the system gives no thread at all, this thread does the work.
+        // If the system starts no thread, this thread does the work.
         made.extend(std::iter::from_fn(take));
         made.sort_by_key(|&(number, _)| number);
         made.into_iter().map(|(_, made)| made).collect()
     }
 
-    /// Flies a scenario to its end; `None` where the batch was interrupted.
+    /// Flies a scenario to its end. Returns `None` if the batch was interrupted.
     ///
     /// # Errors
-    /// [`SimError`] where the law or the judge cannot be built.
+    /// [`SimError`] if the law or the judge cannot be built.
     pub fn fly(&self, scenario: &Scenario, seed: u64) -> Result<Option<FlightSummary>, SimError> {
         if self.is_interrupted() {
             return Ok(None);
@@ -108,8 +109,8 @@ impl<'a> Batch<'a> {
         flight
     }
 
-    /// Returns a function that takes a number of steps, reports the progress and breaks after an interruption, unless flights
-    /// are finished.
+    /// Returns a function that takes a number of steps and reports the progress. The function breaks after an
+    /// interruption, unless `finishes` is set.
     pub fn carry_on<'b>(
         &'b self,
         reported: &'b mut u64,

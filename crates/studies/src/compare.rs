@@ -15,13 +15,14 @@ use tautline_report::report::page::{self, Badge, Picture, Tone};
 use tautline_report::request::{Failure, PICTURES_BYTES, Pictures, ScenarioRequest};
 use tautline_sim::scenario::{Draw, NamedLaw, Scenario, Template};
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 5] = [
-    "Every law is flown from the same starts, on the same plant, and judged by the same audit: a flight is proved clear where it \
-     was flown to its end, no two vehicles came closer than delta at any time, and both detectors agree.",
-    "Starts are draws, and intervals are about all starts that could have been drawn: they hold for a number of runs that was fixed \
-     before the first.",
-    "Shares have the interval of Clopper and Pearson, medians and percentiles that of order statistics, means that of Student.",
+    "Every law is flown from the same starts on the same plant and judged by the same audit. A flight is proved clear \
+     if it was flown to its end, no two vehicles came closer than delta at any time, and both detectors agree.",
+    "Starts are drawn at random. Intervals are for all starts that could have been drawn, and hold for a number of \
+     runs that was fixed before the first.",
+    "Shares have the interval of Clopper and Pearson, medians and percentiles that of order statistics, means that of \
+     Student.",
     "Times to reach are over the flights that reached the formation and kept it to the end.",
     "Path length and total control are sums over all vehicles and the whole flight.",
 ];
@@ -29,13 +30,13 @@ const ASSUMED: [&str; 5] = [
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Kinds of laws, or names of tables `[laws.NAME]`; those of all such tables by default, and where there are none,
-    /// every kind.
+    /// Kinds of laws, or names of tables `[laws.NAME]`. By default the names of all such tables, or all kinds if the
+    /// scenario has no such table.
     pub laws: Option<Vec<String>>,
     /// Starts under each law: 1 to [`crate::MOST_RUNS`].
     pub runs: u64,
-    /// Run k, from 0, has `start.seed` and, where the flight is random, `noise.seed` of this plus k. A start that does not
-    /// depend on its seed gets a jitter of 5 % of delta along each axis.
+    /// Seed of the first run. Run k, from 0, has this seed plus k as `start.seed` and, if the flight is random, as
+    /// `noise.seed`. A start that does not depend on its seed gets a jitter of 5 % of delta along each axis.
     pub seed: u64,
 }
 
@@ -45,27 +46,27 @@ impl Default for Options {
     }
 }
 
-/// Laws side by side. Units are in the names; what does not apply is null.
+/// Laws side by side. Units are in the names; inapplicable values are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// The scenario, the program and the safety distance.
     #[serde(flatten)]
     pub about: About,
-    /// Starts that were flown under every law.
+    /// Number of starts that were flown under every law.
     pub runs: u64,
-    /// Starts that were asked for.
+    /// Requested number of starts.
     pub runs_asked: u64,
-    /// `start.seed` of the first.
+    /// `start.seed` of the first start.
     pub seed: u64,
     /// Jitter along each axis of a start without randomness \[m\].
     pub jitter_m: Option<f64>,
     /// Confidence of all intervals.
     pub confidence: f64,
-    /// A row a law, in the order in which they were named.
+    /// A row for each law, in the order of the options.
     pub laws: Vec<LawRow>,
-    /// Wall-clock times, the only part that differs between two comparisons of the same.
+    /// Wall-clock times. Only this part differs between two equal comparisons.
     pub performance: Performance,
-    /// Whether a seed of noise changes the flight.
+    /// Whether the flight depends on the seed of noise.
     #[serde(skip)]
     flight_is_random: bool,
 }
@@ -91,9 +92,9 @@ pub struct LawRow {
     pub refused: u64,
     /// Flights that reached the formation.
     pub reached: Proportion,
-    /// Median of the time to reach it, over the flights that did \[s\].
+    /// Median of the time to reach the formation, over the flights that reached it \[s\].
     pub reached_median_s: Estimate,
-    /// 95th percentile of that time \[s\].
+    /// 95th percentile of the time to reach the formation \[s\].
     pub reached_p95_s: Estimate,
     /// Smallest separation of all flights \[m\].
     pub min_smallest_m: Option<f64>,
@@ -116,7 +117,7 @@ pub struct LawRow {
 /// Wall-clock times on the machine that flew.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Performance {
-    /// From first to last flight \[s\].
+    /// Time from the start of the first flight to the end of the last \[s\].
     pub wall_s: f64,
     /// Times of each law, in the order of the rows.
     pub laws: Vec<LawPerformance>,
@@ -161,7 +162,7 @@ impl Experiment for Options {
         let flights = usize::try_from(self.runs).unwrap_or(usize::MAX).saturating_mul(laws.len());
         batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
         let began = Instant::now();
-        // All laws from one start before the next one: an interruption leaves few starts that cannot be compared.
+        // Each start is flown under all laws before the next start, so an interruption leaves few incomplete starts.
         let flown = batch.run(flights, |number| {
             let (law, seed) = (&laws[number % laws.len()], seed((number / laws.len()) as u64));
             let flight = batch.fly(&drawn(template, law, seed, jitter_m)?, seed);
@@ -202,7 +203,7 @@ impl Experiment for Options {
 }
 
 impl Options {
-    /// The laws to compare, each once.
+    /// Returns the laws to compare, without repetition.
     fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
         let names = self.laws.clone().unwrap_or_else(|| template.compared());
         if names.is_empty() {
@@ -213,7 +214,7 @@ impl Options {
             return Err(Failure::input(
                 "compare/law-twice",
                 format!("the law `{twice}` is named twice"),
-                "name each once; two settings of one law have tables [laws.NAME] of two names, with the same `kind`",
+                "name each law once; two settings of one law need two tables [laws.NAME] with the same `kind`",
             ));
         }
         Ok(names.iter().map(|name| template.law(name)).collect::<Result<_, _>>()?)
@@ -224,18 +225,19 @@ fn under(law: &NamedLaw, seed: u64) -> String {
     format!("under the law {}, start.seed = {seed}", law.name)
 }
 
-/// The flight of a law from the start of a seed.
+/// Returns the flight of a law from the start of a seed.
 fn drawn(template: &Template, law: &NamedLaw, seed: u64, jitter_m: Option<f64>) -> Result<Scenario, Failure> {
     let drawn = template.scenario(law, Draw { seed, jitter_m });
     drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))
 }
 
-/// Flights by their law, of the starts that were flown under every law; `flown` has all laws of one start after the other.
+/// Returns the flights of each law, from the starts that were flown under every law. `flown` holds start after start,
+/// and within a start law after law.
 fn by_law<T>(flown: Vec<Option<T>>, laws: usize) -> Vec<Vec<T>> {
     let mut flights: Vec<Vec<T>> = (0..laws).map(|_| Vec::new()).collect();
     let mut flown = flown.into_iter().peekable();
     while flown.peek().is_some() {
-        // All flights of a start are taken, whether they were flown or not.
+        // Takes all flights of a start, also those that were not flown.
         let of_start: Vec<_> = flown.by_ref().take(laws).collect();
         for (law, flight) in
             flights.iter_mut().zip(of_start.into_iter().collect::<Option<Vec<_>>>().into_iter().flatten())
@@ -246,7 +248,7 @@ fn by_law<T>(flown: Vec<Option<T>>, laws: usize) -> Vec<Vec<T>> {
     flights
 }
 
-/// One picture a law, of its flight with the smallest separation at that instant.
+/// Returns a picture for each law: the flight with the smallest separation, at the time of this separation.
 fn worst_moments(base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Result<Vec<Picture>, Failure> {
     let mut taken = Vec::new();
     for law in &study.laws {
@@ -301,7 +303,7 @@ impl LawRow {
         }
     }
 
-    /// The flight with the smallest separation, the first of several.
+    /// Returns the flight with the smallest separation; the first of equal ones.
     #[must_use]
     pub fn worst(&self) -> Option<&FlightSummary> {
         worst(&self.flights)

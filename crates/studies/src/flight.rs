@@ -1,4 +1,4 @@
-//! The summary of one flight, which all studies share.
+//! Summary of a flight, for all studies.
 
 use std::ops::ControlFlow;
 
@@ -12,32 +12,32 @@ use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::SimError;
 
-/// How a flight ended; the first of these that applies.
+/// Outcome of a flight: the first variant that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// Two vehicles came closer than delta, or one came nearer to an obstacle than its clearance.
+    /// Two vehicles came closer than delta, or a vehicle came closer to an obstacle than its clearance.
     Violated,
     /// The flight ended early without a violation.
     EndedEarly,
-    /// The judge cannot decide, or its two detectors disagree.
+    /// The judge cannot decide, or the two detectors disagree.
     Undecided,
-    /// Flown to its end and proved clear by both detectors.
+    /// The flight was flown to its end, and both detectors prove it clear.
     Clear,
 }
 
 /// Summary of one flight. Every number but `law_s` is the same for any number of threads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightSummary {
-    /// Seed of the run: of start and noise, or of the noise alone where the study keeps the start.
+    /// Seed of start and noise, or of the noise alone if the study keeps the start.
     pub seed: u64,
-    /// How the flight ended.
+    /// Outcome of the flight.
     pub outcome: Outcome,
     /// Whether `tautline run` passes the flight.
     pub pass: bool,
-    /// Codes by which `tautline check` refuses the scenario, which is flown all the same.
+    /// Codes by which `tautline check` refuses the scenario. The scenario is flown all the same.
     pub refused: Vec<String>,
-    /// Why the flight ended early.
+    /// Reason why the flight ended early.
     pub ended_early: Option<String>,
     /// Whether the formation of every leg was reached, and the last one kept to the end.
     pub reached: bool,
@@ -62,7 +62,7 @@ pub struct FlightSummary {
     pub peak_control_m_s2: Option<f64>,
     /// Integral of |u|, summed over the vehicles \[m/s\].
     pub total_control_m_s: f64,
-    /// Largest energy over the initial energy.
+    /// Largest energy, divided by the initial energy.
     pub energy_max_over_initial: Option<f64>,
     /// Number of steps.
     pub steps: u64,
@@ -84,7 +84,7 @@ pub struct FlightSummary {
 /// `carry_on` is called after each step with the number of steps. [`ControlFlow::Break`] ends the flight without a summary.
 ///
 /// # Errors
-/// [`SimError`] where the law or the judge cannot be built.
+/// [`SimError`] if the law or the judge cannot be built.
 pub fn fly(
     scenario: &Scenario,
     seed: u64,
@@ -97,14 +97,15 @@ pub fn fly(
 }
 
 impl FlightSummary {
-    /// Returns whether the flight is worse than another: a violation is worse than none, then the smaller separation counts.
+    /// Returns whether the flight is worse than another. A violation is worse than none; otherwise the smaller
+    /// separation is worse.
     #[must_use]
     pub fn is_worse_than(&self, other: &Self) -> bool {
         let rank = |flight: &Self| (flight.outcome != Outcome::Violated, flight.min_m.unwrap_or(f64::INFINITY));
         rank(self) < rank(other)
     }
 
-    /// Smallest separation less delta \[m\].
+    /// Returns the smallest separation less delta \[m\].
     #[must_use]
     pub fn clearance_m(&self) -> Option<f64> {
         self.min_m.map(|min_m| min_m - self.delta_m)
@@ -162,9 +163,9 @@ impl Outcome {
     }
 }
 
-/// Path length and control effort of a swarm, accumulated over every step of a flight. Memory is that of one state.
+/// Path length and control effort of a swarm, accumulated over every step of a flight.
 ///
-/// The path within a step counts as straight.
+/// Holds the memory of one state. The path within a step is taken as straight.
 #[derive(Clone, Debug, Default)]
 pub struct Effort {
     before: Option<Before>,
@@ -211,7 +212,7 @@ impl Sink for Effort {
             self.before = Some(Before { time_s, positions_m: positions_m.clone(), control_m_s2 });
             return;
         };
-        // Without an answer of the law the previous command holds.
+        // Without a new command the previous command holds.
         let control_m_s2 = command.unwrap_or(before.control_m_s2);
         self.path_length_m += sum_of_norms(positions_m, Some(&before.positions_m));
         self.total_control_m_s += f64::midpoint(before.control_m_s2, control_m_s2) * (time_s - before.time_s);
@@ -249,7 +250,7 @@ mod tests {
         // Chords of 1000 parts are shorter than their arcs by a part of 1.6e-6.
         assert!((effort.path_length_m() / (3.0 * std::f64::consts::TAU) - 1.0).abs() < 2e-6);
         assert!((effort.total_control_m_s() - 1.5).abs() < 1e-12, "the trapezoidal rule is exact for a line");
-        assert!(seen(4).path_length_m() < 0.91 * effort.path_length_m(), "few looks see less of a way");
+        assert!(seen(4).path_length_m() < 0.91 * effort.path_length_m(), "few steps shorten the path");
     }
 
     #[test]

@@ -17,44 +17,45 @@ use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::preflight::{Bound, Near, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
 
-/// Values that may be scanned first.
+/// Admitted numbers of scanned values.
 const SCANS: RangeInclusive<usize> = 2..=1000;
-/// Halvings that may be asked for.
+/// Admitted numbers of halvings.
 const HALVINGS: RangeInclusive<u32> = 0..=50;
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 3] = [
-    "A value of the key holds where every run of it does. One run that does not is enough, so more runs find a smaller margin.",
-    "The range is scanned at a few values first, and the first interval in which the verdict turns is halved. A turn and back \
-     between two neighbouring values is not seen.",
+    "The verdict holds at a value of the key if every run at the value shows it. More runs therefore find a smaller \
+     margin.",
+    "The range is scanned at a few values first; then the first interval in which the verdict turns is halved. Two \
+     turns between neighbouring scanned values stay unnoticed.",
     "Shares have the interval of Clopper and Pearson for a number of runs that was fixed before the first.",
 ];
 
 /// Options of a search for a margin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// The key that is changed, such as `time.control_hz`.
+    /// The varied key, such as `time.control_hz`.
     pub key: String,
     /// Its values.
     pub range: Range,
-    /// What every run has to show.
+    /// Verdict that every run must show.
     pub question: Question,
-    /// Runs of each value: 1 to [`crate::MOST_RUNS`]. A single run has everything but the key as the scenario says.
+    /// Runs of each value: 1 to [`crate::MOST_RUNS`]. A single run changes only the key.
     pub runs: u64,
-    /// Seed of the first run; run k, from 0, has this plus k for start and noise.
+    /// Seed of the first run; run k, from 0, has this seed plus k for start and noise.
     pub seed: u64,
 }
 
-/// The values between which a verdict is looked for.
+/// Range of values that is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// The first.
+    /// First value.
     pub from: f64,
-    /// The last.
+    /// Last value.
     pub to: f64,
-    /// Number of values, evenly spaced with both ends, that are scanned first: 2 to 1000.
+    /// Number of evenly spaced values, both ends included, that are scanned first: 2 to 1000.
     pub scan: usize,
-    /// Number of times that the interval in which the verdict turns is halved: 0 to 50.
+    /// Number of halvings of the interval in which the verdict turns: 0 to 50.
     pub halvings: u32,
     /// Whether values are spaced and halved by their ratio.
     pub logarithmic: bool,
@@ -65,52 +66,52 @@ pub struct Range {
 pub struct Probe {
     /// The value.
     pub value: f64,
-    /// Runs that showed what was asked.
+    /// Runs that showed the verdict.
     pub held: Proportion,
-    /// Smallest separation of all its runs \[m\].
+    /// Smallest separation of all runs \[m\].
     pub min_m: Option<f64>,
-    /// Its runs, in the order of their seeds.
+    /// The runs, in the order of their seeds.
     pub flights: Vec<FlightSummary>,
 }
 
-/// Where the verdict turns.
+/// Turn of the verdict between two values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Turn {
-    /// The two values that the verdict turns between, the smaller one first.
+    /// The two values between which the verdict turns, the smaller value first.
     pub bracket: [f64; 2],
-    /// Whether the verdict holds at the smaller one.
+    /// Whether the verdict holds at the smaller value.
     pub holds_below: bool,
     /// Number of turns among the values that were scanned first.
     pub turns: u64,
 }
 
-/// How much of a key a verdict survives. What does not apply is null.
+/// Result of a search for a margin. Inapplicable values are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
     /// The scenario, the program and the safety distance.
     #[serde(flatten)]
     pub about: About,
-    /// The key that was changed.
+    /// The varied key.
     pub key: String,
-    /// The first and the last value, as they were asked for.
+    /// First and last value of the range.
     pub range: [f64; 2],
     /// Whether values were spaced and halved by their ratio.
     pub logarithmic: bool,
-    /// What every run of a value had to show.
+    /// Verdict that every run of a value must show.
     pub question: Question,
     /// Runs of each value.
     pub runs: u64,
-    /// Seed of the first.
+    /// Seed of the first run.
     pub seed: u64,
     /// Whether a start without randomness was moved.
     pub jittered: bool,
     /// Confidence of all intervals.
     pub confidence: f64,
-    /// Where the verdict turns; none where it was the same at every value.
+    /// Turn of the verdict; `None` if the verdict is the same at every value.
     pub turn: Option<Turn>,
-    /// What linear theory predicts for this key near the first formation, as `check` says it; empty where there is no theory.
+    /// Predictions of linear theory for this key near the first formation, as in `check`; empty without a theory.
     pub predicted: Vec<PredictedMargin>,
-    /// Whether the search was interrupted before the bracket was as narrow as asked.
+    /// Whether an interruption left the bracket wider than requested.
     pub interrupted: bool,
     /// Every value that was tried, in increasing order.
     pub probes: Vec<Probe>,
@@ -119,14 +120,15 @@ pub struct Margin {
 }
 
 impl Options {
-    /// Whether single flights pass between two values of a key: 5 values and 6 halvings.
+    /// Returns a search between two values of a key, with single flights, 5 scanned values and 6 halvings. A value
+    /// holds if its flight passes.
     #[must_use]
     pub fn new(key: &str, from: f64, to: f64) -> Self {
         let range = Range { from, to, scan: 5, halvings: 6, logarithmic: false };
         Self { key: key.to_owned(), range, question: Question::Pass, runs: 1, seed: 0 }
     }
 
-    /// The scenario with a value of the key and the overrides of a run.
+    /// Returns the scenario with a value of the key and the overrides of a run.
     fn scenario(&self, base: &BaseScenario, value: f64, sets: Vec<String>) -> Result<Scenario, Failure> {
         let key = format!("{}={}", self.key, as_toml(value));
         let sets: Vec<_> = sets.into_iter().chain([key]).collect();
@@ -149,15 +151,15 @@ impl Experiment for Options {
         in_range("--halvings", &self.range.halvings, &HALVINGS)?;
         let Range { from, to, logarithmic, .. } = self.range;
         let why = if !from.is_finite() || !to.is_finite() {
-            format!("a range from {from} to {to}")
+            format!("--from, --to: the range {from} to {to} is not finite")
         } else if from == to {
-            format!("both ends of the range are {from}")
+            format!("--from, --to: both ends of the range are {from}")
         } else if logarithmic && (from <= 0.0 || to <= 0.0) {
-            format!("a logarithmic range from {from} to {to}")
+            format!("--log: the range {from} to {to} is not positive")
         } else {
             return Ok(());
         };
-        let help = "give --from and --to two different finite numbers, both more than 0 where --log is given";
+        let help = "give --from and --to two different finite numbers, with --log both more than 0";
         Err(Failure::input("margin/range", why, help))
     }
 
@@ -184,9 +186,10 @@ impl Experiment for Options {
         let (own, range) = (base.own(), self.range);
         let [from, to] = [range.from, range.to].map(|end| self.scenario(base, end, Vec::new()));
         let ends = [from?, to?];
-        let is_random = ends.iter().any(Scenario::is_random_in_flight) || self.key == JITTER_KEY;
-        let runs = Runs::new(self.runs, self.seed, base, is_random);
-        // Where the law cannot be built, the flight says so.
+        let is_random = ends.iter().any(Scenario::is_random_in_flight);
+        let runs = Runs::new(self.runs, self.seed, base, is_random || self.key == JITTER_KEY);
+        runs.check_seeds(&[&self.key], base, is_random)?;
+        // If the law cannot be built, the first flight returns the error.
         let predicted = Preflight::of(own).map(|preflight| preflight.margins).unwrap_or_default();
         let values = range.scan as u64 + u64::from(range.halvings);
         let steps = own.time.steps().saturating_mul(values.saturating_mul(self.runs));
@@ -228,18 +231,12 @@ impl Experiment for Options {
             jittered: runs.jitter_m.is_some(),
             confidence: CONFIDENCE,
             turn,
-            predicted: predicted.into_iter().filter(|margin| is_same(margin.key, &self.key)).collect(),
+            predicted: predicted.into_iter().filter(|margin| margin.key == self.key).collect(),
             interrupted,
             probes,
             seeds: runs,
         }))
     }
-}
-
-/// Whether two keys are one: the rate of commands has two names.
-fn is_same(key: &str, other: &str) -> bool {
-    let name = |key: &str| if key == "time.control_hz" { "actuation.control_hz".to_owned() } else { key.to_owned() };
-    name(key) == name(other)
 }
 
 impl Probe {
@@ -249,13 +246,13 @@ impl Probe {
         Self { value, held: Proportion::new(held as u64, flights.len() as u64), min_m, flights }
     }
 
-    /// Whether every run showed what was asked.
+    /// Returns whether every run showed the verdict.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.held.count == self.held.of
     }
 
-    /// The number of the first run, from 0, that did not show what was asked; of the first of all where all did.
+    /// Returns the index of the first run that did not show the verdict; 0 if every run showed it.
     #[must_use]
     pub fn worst_run(&self, question: Question) -> u64 {
         self.flights.iter().position(|flight| !question.holds(flight)).unwrap_or_default() as u64
@@ -263,13 +260,13 @@ impl Probe {
 }
 
 impl Margin {
-    /// Whether the verdict held at every value that was tried.
+    /// Returns whether the verdict held at every value that was tried.
     #[must_use]
     pub fn holds_everywhere(&self) -> bool {
         self.probes.iter().all(Probe::holds)
     }
 
-    /// The values on either side of the turn, the one that holds first.
+    /// Returns the values on either side of the turn; the verdict holds at the first.
     #[must_use]
     pub fn sides(&self) -> Option<[&Probe; 2]> {
         let Turn { bracket, holds_below, .. } = self.turn?;
@@ -278,10 +275,10 @@ impl Margin {
     }
 }
 
-/// A prediction of linear theory in words.
+/// Returns a prediction of linear theory in words.
 fn prediction(margin: &PredictedMargin) -> String {
     let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
-    let state = if margin.state == Near::Free { "where nobody pushes" } else { "where the nearest are in contact" };
+    let state = if margin.state == Near::Free { "without contact" } else { "with the nearest pairs in contact" };
     margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
 }
 
@@ -323,11 +320,11 @@ impl Study for Margin {
     fn notes(&self) -> Vec<String> {
         let predicted =
             self.predicted.iter().map(|margin| format!("predicted by linear theory: {}", prediction(margin)));
-        let interrupted = self.interrupted.then(|| "interrupted: the bracket is wider than was asked".to_owned());
+        let interrupted = self.interrupted.then(|| "interrupted: the bracket is wider than requested".to_owned());
         let turns = self.turn.filter(|turn| turn.turns > 1).map(|turn| {
             format!(
-                "the verdict turns {} times among the values scanned first: the bracket is that of the first turn from {}, \
-                 and nothing is known beyond it",
+                "the verdict turns {} times among the values scanned first: the bracket is of the first turn from {} \
+                 on, and later turns were not searched",
                 turn.turns, self.range[0]
             )
         });
@@ -384,27 +381,29 @@ impl Study for Margin {
     }
 }
 
-/// Result of a search.
+/// Result of a bisection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Found {
     /// The answer is the same at every value that was tried.
     Even(bool),
     /// The answer turns between two values.
     Turn {
-        /// The last value with the answer of the range's beginning.
+        /// The last value with the answer of the first value.
         before: f64,
         /// The first value with the other answer.
         after: f64,
-        /// The answer of the range's beginning.
+        /// The answer of the first value.
         was: bool,
         /// Number of turns among the values that were scanned first.
         turns: usize,
     },
 }
 
-/// Calls `ask` at evenly spaced values, then halves the first interval in which the answer turns; only at integers, each of them
-/// once, where `integers`. A missing answer ends the search with what is known then: `None` without an answer at both ends of an
-/// interval.
+/// Calls `ask` at evenly spaced values, then halves the first interval in which the answer turns. With `integers`,
+/// calls `ask` only at integers, at each at most once.
+///
+/// A missing answer ends the search with the result so far; the result is `None` if no turn is known and a value of the
+/// scan has no answer.
 fn search<E>(
     range: Range,
     integers: bool,
@@ -438,7 +437,7 @@ fn search<E>(
     let (mut before, mut after) = (turn[0].0, turn[1].0);
     for _ in 0..range.halvings {
         let middle = between(before, after, 0.5);
-        // Nothing lies between neighbours.
+        // `before` and `after` are neighbouring numbers.
         if middle == before || middle == after {
             break;
         }

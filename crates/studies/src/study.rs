@@ -1,7 +1,8 @@
-//! A study: scenarios that are flown, what is measured, and how the answer is written.
+//! Studies: options, flights, answer and files.
 //!
-//! An [`Experiment`] holds the options of a study and flies it. Its answer is a [`Study`]: a headline, notes and tables, from which
-//! text, JSON, CSV, LaTeX and a page follow. [`answer`] does everything that a command of the command line does.
+//! An [`Experiment`] holds the options of a study and flies its scenarios. The answer is a [`Study`]: a headline, notes
+//! and tables. A [`Study`] is written as text, JSON, CSV, LaTeX and a page. [`answer`] runs a whole command of the
+//! command line.
 
 use std::path::PathBuf;
 
@@ -17,49 +18,49 @@ use tautline_report::request::outputs::{self, Called, is_standard_output, write}
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 
-/// Version of the keys of every JSON file of this crate: raised when a key is renamed, removed or changes its meaning.
+/// Version of the keys of every JSON file of this crate. Raised when a key is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 3;
 
 /// The answer of a study.
 pub trait Study: Serialize {
-    /// Kind of the page, such as `Margin`.
+    /// Returns the kind of the page, such as `Margin`.
     fn kind(&self) -> &'static str;
 
-    /// Title of the page.
+    /// Returns the title of the page.
     fn title(&self) -> String;
 
-    /// The word beside the verdict of the page.
+    /// Returns the badge beside the headline of the page.
     fn badge(&self) -> Badge;
 
-    /// The answer in a sentence.
+    /// Returns the answer in a sentence.
     fn headline(&self) -> String;
 
-    /// What a reader must know to read the answer, a sentence each.
+    /// Returns the notes that a reader needs for the answer, a sentence each.
     fn notes(&self) -> Vec<String>;
 
-    /// Tables and figures. Tables are also in the text and in LaTeX, unless their section is a detail.
+    /// Returns the tables and figures. Text and LaTeX contain the tables of all sections except details.
     fn sections(&self) -> Vec<Section>;
 
-    /// A row a unit of the study, such as a law or a value of a key: the CSV file.
+    /// Returns the table of the CSV file, with a row for each unit of the study, such as a law or a value of a key.
     fn records(&self) -> Table;
 
-    /// What the numbers rest on, a sentence each.
+    /// Returns the assumptions of the numbers, a sentence each.
     fn assumptions(&self) -> Vec<String>;
 
-    /// Whether the command exits with 0.
+    /// Returns whether the command exits with 0.
     fn is_good(&self) -> bool;
 
-    /// Wall-clock times, which are the only part that differs between two answers to the same question.
+    /// Returns the wall-clock times. Only this part differs between two answers to the same question.
     fn performance(&self) -> Option<Table> {
         None
     }
 
-    /// Commands that fly single flights of the study again, each with what it flies.
+    /// Returns descriptions of single flights of the study, each with the command that repeats the flight.
     fn repeats(&self, _scenario: &ScenarioRequest) -> Vec<(String, String)> {
         Vec::new()
     }
 
-    /// The answer as JSON.
+    /// Returns the answer as JSON.
     ///
     /// # Errors
     /// None in practice: every value has a JSON form.
@@ -67,7 +68,7 @@ pub trait Study: Serialize {
         serde_json::to_string_pretty(self).map(|json| json + "\n")
     }
 
-    /// The records as CSV with a line of names.
+    /// Returns the records as CSV with a line of names.
     ///
     /// # Errors
     /// None in practice: the table is written to memory.
@@ -75,7 +76,7 @@ pub trait Study: Serialize {
         self.records().csv()
     }
 
-    /// The tables as LaTeX, each a `tabular`.
+    /// Returns the tables as LaTeX, each a `tabular`.
     fn to_latex(&self) -> String {
         let lines = std::iter::once(self.headline()).chain(self.notes());
         let comments = lines.fold(String::new(), |text, line| text + "% " + &line + "\n");
@@ -83,14 +84,14 @@ pub trait Study: Serialize {
         format!("{comments}% In brackets: 95 % intervals.\n{}", tables.join("\n"))
     }
 
-    /// The tables for a terminal.
+    /// Returns the tables for a terminal.
     fn text(&self) -> String {
         let tables: Vec<_> = tables(self).iter().chain(&self.performance()).map(Table::text).collect();
         tables.join("\n")
     }
 
-    /// The answer as a self-contained page. Two answers to the same question give the same bytes, but for the part on performance,
-    /// which is the last.
+    /// Returns the answer as a self-contained page. Two answers to the same question give the same bytes, except for
+    /// the last section, on performance.
     fn to_html(&self, page: &StudyPage) -> String {
         let mut sections: Vec<_> = self.sections().into_iter().map(Section::html).collect();
         let mut add = |heading: &str, blocks: Vec<Markup>| {
@@ -121,21 +122,21 @@ pub trait Study: Serialize {
     }
 }
 
-/// Tables that are no details.
+/// Returns the tables of all sections except details.
 fn tables(study: &(impl Study + ?Sized)) -> Vec<Table> {
     let blocks = study.sections().into_iter().filter(|section| !section.is_detail).flat_map(|section| section.blocks);
     let table = |block| if let Block::Table(table) = block { Some(table) } else { None };
     blocks.filter_map(table).collect()
 }
 
-/// A part of an answer under a heading.
+/// Section of an answer.
 #[derive(Clone, Debug)]
 pub struct Section {
     /// The heading.
     pub heading: String,
     /// Tables, figures and other blocks.
     pub blocks: Vec<Block>,
-    /// Whether the section is on the page alone.
+    /// Whether only the page has the section.
     pub is_detail: bool,
 }
 
@@ -151,13 +152,13 @@ pub enum Block {
 }
 
 impl Section {
-    /// A section of an answer.
+    /// Returns a section of an answer.
     #[must_use]
     pub fn new(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
         Self { heading: heading.into(), blocks: blocks.into_iter().collect(), is_detail: false }
     }
 
-    /// A section that is on the page alone.
+    /// Returns a section for the page alone.
     #[must_use]
     pub fn detail(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
         Self { is_detail: true, ..Self::new(heading, blocks) }
@@ -178,20 +179,20 @@ impl Block {
     }
 }
 
-/// What a page shows beside the answer.
+/// Parts of a page besides the answer.
 #[derive(Clone, Debug, Default)]
 pub struct StudyPage {
-    /// Commands, and specifications, that make the study again.
+    /// Commands and specifications that repeat the study.
     pub commands: Vec<String>,
-    /// What a command flies, and the command.
+    /// Descriptions of single flights, each with the command that repeats the flight.
     pub repeats: Vec<(String, String)>,
     /// More sections, such as pictures.
     pub sections: Vec<Section>,
-    /// Whether a section replays a flight, which takes a script.
+    /// Whether a section replays a flight, for which the page needs a script.
     pub has_replays: bool,
 }
 
-/// The options of a study, which fly it.
+/// Options of a study.
 pub trait Experiment {
     /// The answer.
     type Study: Study;
@@ -199,38 +200,38 @@ pub trait Experiment {
     /// Name of the command.
     const COMMAND: &'static str;
 
-    /// Refuses options out of range, before anything is read or written.
+    /// Refuses options out of range, before any file is read or written.
     ///
     /// # Errors
     /// [`Failure`] that names the option.
     fn check(&self) -> Result<(), Failure>;
 
-    /// Options of the command line that ask for `study` again.
+    /// Returns the options of the command line that repeat `study`.
     fn arguments(&self, study: &Self::Study) -> Vec<String>;
 
-    /// Flies the study. `None` where it was interrupted before anything was known.
+    /// Flies the study. Returns `None` if an interruption left no answer.
     ///
     /// # Errors
-    /// [`Failure`] where the options or the scenario are wrong.
+    /// [`Failure`] if the options or the scenario are wrong.
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Self::Study>, Failure>;
 
-    /// Makes ready what is written beside the files of the study, before anything is flown.
+    /// Prepares further outputs of the study, such as a folder, before the first flight.
     ///
     /// # Errors
-    /// [`Failure`] where it cannot be written.
+    /// [`Failure`] if the outputs cannot be written.
     fn prepare(&self, _force: bool) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// Sections that only a page has, such as pictures.
+    /// Returns the sections for the page alone, such as pictures.
     fn illustrate(&self, _base: &BaseScenario, _study: &Self::Study, _pictures: &dyn Pictures) -> Vec<Section> {
         Vec::new()
     }
 
-    /// Writes what is written beside the files of the study.
+    /// Writes further outputs of the study, such as a folder.
     ///
     /// # Errors
-    /// [`Failure`] where it cannot be written.
+    /// [`Failure`] if the outputs cannot be written.
     fn conclude(
         &self,
         _request: &ScenarioRequest,
@@ -242,7 +243,7 @@ pub trait Experiment {
     }
 }
 
-/// A scenario, the options of a study of it, and the files to write.
+/// Request for a study: a scenario, options, and files to write.
 #[derive(Clone, Debug)]
 pub struct StudyRequest<E> {
     /// The scenario.
@@ -251,33 +252,33 @@ pub struct StudyRequest<E> {
     pub options: E,
     /// Files to write.
     pub files: StudyFiles,
-    /// Number of threads, by default one a core. The answer is the same for any number.
+    /// Number of threads, by default one for each core. The answer is the same for any number.
     pub threads: Option<usize>,
 }
 
 /// Files of a study. `-` is standard output.
 #[derive(Clone, Debug, Default)]
 pub struct StudyFiles {
-    /// Every number.
+    /// All numbers as JSON.
     pub json: Option<PathBuf>,
-    /// A row a unit of the study.
+    /// A row for each unit of the study as CSV.
     pub csv: Option<PathBuf>,
     /// The tables as LaTeX.
     pub latex: Option<PathBuf>,
-    /// A page.
+    /// The page.
     pub html: Option<PathBuf>,
     /// Whether existing files are overwritten.
     pub force: bool,
 }
 
 impl StudyFiles {
-    /// Options of the files, and the files that are asked for.
+    /// Returns the requested files, each with its option.
     pub fn outputs(&self) -> impl Iterator<Item = Called<'_>> {
         let all = [("--json", &self.json), ("--csv", &self.csv), ("--latex", &self.latex), ("--html", &self.html)];
         all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
     }
 
-    /// Whether standard output carries a file.
+    /// Returns whether a file goes to standard output.
     #[must_use]
     pub fn are_piped(&self) -> bool {
         self.outputs().any(|(_, file)| is_standard_output(file))
@@ -285,18 +286,18 @@ impl StudyFiles {
 }
 
 impl<E> StudyRequest<E> {
-    /// A study without files, on all cores.
+    /// Returns a study without files, on all cores.
     #[must_use]
     pub fn new(scenario: ScenarioRequest, options: E) -> Self {
         Self { scenario, options, files: StudyFiles::default(), threads: None }
     }
 }
 
-/// Flies a study, hands its answer to the monitor and writes its files. `None` where the monitor interrupted before anything was
-/// known.
+/// Flies a study, passes its answer to the monitor and writes its files. Returns `None` if an interruption left no
+/// answer.
 ///
 /// # Errors
-/// [`Failure`] where the request or the scenario is wrong, or a file cannot be written.
+/// [`Failure`] if the request or the scenario is wrong, or a file cannot be written.
 pub fn answer<E: Experiment>(
     request: &StudyRequest<E>,
     pictures: &dyn Pictures,
@@ -311,7 +312,7 @@ pub fn answer<E: Experiment>(
     let flown = options.fly(&base, &batch);
     monitor.finish();
     let Some(study) = flown? else {
-        monitor.warn("interrupted before anything was known: there is no answer");
+        monitor.warn("interrupted too early: there is no answer");
         return Ok(None);
     };
     for note in study.notes() {
@@ -346,12 +347,12 @@ pub fn answer<E: Experiment>(
     Ok(Some(study))
 }
 
-/// What every answer says of the flown scenario.
+/// Identity of the flown scenario, in every answer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct About {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// The scenario as its file has it.
+    /// Name and hash of the scenario of the file.
     pub scenario: ScenarioIdentity,
     /// The program.
     pub tool: Tool,

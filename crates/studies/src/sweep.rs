@@ -17,12 +17,13 @@ use tautline_report::request::{Failure, ScenarioRequest};
 /// Most points of a grid.
 pub const MOST_POINTS: usize = 2500;
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 3] = [
     "Every point of the grid is flown with the same seeds. Nothing is known between points.",
-    "Shares have the interval of Clopper and Pearson and medians that of order statistics, for a number of runs that was fixed before \
-     the first. Of many intervals some miss the true value.",
-    "A refused run is one whose scenario cannot be flown, such as a start of two vehicles within delta; it counts in no share.",
+    "Shares have the interval of Clopper and Pearson, medians that of order statistics, for a number of runs that was \
+     fixed before the first. Of many intervals some miss the true value.",
+    "The scenario of a refused run cannot be flown, such as one with two vehicles within delta at the start. A refused \
+     run counts in no share.",
 ];
 
 /// A key, and the values that it takes.
@@ -39,11 +40,11 @@ pub struct SweptKey {
 pub struct Options {
     /// One key or two.
     pub keys: Vec<SweptKey>,
-    /// What a flight has to show to count in the share.
+    /// Verdict whose share is counted.
     pub question: Question,
-    /// Runs of each point: 1 to [`crate::MOST_RUNS`]. A single run has everything but the keys as the scenario says.
+    /// Runs of each point: 1 to [`crate::MOST_RUNS`]. A single run changes only the swept keys.
     pub runs: u64,
-    /// Seed of the first run; run k, from 0, has this plus k for start and noise.
+    /// Seed of the first run; run k, from 0, has this seed plus k for start and noise.
     pub seed: u64,
 }
 
@@ -52,44 +53,44 @@ pub struct Options {
 pub struct Point {
     /// Values of the keys.
     pub values: Vec<f64>,
-    /// Runs that showed what was asked, of those that were flown.
+    /// Flown runs that showed the verdict.
     pub held: Proportion,
-    /// Runs with a violation, of those that were flown.
+    /// Flown runs with a violation.
     pub violated: Proportion,
     /// Smallest separation of all runs \[m\].
     pub min_smallest_m: Option<f64>,
     /// Median of the runs' smallest separations \[m\].
     pub min_median_m: Estimate,
-    /// Median of the time to reach the formation, over the runs that did \[s\].
+    /// Median of the time to reach the formation, over the runs that reached it \[s\].
     pub reached_median_s: Estimate,
-    /// Runs whose scenario is refused: they are not flown.
+    /// Number of refused runs, whose scenario cannot be flown.
     pub refused: u64,
-    /// Why the first of them is refused.
+    /// Reason of the first refusal.
     pub first_refusal: Option<String>,
     /// The runs that were flown, in the order of their seeds.
     pub flights: Vec<FlightSummary>,
 }
 
-/// Flights over a grid of one key or two. What does not apply is null.
+/// Flights over a grid of one key or two. Inapplicable values are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sweep {
     /// The scenario, the program and the safety distance.
     #[serde(flatten)]
     pub about: About,
-    /// The keys that were changed.
+    /// The swept keys.
     #[serde(rename = "grid")]
     pub keys: Vec<SweptKey>,
-    /// What a flight had to show.
+    /// Verdict whose share is counted.
     pub question: Question,
     /// Runs of each point.
     pub runs: u64,
-    /// Seed of the first.
+    /// Seed of the first run.
     pub seed: u64,
     /// Jitter along each axis of a start without randomness \[m\].
     pub jitter_m: Option<f64>,
     /// Confidence of all intervals.
     pub confidence: f64,
-    /// Points of the grid.
+    /// Number of points of the grid.
     pub points_asked: u64,
     /// Whether the sweep was interrupted before all points were flown.
     pub interrupted: bool,
@@ -98,7 +99,8 @@ pub struct Sweep {
 }
 
 fn wrong(why: &str) -> Failure {
-    let help = "write KEY=FROM:TO:COUNT with two different finite numbers and at least 2 values, or KEY=V1,V2,... with finite numbers";
+    let help = "write KEY=FROM:TO:COUNT with two different finite numbers and a count of at least 2, or KEY=V1,V2,... \
+                with finite numbers";
     Failure::input("sweep/key", why, help)
 }
 
@@ -136,10 +138,10 @@ impl SweptKey {
         }
     }
 
-    /// A key with these values.
+    /// Returns a key with these values.
     ///
     /// # Errors
-    /// [`Failure`] `sweep/key` for no values, the same value twice, and values that are not finite.
+    /// [`Failure`] `sweep/key` for an empty key, no values, a value given twice, or a value that is not finite.
     pub fn new(key: &str, values: Vec<f64>) -> Result<Self, Failure> {
         let key = key.trim().to_owned();
         let twice = values.iter().enumerate().find(|(k, value)| values[..*k].contains(value));
@@ -173,7 +175,7 @@ impl Options {
         Ok(())
     }
 
-    /// Values of the keys at each point.
+    /// Returns the values of the keys at each point.
     fn points(&self) -> Vec<Vec<f64>> {
         self.keys.iter().fold(vec![Vec::new()], |points, SweptKey { values, .. }| {
             let each = |point: Vec<f64>| values.iter().map(move |&value| [point.as_slice(), &[value]].concat());
@@ -182,7 +184,7 @@ impl Options {
     }
 }
 
-/// Overrides of a point.
+/// Returns the overrides of a point.
 fn sets(keys: &[SweptKey], values: &[f64]) -> Vec<String> {
     keys.iter().zip(values).map(|(of, &value)| format!("{}={}", of.key, as_toml(value))).collect()
 }
@@ -221,13 +223,14 @@ impl Experiment for Options {
         }
         let points = self.points();
         let scenario = |values: &Vec<f64>| base.with(&sets(&self.keys, values));
-        let Some(is_random) = points
-            .iter()
-            .filter_map(|values| scenario(values).ok())
-            .map(|of| of.is_random_in_flight())
-            .reduce(|a, b| a | b)
-        else {
-            // Nothing can be flown, such as with an unknown key.
+        let read = batch.run(points.len(), |number| {
+            Ok::<_, Failure>(Some(scenario(&points[number]).ok().map(|of| of.is_random_in_flight())))
+        })?;
+        if read.iter().any(Option::is_none) {
+            return Ok(None);
+        }
+        let Some(is_random) = read.into_iter().flatten().flatten().reduce(|a, b| a | b) else {
+            // No point can be flown, for example because the key is unknown.
             let refused =
                 |error| Failure::from(error).under(&format!("with {}", sets(&self.keys, &points[0]).join(", ")));
             return Err(scenario(&points[0])
@@ -235,8 +238,9 @@ impl Experiment for Options {
                 .err()
                 .unwrap_or_else(|| wrong("--key: the grid is empty")));
         };
-        let is_random = is_random || self.keys.iter().any(|of| of.key == JITTER_KEY);
-        let runs = Runs::new(self.runs, self.seed, base, is_random);
+        let keys: Vec<_> = self.keys.iter().map(|of| &*of.key).collect();
+        let runs = Runs::new(self.runs, self.seed, base, is_random || keys.contains(&JITTER_KEY));
+        runs.check_seeds(&keys, base, is_random)?;
         let count = usize::try_from(self.runs).unwrap_or(usize::MAX);
         let flights = points.len() * count;
         batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
@@ -249,7 +253,8 @@ impl Experiment for Options {
         })?;
         let mut flown = flown.into_iter();
         let of_point = |values: Vec<f64>| {
-            let runs: Option<Vec<_>> = flown.by_ref().take(count).collect();
+            let runs: Vec<_> = flown.by_ref().take(count).collect();
+            let runs = runs.into_iter().collect::<Option<Vec<_>>>();
             runs.map(|runs| Point::new(values, self.question, runs))
         };
         let flown: Vec<_> = points.iter().cloned().filter_map(of_point).collect();
@@ -296,13 +301,13 @@ impl Point {
 }
 
 impl Sweep {
-    /// The point with the smallest separation, of violated ones first.
+    /// Returns the worst flight and its point.
     fn worst(&self) -> Option<(&Point, &FlightSummary)> {
         let flights = self.points.iter().flat_map(|point| point.flights.iter().map(move |flight| (point, flight)));
         flights.reduce(|worst, next| if next.1.is_worse_than(worst.1) { next } else { worst })
     }
 
-    /// Curves over one key, or heat maps over two.
+    /// Returns curves over one key, or heat maps over two.
     fn figures(&self) -> Vec<Figure> {
         let does = self.question.words()[0];
         match &self.keys[..] {

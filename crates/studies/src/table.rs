@@ -15,7 +15,7 @@ use crate::statistics::{Estimate, Proportion};
 use tautline_core::text::{aligned, as_toml, at_least, at_most, fixed, metres, significant};
 use tautline_report::report::page::{self, Markup, Render as _, noted};
 
-/// What a person sees where a value is unknown or does not apply.
+/// Text for an unknown or inapplicable value.
 const UNKNOWN: &str = "-";
 /// Significant digits of a measured number.
 const DIGITS: u8 = 4;
@@ -23,7 +23,7 @@ const DIGITS: u8 = 4;
 /// A table: its columns, and a cell of each column in every row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// What the rows are.
+    /// Caption.
     pub caption: String,
     columns: Vec<Column>,
     rows: Vec<Vec<Cell>>,
@@ -32,14 +32,14 @@ pub struct Table {
 /// A column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Name in CSV and Parquet, without the unit; empty for a column that is only shown.
+    /// Name in CSV and Parquet, without the unit; empty for a column that files omit.
     name: String,
-    /// Heading for people, with the unit in brackets; empty for a column that is only in files.
+    /// Heading in texts and pages, with the unit in brackets; empty for a column that they omit.
     heading: String,
     kind: Kind,
 }
 
-/// Type of the cells of a column, and how people see them.
+/// Type of the cells of a column, and their form in texts and pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Words.
@@ -62,7 +62,7 @@ pub enum Kind {
     AtLeast,
     /// A probability in powers of ten.
     Rare,
-    /// `count of total` with the interval of the share in per cent; of a unit of %, the share alone.
+    /// `count of total` with the interval of the share in per cent; the share alone if the unit of the column is %.
     Share,
 }
 
@@ -86,19 +86,19 @@ pub enum Cell {
 }
 
 impl Column {
-    /// A column that is named in files and headed for people; either may be empty.
+    /// Returns a column with its name in files and its heading in texts and pages; either may be empty.
     #[must_use]
     pub fn new(name: &str, heading: &str, kind: Kind) -> Self {
         Self { name: name.to_owned(), heading: heading.to_owned(), kind }
     }
 
-    /// Heading without its unit, and the unit.
+    /// Returns the heading without its unit, and the unit.
     fn title(&self) -> (&str, &str) {
         let parts = self.heading.strip_suffix(']').and_then(|heading| heading.rsplit_once(" ["));
         parts.unwrap_or((&self.heading, ""))
     }
 
-    /// Names of the columns of a file, each with its type: an estimate has three, a share four.
+    /// Returns the names of the columns of a file, each with its type: an estimate has three, a share four.
     fn fields(&self) -> Vec<(String, Kind)> {
         let name = &self.name;
         let unit = match self.title().1 {
@@ -114,7 +114,7 @@ impl Column {
         }
     }
 
-    /// Value and interval of a cell as people read them.
+    /// Returns the value and the interval of a cell for texts and pages.
     fn shown(&self, cell: &Cell) -> (String, Option<String>) {
         let plain = |text: String| (text, None);
         match cell {
@@ -158,7 +158,7 @@ impl Column {
 }
 
 impl Cell {
-    /// Cells of the columns of a file.
+    /// Returns the cells of the columns of a file.
     fn scalars(&self, kind: Kind) -> Vec<Self> {
         match (kind, self) {
             (Kind::Share, Self::Share(Proportion { count, share, low, high, .. })) => {
@@ -173,7 +173,7 @@ impl Cell {
         }
     }
 
-    /// Text of a scalar in CSV: all digits, and nothing where the value is unknown.
+    /// Returns the text of a scalar in CSV: all digits, or an empty text for an unknown value.
     fn csv(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -209,14 +209,15 @@ impl<T: Into<Self>> From<Option<T>> for Cell {
     }
 }
 
-/// A table that takes its columns one after another.
+/// Builder of a table, column by column.
 pub struct Builder<'a, R> {
     of: &'a [R],
     table: Table,
 }
 
 impl<R> Builder<'_, R> {
-    /// Adds a column: its name in files, its heading for people (either may be empty), and the cell of each row.
+    /// Adds a column: its name in files, its heading in texts and pages (either may be empty), and the cell of each
+    /// row.
     #[must_use]
     pub fn column<C: Into<Cell>>(mut self, name: &str, heading: &str, kind: Kind, cell: impl Fn(&R) -> C) -> Self {
         self.table.columns.push(Column::new(name, heading, kind));
@@ -226,7 +227,7 @@ impl<R> Builder<'_, R> {
         self
     }
 
-    /// The table.
+    /// Returns the table.
     #[must_use]
     pub fn build(self) -> Table {
         self.table
@@ -234,13 +235,13 @@ impl<R> Builder<'_, R> {
 }
 
 impl Table {
-    /// A table with a row for each element.
+    /// Returns a table with a row for each element.
     pub fn of<R>(caption: impl Into<String>, rows: &[R]) -> Builder<'_, R> {
         let table = Self { caption: caption.into(), columns: Vec::new(), rows: vec![Vec::new(); rows.len()] };
         Builder { of: rows, table }
     }
 
-    /// Returns the part of the columns whose place, from 0, `is_kept`, under another caption.
+    /// Returns a table with the columns whose index `is_kept` accepts, under another caption.
     #[must_use]
     pub fn part(&self, caption: &str, is_kept: impl Fn(usize) -> bool) -> Self {
         fn kept<T: Clone>(of: &[T], is_kept: &impl Fn(usize) -> bool) -> Vec<T> {
@@ -253,7 +254,7 @@ impl Table {
         }
     }
 
-    /// Columns for people, each with its cell in a row.
+    /// Returns the columns with a heading, each with its cell in a row.
     fn shown<'a>(&'a self, row: &'a [Cell]) -> impl Iterator<Item = (&'a Column, &'a Cell)> + 'a {
         self.columns.iter().zip(row).filter(|(column, _)| !column.heading.is_empty())
     }
@@ -262,7 +263,7 @@ impl Table {
         self.columns.iter().filter(|column| !column.heading.is_empty()).collect()
     }
 
-    /// The table for a terminal, intervals in brackets.
+    /// Returns the table for a terminal, intervals in brackets.
     #[must_use]
     pub fn text(&self) -> String {
         let cell = |(column, cell): (&Column, &Cell)| {
@@ -274,7 +275,7 @@ impl Table {
         format!("{}:\n{}", self.caption, aligned(&std::iter::once(headings).chain(rows).collect::<Vec<_>>()))
     }
 
-    /// The table as CSV with a line of names: all digits, and an empty cell for an unknown value.
+    /// Returns the table as CSV with a line of names: all digits, and an empty cell for an unknown value.
     ///
     /// # Errors
     /// None in practice: the table is written to memory.
@@ -289,7 +290,8 @@ impl Table {
         out.into_inner().map_err(|error| error.into_error().into())
     }
 
-    /// The table as a `tabular` of LaTeX, which needs no package: units and intervals stand below.
+    /// Returns the table as a `tabular` of LaTeX, which needs no package. Units are below headings, intervals below
+    /// values.
     #[must_use]
     pub fn latex(&self) -> String {
         let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
@@ -314,7 +316,7 @@ impl Table {
         out + "\\hline\n\\end{tabular}\n"
     }
 
-    /// The table as a part of a page, intervals in small print.
+    /// Returns the table as a part of a page, intervals in small print.
     #[must_use]
     pub fn html(&self) -> Markup {
         let headings: Vec<_> = self.headings().iter().map(|column| column.heading.as_str()).collect();
@@ -331,18 +333,18 @@ impl Table {
     }
 }
 
-/// The interval of a share in per cent, rounded outwards.
+/// Returns the interval of a share in per cent, rounded outwards.
 pub(crate) fn interval_of(share: &Proportion) -> String {
     let low = at_least(100.0 * share.low, decimals(share.low));
     format!("[{low} %, {}]", percent_at_most(share.high))
 }
 
-/// A share in per cent, rounded up.
+/// Returns a share in per cent, rounded up.
 pub(crate) fn percent_at_most(share: f64) -> String {
     format!("{} %", at_most(100.0 * share, decimals(share)))
 }
 
-/// Decimals that show two digits of a share in per cent, at most 8.
+/// Returns the decimals that show two digits of a share in per cent, at most 8.
 fn decimals(share: f64) -> u8 {
     let from_the_nearer_end = (100.0 * share).min(100.0 * (1.0 - share));
     if from_the_nearer_end <= 0.0 {
@@ -353,7 +355,7 @@ fn decimals(share: f64) -> u8 {
     decimals
 }
 
-/// An integer with separators: `1,234,567`.
+/// Returns an integer with separators: `1,234,567`.
 pub(crate) fn separated(number: u64) -> String {
     let digits = number.to_string();
     let first = digits.len() % 3;
@@ -366,7 +368,7 @@ pub(crate) fn separated(number: u64) -> String {
     })
 }
 
-/// Text that LaTeX shows as it is.
+/// Returns a text that LaTeX prints unchanged.
 fn escaped(text: &str) -> String {
     let escape = |c: char| match c {
         '\\' => "\\textbackslash{}".to_owned(),
@@ -378,7 +380,7 @@ fn escaped(text: &str) -> String {
     text.split("^2").map(|part| part.chars().map(escape).collect::<String>()).collect::<Vec<_>>().join("$^2$")
 }
 
-/// A table in Parquet while it is written, a group of rows at a time. Columns are scalars.
+/// Writer of a table in Parquet, one group of rows at a time. Columns are scalars.
 pub struct ParquetTable {
     writer: SerializedFileWriter<File>,
     columns: Vec<Column>,

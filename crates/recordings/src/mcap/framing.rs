@@ -80,6 +80,9 @@ impl RecordReader {
             let Some(opcode) = self.read_record()? else { return Ok(None) };
             match opcode {
                 op::DATA_END | op::FOOTER => {
+                    if self.complete {
+                        self.check_end(opcode)?;
+                    }
                     self.ended = true;
                     return Ok(None);
                 }
@@ -127,6 +130,19 @@ impl RecordReader {
         };
         self.offset = self.offset.saturating_add(HEAD_BYTES as u64).saturating_add(bytes);
         if read < bytes { self.broken_off() } else { Ok(Some(opcode)) }
+    }
+
+    /// Refuses a file in which something follows the end of the recording, such as a second recording.
+    fn check_end(&mut self, mut opcode: u8) -> io::Result<()> {
+        while opcode != op::FOOTER {
+            let Some(next) = self.read_record()? else { return Ok(()) };
+            opcode = next;
+        }
+        self.body_offset = self.offset;
+        if self.fill(MAGIC.len() as u64 + 1)? == MAGIC.len() as u64 && self.body == MAGIC {
+            return Ok(());
+        }
+        Err(damaged(self.body_offset, "it follows the end of the recording: judge each recording by itself"))
     }
 
     /// Replaces `body` by the next `bytes` bytes, or by as many as there are.

@@ -9,7 +9,7 @@
 //! | `/summary` | `tautline_msgs/msg/Summary` | each sample | closest approach and energy |
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
 //! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
-//! | `/audit` | `tautline_msgs/msg/Audit` | once, last | the run's own audit, and a hash of everything before it |
+//! | `/audit` | `tautline_msgs/msg/Audit` | once, last | the run's own audit, and a hash of the messages of the topics above |
 //!
 //! Each [`Channel`](tautline_core::record::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
 //! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
@@ -83,12 +83,12 @@ pub struct Header {
 
 /// The run's own audit of every step: the fields of `audit.msg`, in order.
 ///
-/// Lengths are metres, or lengths over the half axes where the scenario has ellipsoids.
+/// Lengths are in metres, or relative to the half axes if the scenario has ellipsoids.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunAudit {
     /// `clear`, `violation` or `undecided`.
     pub status: String,
-    /// Reason why the run ended before its time; empty where it was flown to its end.
+    /// Reason why the run ended early; empty if the run was flown to its end.
     pub ended_early: String,
     /// Whether the samples are all steps of the run and every step was straight.
     pub holds_every_step: bool,
@@ -104,31 +104,31 @@ pub struct RunAudit {
     pub violations_count: u64,
     /// Closest approach of two vehicles, and the closest approaches to obstacles.
     pub closest: Vec<RunFinding>,
-    /// Violations in order of time, a bounded number.
+    /// Violations in order of time, at most a bounded number.
     pub violations: Vec<RunFinding>,
-    /// Hash of the messages and of this audit, which [`McapRecorder::close`] computes. It shows changes of the file by accident or
-    /// by an editor. It is no signature: a program can compute it again.
+    /// Hash of the messages and of this audit, which [`McapRecorder::close`] computes. The hash reveals changes by
+    /// accident or by an editor. It is not a signature: a program can compute the hash again.
     pub sha256: String,
 }
 
-/// An approach or a violation of a [`RunAudit`]. Vehicles and obstacles are numbered from 1; 0 stands for none.
+/// An approach or a violation of a [`RunAudit`]. Vehicles and obstacles are numbered from 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunFinding {
     /// The vehicle.
     pub vehicle: u64,
-    /// The other vehicle, or 0.
+    /// The other vehicle; 0 for an approach to an obstacle.
     pub other_vehicle: u64,
-    /// The obstacle, or 0.
+    /// The obstacle; 0 for an approach of two vehicles.
     pub obstacle: u64,
-    /// Distance that they must keep \[m\].
+    /// Required distance \[m\].
     pub limit_m: f64,
-    /// Start of the violation \[s\]; of an approach the same as `min_at_s`.
+    /// Start of the violation \[s\]; equal to `min_at_s` for an approach.
     pub from_s: f64,
-    /// End of the violation \[s\]; of an approach the same as `min_at_s`.
+    /// End of the violation \[s\]; equal to `min_at_s` for an approach.
     pub to_s: f64,
     /// Smallest distance \[m\].
     pub min_m: f64,
-    /// When it occurred \[s\].
+    /// Time of the smallest distance \[s\].
     pub min_at_s: f64,
 }
 

@@ -20,14 +20,14 @@ pub enum Entry {
     Event(Event),
 }
 
-/// The run's own audit in a recording.
+/// The run's own audit, as stored in a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoredAudit {
-    /// The recording has none, or was not closed.
+    /// The recording has no audit, or was not closed.
     None,
-    /// The recording has one, and is not as the run wrote it.
+    /// The recording has an audit, but was changed after the run.
     Altered,
-    /// The recording is as the run wrote it.
+    /// The recording is unchanged since the run.
     AsWritten(Box<RunAudit>),
 }
 
@@ -76,8 +76,8 @@ impl McapRecording {
         self.topics.is_complete()
     }
 
-    /// Returns the run's own audit, once everything was read. The audit counts only as the last message of a closed file whose
-    /// messages, in their order, have the hash that the run computed.
+    /// Returns the run's own audit, after all entries were read. The audit is accepted only as the last message of a
+    /// closed file whose messages, in their order, have the hash of the audit.
     #[must_use]
     pub fn stored_audit(&self) -> StoredAudit {
         let Contents { audit, is_altered, messages, .. } = &self.contents;
@@ -141,7 +141,7 @@ struct Contents {
     channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ready: VecDeque<Entry>,
     audit: Option<RunAudit>,
-    /// Whether messages were read that a run does not write after its audit, or an audit that cannot be read.
+    /// Whether the file has messages after the audit that a run does not write, or an audit that cannot be read.
     is_altered: bool,
     /// Over the messages of [`Own::ALL`].
     messages: MessageHash,

@@ -1,4 +1,4 @@
-//! The readers: a table with a row for each format.
+//! Table of the readers, with a row for each format.
 
 use std::fmt;
 use std::ops::Deref;
@@ -9,27 +9,27 @@ use super::order::Recording;
 use super::source::Source;
 use super::{crazyflie, csv, mcap, motive, npz, objects, parquet, skybrush, ulog, vicon, vviz};
 
-/// A format that is read. Each is a file of this module and a row of [`READERS`].
+/// Reader of a format. Each reader is a file of this module and a row of [`READERS`].
 pub struct Reader {
     /// Name for `--format`.
     pub name: &'static str,
     /// Name in sentences, with its article.
     pub title: &'static str,
-    /// Usual extensions. Recognition goes by the content alone.
+    /// Usual extensions. Recognition uses only the content.
     pub extensions: &'static [&'static str],
     /// Description for `--help` and docs/recordings.md.
     pub docs: &'static str,
-    /// First bytes, where every file of the format begins with one of these.
+    /// First bytes of every file of the format; empty if there are none.
     pub(super) magic: &'static [&'static [u8]],
-    /// Whether a file is of this format, by its first bytes. The first reader of [`READERS`] that answers yes reads the file.
+    /// Whether a file is of this format, by its first bytes. The first row of [`READERS`] that accepts a file reads it.
     pub(super) sniff: fn(&Head<'_>) -> bool,
     pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-    /// Options that have a meaning for this format alone or with some others.
+    /// Options of [`Takes`] that this format supports.
     pub(super) takes: &'static [Takes],
     pub(super) packing: Packing,
 }
 
-/// All readers, in the order in which a file is shown to them.
+/// All readers, in the order of recognition.
 pub static READERS: &[Reader] = &[
     ulog::READER,
     parquet::READER,
@@ -46,7 +46,7 @@ pub static READERS: &[Reader] = &[
     csv::TEXT,
 ];
 
-/// Options that not every format has a use for.
+/// Options that only some formats support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Takes {
     TimeUnit,
@@ -69,10 +69,10 @@ impl Takes {
         &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle];
 }
 
-/// Where a file of a format may be packed.
+/// Packing in which a file of a format is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Packing {
-    /// By gzip and in an archive.
+    /// With gzip and in an archive.
     Any,
     /// In an archive.
     Archive,
@@ -82,7 +82,7 @@ pub(super) enum Packing {
 /// First bytes of a file.
 pub(super) struct Head<'a> {
     pub(super) bytes: &'a [u8],
-    /// The bytes from the first letter on, where they are text without NUL.
+    /// The bytes from the first non-blank on, if the bytes contain no NUL.
     pub(super) text: Option<&'a [u8]>,
     /// The first line that is neither empty nor a comment.
     pub(super) line: Option<&'a [u8]>,
@@ -101,7 +101,7 @@ impl<'a> Head<'a> {
         magic.iter().any(|magic| self.bytes.starts_with(magic))
     }
 
-    /// Whether the text has a property; `false` of bytes that are no text.
+    /// Returns whether the text has a property; `false` if the bytes are not text.
     pub(super) fn is_text(&self, has: impl FnOnce(&[u8]) -> bool) -> bool {
         self.text.is_some_and(has)
     }
@@ -129,7 +129,7 @@ impl Format {
     /// A Skybrush show.
     pub const SKYBRUSH: Self = Self(&skybrush::READER);
 
-    /// All formats that are read.
+    /// Returns all formats.
     pub fn all() -> impl Iterator<Item = Self> {
         READERS.iter().map(Self)
     }

@@ -1,4 +1,4 @@
-//! A number over a grid of two keys.
+//! Heat maps over a grid of two keys.
 
 use super::Figure;
 use super::axis::{Axis, extent};
@@ -19,22 +19,24 @@ const SCALE_SPACE: f64 = 92.0;
 const HEIGHT: f64 = 260.0;
 /// Steps of the colour scale.
 const STEPS: u32 = 40;
-/// Colours from the smallest to the largest number, which colour-blind people tell apart (cividis of Nunez, Anderton and
-/// Renslow, 2018) and whose lightness grows evenly. They are the same on light and dark paper.
+/// Colours from the smallest to the largest number: cividis of Nunez, Anderton and Renslow (2018). Its lightness grows
+/// evenly, and colour-blind readers can distinguish its colours. They are the same on light and dark paper.
 const COLOURS: [[u8; 3]; 6] =
     [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
 
-/// One axis of a grid: a key, and its values in the order in which they are drawn.
+/// An axis of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridAxis<'a> {
-    /// The key, whose name ends with its unit.
+    /// The key; its name ends with its unit.
     pub key: &'a str,
-    /// Its values.
+    /// Values of the key, in the order in which they are drawn.
     pub values: &'a [f64],
 }
 
-/// A number over a grid of two keys as colours, with a colour scale. `numbers` has a row for each value of `y`, each with a cell
-/// for each value of `x`; a cell without a number is crossed out. The scale spans `range`, or the numbers themselves.
+/// Draws a number over a grid of two keys as colours, with a colour scale.
+///
+/// `numbers` has a row for each value of `y`, and each row a cell for each value of `x`. A cell without a number is
+/// crossed out. The scale spans `range`, or the range of the numbers if `range` is `None`.
 #[must_use]
 pub fn heat_map(
     name: &str,
@@ -116,7 +118,7 @@ fn capitalised(words: &str) -> String {
     chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
 }
 
-/// The colour of a place on the scale, from 0 to 1, and a colour of words that can be read on it.
+/// Returns the colour of a place on the scale, from 0 to 1, and a colour of words that can be read on it.
 fn colour(share: f64) -> (String, &'static str) {
     let along = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and the number of colours")]

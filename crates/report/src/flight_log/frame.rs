@@ -1,4 +1,4 @@
-//! State of a flight at any time, between keyframes too.
+//! State of a flight at any time, also between keyframes.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -7,15 +7,15 @@ use tautline_core::record::Sample;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, row};
 use tautline_laws::space::{Metric, closest_pair};
 
-/// Most vehicles whose closest pair is sought anew for each frame.
+/// Largest number of vehicles for which each frame searches the closest pair.
 const SEARCHED_VEHICLES: usize = 2000;
 /// Name and columns of the channel of attitudes: quaternions that turn body into world.
 const CHANNEL: &str = "attitude";
 const COLUMNS: [&str; 4] = ["qw", "qx", "qy", "qz"];
-/// Least norm of a quaternion that is an attitude.
+/// Smallest norm of a valid quaternion.
 const LEAST_NORM: f64 = 1e-6;
 
-/// Attitudes of the vehicles; none for a vehicle whose attitude is not known. Empty where no attitude is recorded.
+/// Attitudes of the vehicles; `None` for a vehicle with unknown attitude. Empty if no attitude is recorded.
 pub type Attitudes = Vec<Option<UnitQuaternion<f64>>>;
 
 /// A flight at one time.
@@ -23,11 +23,11 @@ pub type Attitudes = Vec<Option<UnitQuaternion<f64>>>;
 pub struct Frame {
     /// The time \[s\].
     pub time_s: f64,
-    /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
+    /// Positions \[m\], N x 3; NaN for an absent vehicle.
     pub positions_m: Rows,
-    /// Rotation from the body of each vehicle to the world, where it was recorded; empty where none was.
+    /// Rotation from the body of each vehicle to the world, if recorded; otherwise empty.
     pub attitudes: Attitudes,
-    /// Commanded accelerations \[m/s^2\] at the last sample, where they were recorded.
+    /// Commanded accelerations \[m/s^2\] at the last sample, if recorded.
     pub control_m_s2: Option<Rows>,
     /// The two nearest vehicles and their distance \[m\].
     pub nearest: Option<(Pair, f64)>,
@@ -35,26 +35,26 @@ pub struct Frame {
     pub so_far: Option<ClosestApproach>,
     /// Index of the last keyframe at or before this time.
     pub keyframe: usize,
-    /// Lengths in which distances between vehicles are measured.
+    /// Metric of distances between vehicles.
     metric: Metric,
     /// Closest approach between the keyframes around this time.
     around: Option<ClosestApproach>,
-    /// Approaches at this very time, as the judge measured them.
+    /// Approaches that the judge measured at exactly this time.
     measured: Vec<ClosestApproach>,
 }
 
 impl Frame {
-    /// Rotation from the body of a vehicle to the world, where it is known.
+    /// Returns the rotation from the body of a vehicle to the world, if known.
     #[must_use]
     pub fn attitude(&self, vehicle: usize) -> Option<UnitQuaternion<f64>> {
         self.attitudes.get(vehicle).copied().flatten()
     }
 
-    /// Distance of a pair \[m\], scaled where ellipsoids stay empty; NaN where one of the two is not there.
+    /// Returns the distance of a pair \[m\], scaled with ellipsoids; NaN if a vehicle of the pair is absent.
     ///
-    /// Where the judge measured the pair at this very time, it is the judge's distance: the straight lines between two
-    /// samples may pass each other farther away. Elsewhere it is the distance between these lines, and no less than the
-    /// closest approach that was measured around this time.
+    /// If the judge measured the pair at exactly this time, the distance is that of the judge. Otherwise it is the
+    /// distance on straight lines between samples, but at least the closest approach that the judge measured around
+    /// this time.
     #[must_use]
     pub fn distance_m(&self, pair: Pair) -> f64 {
         if let Some(measured) = self.measured.iter().find(|measured| measured.pair == pair) {
@@ -80,7 +80,7 @@ impl FlightLog {
             so_far = closer(so_far, after.closest.filter(|approach| approach.time_s <= time_s));
             around = after.closest;
         }
-        // Of many vehicles the nearest pair is taken to be the one that was nearest just before.
+        // With many vehicles, the pair of the last closest approach is taken as the nearest pair.
         let pair = match (around, before.closest) {
             (Some(around), _) if around.time_s == time_s => Some(around.pair),
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
@@ -122,8 +122,8 @@ impl FlightLog {
         Some(positions_m)
     }
 
-    /// Attitudes at a time \[s\] that is not before this keyframe and before the next, turned the shorter way. A vehicle
-    /// whose attitude is not known at the next keyframe keeps the one before.
+    /// Returns the attitudes at a time \[s\] from this keyframe to the next, on the shorter rotation. A vehicle with
+    /// unknown attitude at the next keyframe keeps the attitude of this keyframe.
     fn attitudes(&self, time_s: f64, keyframe: usize) -> Attitudes {
         let before = &self.keyframes[keyframe];
         let Some(after) = self.keyframes.get(keyframe + 1).filter(|_| time_s > before.time_s) else {
@@ -132,7 +132,7 @@ impl FlightLog {
         let part = (time_s - before.time_s) / (after.time_s - before.time_s);
         let turned = |(k, from): (usize, &Option<UnitQuaternion<f64>>)| {
             let (from, to) = ((*from)?, after.attitudes.get(k).copied().flatten());
-            // Half a turn has no shorter way.
+            // Half a turn has no shorter rotation.
             to.and_then(|to| from.try_slerp(&to, part, f64::EPSILON)).or(Some(from))
         };
         before.attitudes.iter().enumerate().map(turned).collect()
@@ -152,12 +152,12 @@ pub fn attitudes_of(sample: &Sample<'_>) -> Attitudes {
     if rows.len() == sample.swarm.count() { rows.map(attitude).collect() } else { Attitudes::new() }
 }
 
-/// Vector from the first vehicle of a pair to the second, scaled.
+/// Returns the scaled vector from the first vehicle of a pair to the second.
 pub(super) fn apart(positions_m: &Rows, pair: Pair, metric: Metric) -> Vector3<f64> {
     metric.scaled(row(positions_m, pair.second()) - row(positions_m, pair.first()))
 }
 
-/// Returns the nearest two of the vehicles that are there and their distance \[m\], scaled.
+/// Returns the nearest two present vehicles and their scaled distance \[m\].
 pub(crate) fn nearest_present(positions_m: &Rows, metric: Metric) -> Option<(Pair, f64)> {
     let is_there = |i: &usize| row(positions_m, *i).iter().all(|x| x.is_finite());
     let there: Vec<usize> = (0..positions_m.nrows()).filter(is_there).collect();

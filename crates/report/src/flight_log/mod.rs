@@ -1,7 +1,7 @@
-//! The history of a flight in bounded memory, from which figures, replay and pictures are made.
+//! The history of a flight in bounded memory, for figures, replay and pictures.
 //!
-//! A [`FlightLog`] is a [`Sink`]. It holds keyframes, the extremes between them, and what the judge reported. Closest
-//! approach, violations and peaks are those of every step, whatever is thinned out.
+//! A [`FlightLog`] is a [`Sink`]. It holds keyframes, the extremes between keyframes, and the findings of the judge.
+//! Thinning keyframes out does not change closest approach, violations and peaks: they are over every step.
 
 mod frame;
 mod series;
@@ -22,51 +22,51 @@ use tautline_laws::space::Metric;
 use tautline_recordings::mcap::Entry;
 use tautline_sim::scenario::Scenario;
 
-/// Memory of the keyframes \[bytes\]; beyond it every second one is dropped.
+/// Memory of the keyframes \[bytes\]. Every second keyframe is dropped above this limit.
 pub const BUDGET_BYTES: usize = 256 << 20;
-/// Fewest keyframes that are thinned.
+/// Smallest number of keyframes that are thinned out.
 const FEWEST_KEYFRAMES: usize = 16;
-/// Violations whose worst moments are never thinned out: those that have a picture of their own.
+/// Number of violations whose worst moments are never thinned out. Each of these has its own picture.
 pub const PICTURED: usize = 10;
-/// Part of the memory that other samples of violations may take.
+/// Samples within violations take at most one part in `VIOLATION_SHARE` of the memory.
 const VIOLATION_SHARE: usize = 4;
-/// Most hits of hulls that are kept one by one.
+/// Largest number of stored hits of hulls.
 const MOST_HITS: usize = 100;
-/// Up to this many vehicles the smallest distance of every pair is kept.
+/// Largest number of vehicles for which the smallest distance of every pair is stored.
 pub(crate) const FEW_VEHICLES: usize = 12;
 
-/// A flight in bounded memory: keyframes in order of time, and what its judge reported.
+/// A flight in bounded memory: keyframes in order of time, and the findings of the judge.
 ///
-/// Beyond 256 MiB every second keyframe is dropped. The first and the last keyframe stay, and so do those around the
-/// closest approach, around the worst moments of the first ten violations, and within violations as long as these take no
-/// more than a quarter. A keyframe takes over the extremes of the keyframes that were dropped before it.
+/// Every second keyframe is dropped above 256 MiB. These keyframes stay: the first, the last, those around the closest
+/// approach and around the worst moments of the first ten violations. Keyframes within violations stay as long as they
+/// take at most a quarter of the memory. A keyframe absorbs the extremes of dropped keyframes before it.
 #[derive(Clone, Debug)]
 pub struct FlightLog {
     metric: Metric,
-    /// Safety distance delta \[m\]; NaN where it is not known.
+    /// Safety distance delta \[m\]; NaN if unknown.
     delta_m: f64,
     keyframes: Vec<Keyframe>,
-    /// One in `every` samples is a keyframe whatever happened.
+    /// Every `every`-th sample is a keyframe, independent of findings.
     every: usize,
     samples: usize,
     violations: Violations,
     energy_initial: Option<f64>,
     /// Largest control effort of any vehicle over all steps and its time \[m/s^2\], \[s\].
     peak_control: Option<[f64; 2]>,
-    /// Changes of the target: a leg began, or vehicles were given other slots.
+    /// Changes of the target: a new leg, or other slots of vehicles.
     targets: Vec<Event>,
     /// First hits of hulls, and the number of all.
     hits: Vec<Bounce>,
     hit_count: usize,
     /// Numbers of the samples around the closest approach (0), and around the worst moment of the k-th violation (k).
     moments: BTreeMap<usize, [usize; 2]>,
-    /// Keyframes that stay because a violation lasted, and whether one lasts at the last keyframe.
+    /// Number of keyframes that stay because of a violation.
     kept_for_violations: usize,
     /// Vehicles that were absent from one time \[s\] to another, between two samples of a recording.
     pub gaps: Vec<(usize, [f64; 2])>,
     /// Whether vehicles rest between two keyframes, rather than move straight.
     pub holds: bool,
-    /// Closest approaches of a recording that was judged as a whole.
+    /// Closest approaches from the audit of a whole recording.
     nearest: Option<Slices>,
     budget_bytes: usize,
 }
@@ -76,21 +76,21 @@ pub struct FlightLog {
 pub struct Keyframe {
     /// The time \[s\].
     pub time_s: f64,
-    /// Positions \[m\], N x 3; NaN for a vehicle that is not there.
+    /// Positions \[m\], N x 3; NaN for an absent vehicle.
     pub positions_m: Rows,
-    /// Rotation from the body of each vehicle to the world, where it was recorded; empty where none was.
+    /// Rotation from the body of each vehicle to the world, if recorded; otherwise empty.
     pub attitudes: Attitudes,
-    /// Commanded accelerations \[m/s^2\], where they were recorded.
+    /// Commanded accelerations \[m/s^2\], if recorded.
     pub control_m_s2: Option<Rows>,
-    /// Closest approach since the keyframe before.
+    /// Closest approach since the previous keyframe.
     pub closest: Option<ClosestApproach>,
     /// Closest approach since the start.
     pub so_far: Option<ClosestApproach>,
     /// Number of the sample, from 0.
     pub(crate) number: usize,
-    /// Whether the keyframe stays because a violation lasted.
+    /// Whether the keyframe stays because of a violation.
     is_of_violation: bool,
-    /// Extremes since the keyframe before.
+    /// Extremes since the previous keyframe.
     pub(crate) extremes: Extremes,
 }
 
@@ -119,7 +119,7 @@ impl Default for FlightLog {
 }
 
 impl FlightLog {
-    /// An empty log with distances in the lengths of `metric`, for a flight with this safety distance \[m\].
+    /// Returns an empty log with distances in `metric`, for a flight with this safety distance \[m\].
     #[must_use]
     pub fn new(metric: Metric, delta_m: f64) -> Self {
         Self {
@@ -143,7 +143,7 @@ impl FlightLog {
         }
     }
 
-    /// An empty log of a flight of this scenario.
+    /// Returns an empty log of a flight of this scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self::new(scenario.metric(), scenario.delta_m)
@@ -164,8 +164,8 @@ impl FlightLog {
         Ok(log)
     }
 
-    /// Known positions, N x 3 \[m\] at each time \[s\], of a recording of `samples` samples, with its closest approaches. Nothing
-    /// is thinned.
+    /// Returns the log of a recording with `samples` samples, from known positions, N x 3 \[m\] at each time \[s\], and
+    /// closest approaches. No keyframe is dropped.
     #[must_use]
     pub fn recorded(times_s: Vec<f64>, positions_m: Vec<Rows>, nearest: Slices, samples: usize) -> Self {
         let keyframe =
@@ -174,14 +174,13 @@ impl FlightLog {
         Self { keyframes, samples, nearest: Some(nearest), ..Self::default() }
     }
 
-    /// The same with another memory of the keyframes \[bytes\].
+    /// Returns the same log with another limit of memory for keyframes \[bytes\].
     #[must_use]
     pub fn within(self, budget_bytes: usize) -> Self {
         Self { budget_bytes, ..self }
     }
 
-    /// Takes one sample, which is later than the one before. A sample of another number of vehicles than the first is
-    /// passed over.
+    /// Takes a sample, later than the previous one. Ignores a sample with another number of vehicles than the first.
     pub fn take(&mut self, sample: &Sample<'_>) {
         let positions_m = &sample.swarm.positions_m;
         let count = positions_m.nrows();
@@ -197,7 +196,7 @@ impl FlightLog {
         });
     }
 
-    /// Takes positions alone, N x 3 \[m\], at a time \[s\] later than the one before.
+    /// Takes positions, N x 3 \[m\], at a time \[s\] later than the previous one.
     pub fn take_positions(&mut self, time_s: f64, positions_m: Rows) {
         self.push(Keyframe { time_s, positions_m, ..Keyframe::default() });
     }
@@ -218,7 +217,7 @@ impl FlightLog {
         }
     }
 
-    /// Replaces closest approaches, in order of time, and violations by those that were found in the recording as a whole.
+    /// Replaces closest approaches, in order of time, and violations by those of the audit of the whole recording.
     pub fn judge(&mut self, closest: impl IntoIterator<Item = ClosestApproach>, violations: Violations) {
         self.violations = violations;
         let (mut closest, last_s) = (closest.into_iter().peekable(), self.range_s()[1]);
@@ -234,8 +233,9 @@ impl FlightLog {
         }
     }
 
-    /// Takes the smallest separation of the whole flight \[m\] and its time \[s\] as the judge concludes them. During the flight
-    /// the separation may be larger by rounding; a number that differs by more is of another flight and is passed over.
+    /// Takes the smallest separation of the whole flight \[m\] and its time \[s\] from the judge at the end of the
+    /// flight. The separation in the log may be larger by rounding. A larger difference means another flight; the log
+    /// ignores it.
     pub fn conclude(&mut self, separation_m: f64, time_s: f64) {
         const ROUNDING: f64 = 1e-9;
         let Some(closest) = self.closest().filter(|closest| closest.time_s == time_s) else { return };
@@ -247,80 +247,83 @@ impl FlightLog {
         }
     }
 
-    /// Number of vehicles N; 0 without keyframes.
+    /// Returns the number of vehicles N; 0 without keyframes.
     #[must_use]
     pub fn count(&self) -> usize {
         self.keyframes.first().map_or(0, |first| first.positions_m.nrows())
     }
 
-    /// Keyframes in order of time.
+    /// Returns the keyframes in order of time.
     #[must_use]
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
 
-    /// One in `every` samples is a keyframe.
+    /// Returns the number of samples from one regular keyframe to the next.
     #[must_use]
     pub fn every(&self) -> usize {
         self.every
     }
 
-    /// Number of samples taken.
+    /// Returns the number of samples taken.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// Lengths in which distances between vehicles are measured.
+    /// Returns the metric of distances between vehicles.
     #[must_use]
     pub fn metric(&self) -> Metric {
         self.metric
     }
 
-    /// First and last time \[s\]; both 0 without keyframes.
+    /// Returns the first and last time \[s\]; both 0 without keyframes.
     #[must_use]
     pub fn range_s(&self) -> [f64; 2] {
         [self.keyframes.first(), self.keyframes.last()].map(|keyframe| keyframe.map_or(0.0, |keyframe| keyframe.time_s))
     }
 
-    /// Closest approach of the whole flight, between samples too.
+    /// Returns the closest approach of the whole flight, between samples too.
     #[must_use]
     pub fn closest(&self) -> Option<ClosestApproach> {
         self.keyframes.last().and_then(|last| last.so_far)
     }
 
-    /// Every violation, of two vehicles and of obstacles.
+    /// Returns every violation, of two vehicles and of obstacles.
     #[must_use]
     pub fn violations(&self) -> &Violations {
         &self.violations
     }
 
-    /// Energy of the first sample that has one \[m^2/s^2\].
+    /// Returns the energy of the first sample with an energy \[m^2/s^2\].
     #[must_use]
     pub fn energy_initial(&self) -> Option<f64> {
         self.energy_initial
     }
 
-    /// Largest control effort of any vehicle over all steps \[m/s^2\], and the time of the sample that reported it \[s\].
+    /// Returns the largest control effort of any vehicle over all steps \[m/s^2\], and the time of the sample that
+    /// reported it \[s\].
     #[must_use]
     pub fn peak_control(&self) -> Option<[f64; 2]> {
         self.peak_control
     }
 
-    /// The first hits of hulls, a hundred at most, and the number of all.
+    /// Returns the first hits of hulls, at most 100, and the number of all hits.
     #[must_use]
     pub fn hits(&self) -> (&[Bounce], usize) {
         (&self.hits, self.hit_count)
     }
 
-    /// Changes of the target in order of time.
+    /// Returns the changes of the target in order of time.
     #[must_use]
     pub fn targets(&self) -> &[Event] {
         &self.targets
     }
 
-    /// Returns the distance of two centres when their hulls hit \[m\], scaled where ellipsoids stay empty: on straight lines
-    /// between keyframes, or the closest approach of the keyframe after where that is less and theirs.
+    /// Returns the distance of two centres at the time of a hit of their hulls \[m\], scaled with ellipsoids.
+    ///
+    /// The distance is on straight lines between keyframes. A smaller closest approach of the pair in the next keyframe
+    /// replaces it.
     #[must_use]
     pub fn hit_distance_m(&self, hit: &Bounce) -> Option<f64> {
         let positions_m = self.positions_m(hit.time_s).filter(|at| hit.pair.second() < at.nrows())?;
@@ -330,7 +333,7 @@ impl FlightLog {
         Some(closest.filter(|closest| closest.pair == hit.pair).map_or(between_m, |of| of.separation_m.min(between_m)))
     }
 
-    /// Returns the closest approaches of slices of time: those between keyframes, or of the recording.
+    /// Returns the closest approaches in slices of time: between keyframes, or from the audit of the recording.
     #[must_use]
     pub fn nearest(&self) -> Slices {
         if let Some(nearest) = &self.nearest {
@@ -388,7 +391,7 @@ impl FlightLog {
             self.kept_for_violations += 1;
         }
         self.keyframes.push(keyframe);
-        // What was around a moment so far may be so no longer.
+        // Keyframes around an earlier moment may no longer need to stay.
         self.sift(self.keyframes.len().saturating_sub(3));
         if self.keyframes.len() >= FEWEST_KEYFRAMES && self.keyframes.len() * bytes_each > self.budget_bytes {
             self.every *= 2;
@@ -396,13 +399,13 @@ impl FlightLog {
         }
     }
 
-    /// Whether a keyframe is one in [`FlightLog::every`], or needed for a moment that is looked at.
+    /// Returns whether a keyframe stays, because of its number or because of a finding.
     fn stays(&self, keyframe: &Keyframe) -> bool {
         let is_of_moment = || self.moments.values().any(|around| around.contains(&keyframe.number));
         keyframe.number.is_multiple_of(self.every) || keyframe.is_of_violation || is_of_moment()
     }
 
-    /// Drops what need not stay of the keyframes from this one on; the last one is always there.
+    /// Drops keyframes from this index on that need not stay; the last keyframe always stays.
     fn sift(&mut self, from: usize) {
         if self.every == 1 {
             return;
@@ -438,13 +441,13 @@ impl Sink for FlightLog {
 }
 
 impl Keyframe {
-    /// Takes over the extremes of an earlier keyframe.
+    /// Merges the extremes of an earlier keyframe.
     fn absorb(&mut self, earlier: &Self) {
         self.closest = closer(earlier.closest, self.closest);
         self.extremes.absorb(&earlier.extremes);
     }
 
-    /// Memory \[bytes\].
+    /// Returns the memory of the keyframe \[bytes\].
     fn bytes(&self) -> usize {
         let Extremes { control_m_s2, series, pair_min_m, .. } = &self.extremes;
         let numbers = self.positions_m.len() + self.control_m_s2.as_ref().map_or(0, Rows::len);
@@ -475,7 +478,7 @@ impl Extremes {
         }
     }
 
-    /// Takes in the extremes of other samples.
+    /// Merges the extremes of other samples.
     pub(crate) fn absorb(&mut self, other: &Self) {
         let raise = |kept: &mut f64, other: f64| *kept = kept.max(other);
         self.control_m_s2.iter_mut().zip(&other.control_m_s2).for_each(|(kept, &other)| raise(kept, other));
@@ -493,17 +496,17 @@ impl Extremes {
     }
 }
 
-/// The larger of two numbers of which either may be unknown.
+/// Returns the larger of two numbers; an unknown number counts as smaller.
 fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     a.into_iter().chain(b).reduce(f64::max)
 }
 
-/// All pairs of `count` vehicles in index order.
+/// Returns all pairs of `count` vehicles in index order.
 pub(crate) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> + Clone {
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
-/// The closer of two approaches, the first of equals.
+/// Returns the closer of two approaches; the first of equal ones.
 pub(crate) fn closer(a: Option<ClosestApproach>, b: Option<ClosestApproach>) -> Option<ClosestApproach> {
     match (a, b) {
         (Some(a), Some(b)) => Some(if b.separation_m < a.separation_m { b } else { a }),

@@ -1,26 +1,26 @@
-//! What figures take from the channels of a sample: a number of each vehicle.
+//! Channels of samples that figures show, as a number of each vehicle.
 
 use tautline_core::record::{Channel, Sample};
 
-/// What a figure shows of a channel.
+/// A channel as a figure shows it.
 pub(crate) struct Series {
     /// Name and title of the figure.
     pub(crate) name: &'static str,
     pub(crate) title: &'static str,
-    /// What the number is, and its unit.
+    /// Name of the quantity, and its unit.
     pub(crate) what: &'static str,
     pub(crate) unit: &'static str,
-    /// The channel, by its name and its columns.
+    /// Name and columns of the channel.
     channel: &'static str,
     columns: &'static [&'static str],
-    /// The number, of a row of the channel. Where instants are merged the largest is kept.
+    /// Computes the number from a row of the channel. Merged instants keep the largest number.
     number: fn(&[f64]) -> f64,
 }
 
-/// How many there are.
+/// Number of series.
 pub(crate) const COUNT: usize = 4;
 
-/// All that are drawn, in the order in which they are.
+/// All series, in the order of the figures.
 pub(crate) const SERIES: [Series; COUNT] = [
     Series {
         name: "attitude",
@@ -63,7 +63,7 @@ pub(crate) const SERIES: [Series; COUNT] = [
 /// Name of the figure of rotors.
 pub(crate) const ROTORS: &str = "rotors";
 
-/// The numbers of every series at an instant, one of each vehicle; none of a channel that the sample does not have.
+/// Returns the numbers of every series at an instant, one for each vehicle; empty for a channel that the sample lacks.
 pub(crate) fn numbers_of(sample: &Sample<'_>) -> [Vec<f64>; COUNT] {
     let vehicles = sample.swarm.count();
     SERIES.map(|series| {
@@ -77,7 +77,8 @@ pub(crate) fn numbers_of(sample: &Sample<'_>) -> [Vec<f64>; COUNT] {
     })
 }
 
-/// Angle between the axis of thrust and the vertical \[degrees\] of a quaternion (w, x, y, z) that turns body into world.
+/// Returns the angle between the axis of thrust and the vertical \[degrees\] of a quaternion (w, x, y, z) that turns
+/// body into world.
 fn tilt_deg(q: &[f64]) -> f64 {
     let [w, x, y, z] = [q[0], q[1], q[2], q[3]];
     let (across, up) = (2.0 * (x * z + w * y).hypot(y * z - w * x), w * w - x * x - y * y + z * z);

@@ -1,4 +1,4 @@
-//! Violations of a flight, followed event by event.
+//! Violations of a flight, from its events.
 
 use std::collections::BTreeMap;
 
@@ -7,28 +7,28 @@ use tautline_core::record::Event;
 
 /// Every violation that the judge of a flight has reported, in order of its beginning.
 ///
-/// A violation that still lasts has no end (infinity). The limit of an obstacle is not in the events and is NaN.
+/// The end of a violation that still lasts is infinity. The limit of an obstacle is NaN, because events do not have it.
 #[derive(Clone, Debug, Default)]
 pub struct Violations {
     all: Vec<Violation<ObjectPair>>,
-    /// Index of the violation of every pair that is in one.
+    /// Index of the present violation of each pair.
     open: BTreeMap<ObjectPair, usize>,
 }
 
 impl Violations {
-    /// Violations of a recording that was judged as a whole.
+    /// Returns violations from the audit of a whole recording.
     #[must_use]
     pub fn judged(all: Vec<Violation<ObjectPair>>) -> Self {
         Self { all, open: BTreeMap::new() }
     }
 
-    /// All violations.
+    /// Returns all violations.
     #[must_use]
     pub fn all(&self) -> &[Violation<ObjectPair>] {
         &self.all
     }
 
-    /// Violations of two vehicles.
+    /// Returns the violations of two vehicles.
     pub fn of_vehicles(&self) -> impl Iterator<Item = Violation> {
         self.all.iter().filter_map(|found| {
             let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
@@ -36,7 +36,7 @@ impl Violations {
         })
     }
 
-    /// Violations of an obstacle's clearance, each with its vehicle and its obstacle, from 0.
+    /// Returns the violations of an obstacle's clearance, each with its vehicle and its obstacle, from 0.
     pub fn of_obstacles(&self) -> impl Iterator<Item = (&Violation<ObjectPair>, [usize; 2])> {
         self.all.iter().filter_map(|found| match found.pair {
             ObjectPair::Obstacle { vehicle, obstacle } => Some((found, [vehicle, obstacle])),
@@ -44,13 +44,13 @@ impl Violations {
         })
     }
 
-    /// Pairs that are in a violation now.
+    /// Returns the pairs with a present violation.
     pub fn open(&self) -> impl Iterator<Item = ObjectPair> {
         self.open.keys().copied()
     }
 
-    /// Takes an event of a flight of `vehicles`; `delta_m` is the limit of two vehicles. Events of other vehicles are
-    /// passed over: a file may hold anything.
+    /// Takes an event of a flight of `vehicles`; `delta_m` is the limit of two vehicles. Ignores events of other
+    /// vehicles, which a damaged file may contain.
     pub fn note(&mut self, event: &Event, delta_m: f64, vehicles: usize) {
         match *event {
             Event::ViolationBegan { pair, .. } if pair.second() >= vehicles => {}
@@ -86,8 +86,8 @@ impl Violations {
         }
     }
 
-    /// Lowers the smallest distance of every pair of vehicles in a violation to `nearest`, as a sample shows it. Returns
-    /// the indices of the violations that are worse than before.
+    /// Lowers the smallest distance of each pair of vehicles in a violation to the distance `nearest` of a sample.
+    /// Returns the indices of the violations that became worse.
     pub(super) fn lower(&mut self, nearest: impl Fn(&Violation<ObjectPair>) -> Option<(f64, f64)>) -> Vec<usize> {
         let mut worse = Vec::new();
         for &k in self.open.values() {
@@ -116,7 +116,7 @@ impl Violations {
         let Some(k) = self.open.remove(&pair) else { return };
         let found = &mut self.all[k];
         if found.min_m.is_infinite() {
-            // No sample lies within, and no approach was reported.
+            // The violation contains no sample and no reported approach.
             found.min_at_s = f64::midpoint(found.from_s, time_s);
         }
         (found.to_s, found.min_m) = (time_s, min_m);

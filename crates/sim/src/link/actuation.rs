@@ -1,4 +1,4 @@
-//! `[actuation]`: how commands become accelerations: limited, and with the lag of motors.
+//! `[actuation]`: how commands become accelerations, with a limit and the lag of motors.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::Void;
 
-/// How commands become accelerations: as given and at once unless given.
+/// How commands become accelerations: unchanged and without a lag unless given.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ActuationSpec {
@@ -17,7 +17,7 @@ pub struct ActuationSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
-    /// Time constant in s with which the acceleration follows the command, lag a' = u - a, from none at the start.
+    /// Time constant in s of the lag between command and acceleration, lag a' = u - a, from a = 0 at the start.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub lag_s: f64,
@@ -32,7 +32,7 @@ impl ImperfectionSpec for ActuationSpec {
         if self.lag_s == 0.0 || scenario.plant.holds_commands() {
             return Ok(());
         }
-        Err(ScenarioError::new("the ideal plant's vehicles are accelerated as they are commanded, without a lag")
+        Err(ScenarioError::new("the ideal plant supports no lag")
             .coded("scenario/unsupported-by-plant")
             .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
             .at("actuation.lag_s")

@@ -1,4 +1,4 @@
-//! `[[failure]]`: vehicles of which a part fails.
+//! `[[failure]]`: vehicles with a failed part.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -11,51 +11,51 @@ use crate::vehicle::RotorFailure;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::Void;
 
-/// A vehicle of which a part fails, for the rest of the flight.
+/// A failure of a part of a vehicle, which lasts to the end of the flight.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Failure {
     /// The vehicle, counted from 1.
     #[schemars(range(min = 1))]
     pub vehicle: u64,
-    /// From when on in s.
+    /// Start time in s.
     pub at_s: f64,
-    /// What fails.
+    /// Kind of the failure.
     #[schemars(flatten)]
     pub kind: FailureKind,
 }
 
-/// What fails.
+/// Kind of a failure.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum FailureKind {
-    /// It commands nothing any more: a point drifts on, a quadrotor's rotors stop.
+    /// The vehicle has no more commands: a point drifts on, a quadrotor's rotors stop.
     Dead {},
     /// A rotor of a quadrotor gives less thrust.
     Rotor {
-        /// The rotor, counted from 1 as its model lists them.
+        /// The rotor, counted from 1 in the order of the model.
         #[schemars(range(min = 1, max = 4))]
         rotor: u64,
-        /// Share of its thrust that it still gives, from 0 to less than 1: none unless given.
+        /// Share of its thrust that the rotor still gives, from 0 to less than 1; 0 unless given.
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
         share: f64,
     },
-    /// It sends nothing any more. Needs `network.rate_hz`.
+    /// The vehicle sends no more messages. Needs `network.rate_hz`.
     Silent {},
-    /// Its command stays as it was.
+    /// The vehicle keeps its last command.
     Frozen {},
 }
 
 impl Failure {
-    /// Whether it sends nothing any more.
+    /// Returns whether the vehicle sends no more messages.
     #[must_use]
     pub fn is_silent(&self) -> bool {
         matches!(self.kind, FailureKind::Silent {})
     }
 
-    /// The vehicle, from 0.
+    /// Returns the vehicle, counted from 0.
     #[must_use]
     pub fn index(&self) -> usize {
         usize::try_from(self.vehicle.saturating_sub(1)).unwrap_or(usize::MAX)
@@ -72,7 +72,7 @@ impl ImperfectionSpec for Vec<Failure> {
             let &Failure { vehicle, at_s, kind } = failure;
             if vehicle == 0 || failure.index() >= scenario.count() {
                 return Err(ScenarioError::new(format!(
-                    "vehicle {vehicle} is to fail, and there are {}",
+                    "the vehicle must be one of 1 to {}, got {vehicle}",
                     scenario.count()
                 ))
                 .coded("scenario/unknown-vehicle")
@@ -81,11 +81,11 @@ impl ImperfectionSpec for Vec<Failure> {
             }
             if !(0.0..scenario.time.duration_s).contains(&at_s) {
                 return Err(ScenarioError::new(format!(
-                    "vehicle {vehicle} is to fail at {at_s} s, in a flight from 0 s to {} s",
+                    "at_s must be from 0 s to less than {} s, got {at_s} s",
                     scenario.time.duration_s
                 ))
                 .coded("scenario/outside-flight")
-                .with_help("let it fail within the flight")
+                .with_help("give a time within the flight")
                 .at_entry("failure", entry)
                 .at("time.duration_s"));
             }
@@ -110,14 +110,14 @@ impl Scenario {
         let (code, said, help) = if self.airframe.quadrotor().is_none() {
             (
                 "scenario/unsupported-by-vehicle",
-                "a rotor is to fail, and vehicles are points".to_owned(),
+                "points have no rotors that can fail".to_owned(),
                 "set vehicle.model to a quadrotor, or kind to \"dead\"",
             )
         } else if !(0.0..1.0).contains(&share) {
             (
                 "scenario/out-of-range",
-                format!("a rotor that fails still gives a share of {share} of its thrust"),
-                "set share from 0 to less than 1",
+                format!("share must be from 0 to less than 1, got {share}"),
+                "share is the part of its thrust that the rotor still gives",
             )
         } else {
             return Ok(());
@@ -129,7 +129,7 @@ impl Scenario {
         if self.plant.holds_commands() || self.time.control_hz.is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new("the ideal plant's vehicles hold no command that could stay as it was")
+        Err(ScenarioError::new("vehicles of the ideal plant hold no command in continuous time")
             .coded("scenario/unsupported-by-plant")
             .with_help("set time.control_hz, or plant.kind to \"rapier\"")
             .at_entry("failure", entry)
@@ -140,13 +140,13 @@ impl Scenario {
         if self.message_hz().is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new("a vehicle is to send nothing any more, and nothing says how often messages are sent")
+        Err(ScenarioError::new("a vehicle cannot fall silent without a rate of messages")
             .coded("scenario/missing-key")
             .with_help("set network.rate_hz, such as 50")
             .at_entry("failure", entry))
     }
 
-    /// What becomes of rotors.
+    /// Returns the failures of rotors.
     pub(crate) fn rotor_failures(&self) -> Vec<RotorFailure> {
         let of_rotors = |failure: &Failure| {
             let (rotor, share) = match failure.kind {
@@ -162,7 +162,7 @@ impl Scenario {
     }
 }
 
-/// What becomes of the commands of vehicles of which a part fails.
+/// Replaces the commands of failed vehicles.
 #[derive(Clone, Debug)]
 pub(super) struct Failing {
     all: Vec<Failed>,
@@ -172,7 +172,7 @@ pub(super) struct Failing {
 struct Failed {
     vehicle: usize,
     at_s: f64,
-    /// What it commands then \[m/s^2\]; not known yet of one that keeps its command.
+    /// Command after the failure \[m/s^2\]; unknown until the failure if the vehicle keeps its last command.
     kept: Option<Vector3<f64>>,
 }
 
@@ -189,7 +189,7 @@ impl Failing {
         Self { all: failed.collect() }
     }
 
-    /// Changes the commands that are given at a time \[s\].
+    /// Changes the commands of a time \[s\].
     pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
         for failed in self.all.iter_mut().filter(|failed| time_s + SAME_S >= failed.at_s) {
             let kept = *failed.kept.get_or_insert_with(|| row(command, failed.vehicle));

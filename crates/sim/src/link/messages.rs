@@ -254,14 +254,14 @@ impl Down {
     }
 }
 
-/// Least age that is told from none \[s\].
+/// Smallest age that is distinguished from 0 \[s\].
 const LEAST_S: f64 = 1e-5;
-/// Ratio of the ends of a class: a quantile is known to a hundredth.
+/// Ratio of the bounds of a class, for a relative error of quantiles of a hundredth.
 const RATIO: f64 = 1.01;
-/// Classes, up to an age of 4 weeks.
+/// Number of classes, up to an age of 4 weeks.
 const CLASSES: usize = 2600;
 
-/// Ages that were counted.
+/// Histogram of ages.
 #[derive(Clone, Debug)]
 pub(super) struct Ages {
     counts: Vec<u64>,
@@ -278,13 +278,17 @@ impl Ages {
     /// Counts an age \[s\].
     pub(super) fn take(&mut self, age_s: f64) {
         let class = (libm::log(age_s.max(LEAST_S) / LEAST_S) / libm::log(RATIO)).ceil();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; what is more is cut")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "at least 0; larger values saturate"
+        )]
         let class = (class as usize).min(CLASSES - 1);
         self.counts[class] += 1;
         self.total += 1;
     }
 
-    /// The age that this share of them does not exceed \[s\], to a hundredth; none where none was counted.
+    /// Returns a quantile of the ages \[s\], with a relative error of a hundredth; `None` without ages.
     pub(super) fn quantile_s(&self, share: f64) -> Option<f64> {
         let wanted = share * self.total as f64;
         let mut counted = 0;
@@ -298,11 +302,11 @@ impl Ages {
     }
 }
 
-/// The links of a graph, each of them twice, in the order of who sends and then of who hears.
+/// Links of a graph, one for each direction, ordered by sender and then by hearer.
 #[derive(Clone, Debug)]
 pub(super) struct Links {
     count: usize,
-    /// Who hears vehicle j: `hearers[offsets[j]..offsets[j + 1]]`, ascending.
+    /// Hearers of vehicle j: `hearers[offsets[j]..offsets[j + 1]]`, ascending.
     offsets: Vec<usize>,
     hearers: Vec<usize>,
 }
@@ -323,36 +327,36 @@ impl Links {
                 next[from] += 1;
             }
         }
-        // Edges come in row order: whoever is before a vehicle was put down before whoever is after it.
+        // Edges come in row order: each vehicle gets its hearers of smaller index before those of larger index.
         Self { count, offsets, hearers }
     }
 
-    /// Number of links one way.
+    /// Returns the number of directed links.
     pub(super) fn len(&self) -> usize {
         self.hearers.len()
     }
 
-    /// Number of vehicles.
+    /// Returns the number of vehicles.
     pub(super) fn count(&self) -> usize {
         self.count
     }
 
-    /// The links on which a vehicle sends, with who hears it there.
+    /// Returns the links of a sender, each with its hearer.
     pub(super) fn from(&self, sender: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + '_ {
         let places = self.offsets[sender]..self.offsets[sender + 1];
         places.clone().zip(&self.hearers[places]).map(|(link, &hearer)| (link, hearer))
     }
 
-    /// The link on which one vehicle hears another.
+    /// Returns the link from a sender to a hearer.
     pub(super) fn find(&self, hearer: usize, sender: usize) -> Option<usize> {
         let from = self.offsets[sender];
         self.hearers[from..self.offsets[sender + 1]].binary_search(&hearer).ok().map(|place| from + place)
     }
 }
 
-/// Losses of Gilbert and Elliott: a link is good or bad, all messages are lost while it is bad and none while it is good. It
-/// turns bad with probability p a message and good with r. The share lost is p/(p + r) and a burst has 1/r messages in the
-/// mean; with p + r = 1 each message is lost by itself.
+/// Losses after Gilbert and Elliott. A link loses all messages while it is bad and none while it is good. With each
+/// message, a good link turns bad with probability p and a bad link turns good with probability r. The share of lost
+/// messages is p/(p + r), the mean length of a burst 1/r. Losses are independent for p + r = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Loss {
     share: f64,
@@ -361,14 +365,15 @@ pub(super) struct Loss {
 }
 
 impl Loss {
-    /// Losses of this share, in bursts of so many messages in the mean, or one by one.
+    /// Returns losses of this share, in bursts of a mean length, or independent losses.
     pub(super) fn new(share: f64, burst: Option<f64>) -> Self {
         let turns_good = burst.map_or(1.0 - share, |burst| if share < 1.0 { 1.0 / burst } else { 0.0 });
         let turns_bad = if share < 1.0 { (turns_good * share / (1.0 - share)).min(1.0) } else { 1.0 };
         Self { share, turns_bad, turns_good }
     }
 
-    /// Whether a message is lost, after what became of the one before it on the same link; `unit` is uniform in \[0, 1).
+    /// Returns whether a message is lost; `before` is whether the previous message on the same link was lost, `unit` is
+    /// uniform in \[0, 1).
     pub(super) fn next(&self, before: Option<bool>, unit: f64) -> bool {
         match before {
             None => unit < self.share,
@@ -415,9 +420,9 @@ mod tests {
         assert_eq!(Links::of(&Graph::star(4)).find(1, 2), None);
     }
 
-    /// Share lost and mean burst of so many messages on a link.
+    /// Returns the share of lost messages and the mean length of a burst on a link.
     fn measured(loss: Loss, messages: u64) -> (f64, f64) {
-        // In runs, since each draw begins a block of the generator.
+        // Numbers are drawn in runs, because each draw begins a block of the generator.
         const RUN: usize = 4096;
         let noise = Noise::new(3, Source::Radio);
         let mut draw = noise.draw(0, 0, 0, RUN);
@@ -443,7 +448,7 @@ mod tests {
             assert!((lost / share - 1.0).abs() < 0.02, "{share} {burst:?}: {lost}");
             assert!((length / expected - 1.0).abs() < 0.02, "{share} {burst:?}: bursts of {length}");
         }
-        // Losses in bursts are not those one by one.
+        // Losses in bursts differ from independent losses.
         assert!(measured(Loss::new(0.1, None), 100_000).1 < 1.2);
     }
 

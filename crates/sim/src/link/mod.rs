@@ -1,12 +1,12 @@
 //! What lies between the true world and the laws: sensors and network on the way in, actuators on the way out.
 //!
-//! An imperfection is a file here: its table of the scenario, which checks itself and names what it voids
-//! ([`ImperfectionSpec`]), and its part of the link. [`of`] combines the parts into one [`Imperfections`]. [`Direct`] has
-//! none: laws see the true state itself, and nothing is copied. docs/imperfections.md has the equations.
+//! Each imperfection is a file of this module. The file holds the table of the scenario, which implements
+//! [`ImperfectionSpec`], and the part of the link. [`of`] combines the parts into one [`Imperfections`]. [`Direct`] has
+//! no imperfection: laws read the true state without a copy. docs/imperfections.md has the equations.
 //!
-//! Whatever happens at instants of its own (measurements, messages) happens when the flight has come to them
-//! ([`Imperfections::settle`]). It depends on the seed, the vehicle and the number of the event alone: not on steps, on trial
-//! states, or on threads.
+//! Measurements and messages have instants of their own. [`Imperfections::settle`] makes them when the flight has
+//! reached these instants. A measurement or message depends only on the seed, the vehicle and its number. Steps, trial
+//! states and threads do not change it.
 
 mod actuation;
 mod failure;
@@ -35,133 +35,134 @@ use tautline_laws::observation::Others;
 
 /// A table of the scenario that describes an imperfection.
 pub trait ImperfectionSpec {
-    /// Whether it changes nothing.
+    /// Returns whether the imperfection changes nothing.
     fn is_exact(&self) -> bool;
 
-    /// Whether another seed of noise gives another flight.
+    /// Returns whether the flight depends on the seed of noise.
     fn is_random(&self) -> bool {
         false
     }
 
-    /// Checks it against the other tables of the scenario.
+    /// Checks the imperfection against the other tables of the scenario.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the scenario cannot be flown with it.
+    /// [`ScenarioError`] if the scenario cannot be flown with the imperfection.
     fn check(&self, scenario: &Scenario) -> Result<(), ScenarioError>;
 
-    /// The reasons for which no certificate holds with it.
+    /// Returns the reasons why no certificate holds with the imperfection.
     fn voids(&self) -> Vec<Void>;
 }
 
 impl Scenario {
-    /// The imperfections of the scenario: what adds one adds it here, and to [`of`].
+    /// Returns the imperfections of the scenario. A new imperfection is added here and to [`of`].
     pub(crate) fn imperfections(&self) -> [&dyn ImperfectionSpec; 4] {
         [&self.sensing, &self.network, &self.actuation, &self.failures]
     }
 
-    /// Whether another seed of noise gives another flight.
+    /// Returns whether the flight depends on the seed of noise.
     #[must_use]
     pub fn is_random_in_flight(&self) -> bool {
         self.wind.turbulence.is_some() || self.imperfections().iter().any(|imperfection| imperfection.is_random())
     }
 
-    /// Whether vehicles know the true present state, and are accelerated as they are commanded.
+    /// Returns whether vehicles know the true present state, and their accelerations are the commands.
     #[must_use]
     pub fn is_exact(&self) -> bool {
         self.imperfections().iter().all(|imperfection| imperfection.is_exact())
     }
 
-    /// Refuses what happens at instants of its own where time is continuous.
+    /// Refuses a sampled imperfection if the plant evaluates the law in continuous time.
     fn check_sampled(&self, key: &'static str) -> Result<(), ScenarioError> {
         if self.plant.holds_commands() || self.time.control_hz.is_some() {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "{key} makes what is known jump, and the ideal plant asks the law in continuous time, where nothing does"
+            "{key} samples the state, but the ideal plant evaluates the law in continuous time"
         ))
         .coded("scenario/unsupported-by-plant")
-        .with_help("set time.control_hz, at which commands are made and held, or plant.kind to \"rapier\"")
+        .with_help("set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"")
         .at(key)
         .at("plant.kind"))
     }
 }
 
-/// Turns the true state into what the vehicles know, and the commands of the law into accelerations: noise, delay, loss and
-/// limits.
+/// Noise, delay, loss and limits between true state and law. Turns the true state into the knowledge of the vehicles,
+/// and the commands of the law into accelerations.
 ///
-/// All of its memory (filters, messages under way, random numbers) is saved with a simulation, so it must be [`Clone`].
+/// A saved simulation holds the whole memory of the link (filters, messages under way, random numbers), so an
+/// implementation must be [`Clone`].
 pub trait Imperfections: DynClone + Send {
-    /// What the vehicles know at a time \[s\] at which the true state is `truth`.
+    /// Returns the knowledge of the vehicles at a time \[s\] at which the true state is `truth`.
     ///
-    /// In continuous time this is asked about trial states too, in any order of time; only what [`Imperfections::accept`] is told
-    /// has happened.
+    /// In continuous time the integrator also calls this for trial states, in any order of time. Only states that
+    /// [`Imperfections::accept`] receives are part of the flight.
     fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a>;
 
-    /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles. At instants of a flight
-    /// at which no command is made this is told the one that is held; it may be told two at the same instant, of which the
-    /// last counts.
+    /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles. Between two commands
+    /// of the law, `_command` is the held command. Of two calls for the same instant the last counts.
     fn actuate(&mut self, _time_s: f64, _command: &mut Rows) {}
 
-    /// The swarm has come to this state, in the order of time.
+    /// Takes the next state of the flight, in the order of time.
     fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
 
-    /// What was accepted after this time has not happened: a step was refused.
+    /// Drops the states that were accepted after this time: their step was refused.
     fn forget_after(&mut self, _time_s: f64) {}
 
-    /// What was accepted up to this time stays.
+    /// Makes the accepted states up to this time final, and all measurements and messages that are due by then.
     fn settle(&mut self, _time_s: f64) {}
 
-    /// Whether every vehicle knows the true present state of all, and commands arrive as given: what certificates assume.
+    /// Returns whether every vehicle knows the true present state of all vehicles and commands arrive unchanged, as
+    /// certificates assume.
     fn is_exact(&self) -> bool {
         false
     }
 
-    /// Longest step of continuous time that its memory allows \[s\].
+    /// Returns the longest step of continuous time that the memory of the link allows \[s\].
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// What is known of it for every vehicle: a channel each, without values yet.
+    /// Returns the channels of the link, without values.
     fn channels(&self) -> Vec<Channel> {
         Vec::new()
     }
 
-    /// Writes the present values into channels of [`Imperfections::channels`], in their order.
+    /// Writes the present values into the channels of [`Imperfections::channels`], in the same order.
     fn write_channels(&self, _channels: &mut [Channel]) {}
 
-    /// What was sent over its network, where messages are sent one by one.
+    /// Returns the counts of messages, if the network sends single messages.
     fn traffic(&self) -> Option<Traffic> {
         None
     }
 
-    /// Begins its random numbers anew.
+    /// Restarts the random numbers from another seed.
     fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Imperfections);
 
-/// What the vehicles know at one instant.
+/// Knowledge of the vehicles at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensed<'a> {
-    /// Each vehicle of itself.
+    /// Knowledge of each vehicle of its own state.
     pub own: &'a Swarm,
-    /// Vehicles of each other.
+    /// Knowledge of the vehicles of each other.
     pub others: Others<'a>,
 }
 
 /// Messages of a network up to now.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Traffic {
-    /// Messages, one for each who may hear it.
+    /// Number of messages, one for each receiver.
     pub sent: u64,
-    /// Those of them that never arrive.
+    /// Number of messages that never arrive.
     pub lost: u64,
-    /// The age \[s\] that 95 % of what vehicles hold of each other does not exceed, over all links, looked at whenever messages
-    /// are sent, to a hundredth.
+    /// 95th percentile of the age of the last message of each link \[s\], with a relative error of a hundredth. Ages
+    /// are taken whenever messages are sent.
     pub age_p95_s: Option<f64>,
 }
 
-/// Nothing between truth and law.
+/// A link without imperfections.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Direct;
 
@@ -175,10 +176,10 @@ impl Imperfections for Direct {
     }
 }
 
-/// Shortest latency that is not none \[s\].
+/// Smallest nonzero latency \[s\].
 const SHORTEST_S: f64 = 1e-6;
 
-/// The latency, if it is 0, or at least a microsecond and no longer than the flight.
+/// Returns the latency if it is 0, or at least [`SHORTEST_S`] and at most the duration of the flight.
 fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Result<f64, ScenarioError> {
     if latency_s == 0.0 || (SHORTEST_S..=duration_s).contains(&latency_s) {
         return Ok(latency_s);
@@ -186,21 +187,21 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
     let (code, said, help) = if latency_s < SHORTEST_S {
         (
             "scenario/out-of-range",
-            format!("{what} is {latency_s} s"),
-            format!("give at least {SHORTEST_S} s, or 0 for none"),
+            format!("{what} must be 0 or at least {SHORTEST_S} s, got {latency_s} s"),
+            "give 0 for no latency",
         )
     } else {
         (
             "scenario/outside-flight",
-            format!("{what} is {latency_s} s in a flight of {duration_s} s"),
-            "nothing would ever be known but the start: give less, or enlarge time.duration_s".to_owned(),
+            format!("{what} must be at most the {duration_s} s of the flight, got {latency_s} s"),
+            "reduce the latency, or increase time.duration_s",
         )
     };
     Err(ScenarioError::new(said).coded(code).with_help(help).at(key).at("time.duration_s"))
 }
 
-/// Whether a number is 0, which stands for none.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+/// Returns whether a number is 0, which turns its imperfection off.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_off(number: &f64) -> bool {
     *number == 0.0
 }

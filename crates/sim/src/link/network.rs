@@ -1,4 +1,4 @@
-//! `[network]`: what vehicles hear of each other, and when.
+//! `[network]`: messages between vehicles, with delay and loss.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,15 +14,15 @@ use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::Void;
 use tautline_laws::observation::Neighbour;
 
-/// What vehicles hear of others over links: all, at once and all the time unless given.
+/// Messages between vehicles over links: without loss and delay, in continuous time unless given.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NetworkSpec {
-    /// How long a message takes, in s: delays what is heard of others, and not what a vehicle knows of itself.
+    /// Delay of each message in s. A vehicle knows its own state without this delay.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub latency_s: f64,
-    /// Each message takes up to so much longer, in s, all of it alike likely. Needs `rate_hz`.
+    /// Extra delay of each message in s, uniform from 0 to `jitter_s`. Needs `rate_hz`.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub jitter_s: f64,
@@ -30,67 +30,67 @@ pub struct NetworkSpec {
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
     pub loss: f64,
-    /// How many messages are lost one after the other in the mean, from 1 on (Gilbert and Elliott: all are lost while a link
-    /// is bad, and none while it is good); unless given, each message is lost or not by itself.
+    /// Mean number of messages lost in a row, at least 1. Model of Gilbert and Elliott: a link loses all messages while
+    /// it is bad, and none while it is good. Losses are independent unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1))]
     pub loss_burst: Option<f64>,
-    /// Messages a second in Hz; `sensing.rate_hz` unless given, and where there is none either, all the time.
+    /// Messages a second in Hz; `sensing.rate_hz` unless given, and continuous if neither is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
-    /// What a vehicle takes for the present state of another of which it has an old message.
+    /// Estimate of the present state of another vehicle from its last message.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = Missing::default()))]
     pub missing: Missing,
-    /// How a vehicle knows whoever is near, with or without a link.
+    /// How a vehicle knows near vehicles, with or without a link.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = NearBy::default()))]
     pub near: NearBy,
-    /// Links that are down for a while. Needs `rate_hz`.
+    /// Links that are down for some time. Needs `rate_hz`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failure: Vec<LinkFailure>,
 }
 
-/// What stands for a message that has not come.
+/// Estimate of the present state of another vehicle from its last message.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Missing {
-    /// What was heard last.
+    /// The state in the last message.
     #[default]
     Hold,
-    /// What was heard last, carried along its velocity up to the time of the vehicle's own measurement.
+    /// The state in the last message, moved along its velocity to the time of the vehicle's own measurement.
     Extrapolate,
 }
 
-/// How a vehicle knows whoever is near.
+/// How a vehicle knows near vehicles.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NearBy {
-    /// With a sensor on board, whatever the network does.
+    /// With a sensor on board, independent of the network.
     #[default]
     Seen,
-    /// By messages that everybody sends to everybody.
+    /// By messages that each vehicle sends to all others.
     Heard,
 }
 
-/// A link that is down for a while: what is sent over it is lost, both ways.
+/// A link that is down for some time. Messages over it are lost in both directions.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LinkFailure {
     /// The two vehicles, counted from 1.
     #[schemars(inner(range(min = 1)))]
     pub link: [u64; 2],
-    /// From when on in s.
+    /// Start time in s.
     pub from_s: f64,
-    /// Until when in s; to the end of the flight unless given.
+    /// End time in s; the end of the flight unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub to_s: Option<f64>,
 }
 
 impl NetworkSpec {
-    /// Whether messages may be missing.
+    /// Returns whether messages may be lost.
     #[must_use]
     pub fn loses(&self) -> bool {
         self.loss > 0.0 || !self.failure.is_empty()
@@ -133,26 +133,26 @@ impl ImperfectionSpec for NetworkSpec {
     }
 }
 
-/// Most messages that a vehicle sends in a step.
+/// Largest number of messages that a vehicle sends in a step.
 const MESSAGES_A_STEP: f64 = 10.0;
-/// Memory expected for a link in one direction: what was heard over it last \[bytes\].
+/// Expected memory of a link in one direction, for its last message \[bytes\].
 const BYTES_PER_LINK: u128 = 80;
-/// And for each message that may be under way on it.
+/// Expected memory of a message under way \[bytes\].
 const BYTES_PER_MESSAGE: u128 = 8;
 
 impl Scenario {
-    /// Messages a second \[Hz\], where they are not sent all the time.
+    /// Returns the rate of messages \[Hz\]; `None` for continuous communication.
     #[must_use]
     pub fn message_hz(&self) -> Option<f64> {
         self.network.rate_hz.or(self.sensing.rate_hz)
     }
 
-    /// Refuses what happens to messages where nothing says when they are sent.
+    /// Refuses a key about single messages if no rate of messages is given.
     fn check_messages(&self, key: &'static str) -> Result<(), ScenarioError> {
         if self.message_hz().is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!("{key} is about messages, and nothing says how often they are sent"))
+        Err(ScenarioError::new(format!("{key} needs a rate of messages"))
             .coded("scenario/missing-key")
             .with_help("set network.rate_hz, such as 50")
             .at(key))
@@ -173,7 +173,7 @@ impl Scenario {
         if !is_link {
             return refuse(
                 "scenario/edge",
-                format!("the graph has no link between vehicles {a} and {b} that could be down"),
+                format!("the graph has no link between vehicles {a} and {b}"),
                 "name the two ends of an edge of [graph], counted from 1",
             );
         }
@@ -183,8 +183,8 @@ impl Scenario {
         }
         refuse(
             "scenario/outside-flight",
-            format!("the link of vehicles {a} and {b} is down from {from_s} s to {until_s} s"),
-            "it is down from 0 s or later, before the end of the flight, and until later than that",
+            format!("the link of vehicles {a} and {b} must be down within the flight, got {from_s} s to {until_s} s"),
+            "give from_s from 0 s to less than the end of the flight, and to_s more than from_s",
         )
     }
 
@@ -195,9 +195,10 @@ impl Scenario {
         }
         if rate_hz * self.time.dt_s > MESSAGES_A_STEP {
             return Err(ScenarioError::new(format!(
-                "{rate_hz} messages a second are more than {MESSAGES_A_STEP} in a step of {} s, and only the last one counts",
+                "{rate_hz} messages a second are more than {MESSAGES_A_STEP} messages in a step of {} s",
                 self.time.dt_s
-            )).coded("scenario/step-too-long")
+            ))
+            .coded("scenario/step-too-long")
             .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
             .at("network.rate_hz")
             .at("sensing.rate_hz"));
@@ -213,7 +214,7 @@ impl Scenario {
         }
         let gib = MAX_MEMORY_BYTES >> 30;
         Err(ScenarioError::new(format!(
-            "messages over {heard} links would take {} GiB of memory; at most {gib} GiB are used",
+            "messages over {heard} links need {} GiB of memory, more than the limit of {gib} GiB",
             bytes >> 30
         ))
         .coded("scenario/memory")
@@ -232,23 +233,23 @@ fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
         return Ok(());
     }
     Err(ScenarioError::new(format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}"))
-        .with_help(format!("give at least {least}, or leave network.loss_burst out: then each is lost by itself"))
+        .with_help(format!("give at least {least}, or leave network.loss_burst out for independent losses"))
         .at("network.loss_burst")
         .at("network.loss"))
 }
 
-/// What vehicles hear of each other.
+/// Communication between the vehicles of a flight.
 #[derive(Clone, Debug)]
 pub(super) enum Network {
-    /// The others' own measurements, without delay.
+    /// Measurements of the other vehicles, without delay.
     None,
-    /// The same, some seconds later.
+    /// Measurements of the other vehicles after a constant delay.
     Late(Late),
-    /// Messages.
+    /// Single messages at a rate.
     Messages(Box<Messages>),
 }
 
-/// What all vehicles hear of each other after a constant delay.
+/// Communication with a constant delay.
 #[derive(Clone, Debug)]
 pub(super) struct Late {
     by_s: f64,
@@ -267,7 +268,8 @@ impl Network {
         }
     }
 
-    /// What a vehicle heard of another at a time \[s\]; none where it is what the other knows of itself now.
+    /// Returns the state of `sender` that `hearer` knows at a time \[s\]; `None` without a delay or
+    /// without a link.
     pub(super) fn heard(&self, hearer: usize, sender: usize, time_s: f64) -> Option<Neighbour> {
         match self {
             Self::None => None,
@@ -276,7 +278,7 @@ impl Network {
         }
     }
 
-    /// Takes what is heard at a time \[s\] after a constant delay.
+    /// Updates the delayed states to a time \[s\].
     pub(super) fn hear(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
         if let Self::Late(late) = self {
             let said_s = (time_s - late.by_s).max(0.0);
@@ -292,7 +294,8 @@ impl Network {
         }
     }
 
-    /// Largest distance \[m\] of a vehicle from where another holds it; `own_m` where all hold what the vehicle knows of itself.
+    /// Returns the largest distance \[m\] between the true position of a vehicle and its position as known to another;
+    /// `own_m` without a delay.
     pub(super) fn farthest_m(
         &self,
         positions_m: &Rows,
@@ -311,7 +314,7 @@ impl Network {
         }
     }
 
-    /// The constant delay \[s\], if there is one.
+    /// Returns the constant delay \[s\], if the communication has one.
     pub(super) fn delay_s(&self) -> Option<f64> {
         if let Self::Late(late) = self { Some(late.by_s) } else { None }
     }

@@ -1,4 +1,4 @@
-//! `[sensing]`: what vehicles measure of themselves and of near vehicles: late, at a rate, with errors.
+//! `[sensing]`: measurements of the own state and of near vehicles, with latency, rate and errors.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -12,46 +12,46 @@ use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::law::Void;
 use tautline_laws::observation::Neighbour;
 
-/// What vehicles measure: exactly, at once and all the time unless given.
+/// Measurements of the vehicles: exact, without latency and in continuous time unless given.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensingSpec {
-    /// Standard deviation in m, along each axis, of the error of a measured position: a new one with each measurement
+    /// Standard deviation in m, along each axis, of the error of a measured position, drawn for each measurement
     /// (motion capture 0.001, ultra-wide band 0.1, satellites 1). Needs `rate_hz`.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_noise_m: f64,
-    /// Standard deviation in m, along each axis, of an error of the own position that a vehicle keeps for the whole flight.
+    /// Standard deviation in m, along each axis, of a constant error of the own position, drawn once a flight.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_bias_m: f64,
-    /// Standard deviation in m/s, along each axis, of the error of a measured velocity: a new one with each measurement.
+    /// Standard deviation in m/s, along each axis, of the error of a measured velocity, drawn for each measurement.
     /// Needs `rate_hz`.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub velocity_noise_m_s: f64,
-    /// Measurements a second in Hz, held in between; all the time unless given.
+    /// Measurements a second in Hz, held in between; continuous unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
-    /// How old a measurement is when it is known, in s: delays all that a vehicle knows, its own state too.
+    /// Delay of each measurement in s, of the own state and of other vehicles.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub latency_s: f64,
-    /// The same of what a vehicle sees, with a sensor on board, of whoever is near, in s; `latency_s` unless given.
+    /// Delay of measurements of near vehicles by a sensor on board in s; `latency_s` unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub near_latency_s: Option<f64>,
 }
 
 impl SensingSpec {
-    /// Whether measurements are off the truth.
+    /// Returns whether measurements have errors.
     #[must_use]
     pub fn is_noisy(&self) -> bool {
         self.position_noise_m > 0.0 || self.velocity_noise_m_s > 0.0 || self.position_bias_m > 0.0
     }
 
-    /// How old what is seen of near ones is when it is known \[s\].
+    /// Returns the delay of measurements of near vehicles \[s\].
     #[must_use]
     pub fn near_s(&self) -> f64 {
         self.near_latency_s.unwrap_or(self.latency_s)
@@ -75,19 +75,17 @@ impl ImperfectionSpec for SensingSpec {
         ];
         for (key, what, noise) in noises {
             if noise > 0.0 && rate_hz.is_none() {
-                return Err(ScenarioError::new(format!(
-                    "{what} is drawn anew with each measurement, and none has a time"
-                ))
-                .coded("scenario/missing-key")
-                .with_help("say how often it is measured: sensing.rate_hz, such as 100")
-                .at(key));
+                return Err(ScenarioError::new(format!("{what} needs a rate of measurements"))
+                    .coded("scenario/missing-key")
+                    .with_help("set sensing.rate_hz, such as 100")
+                    .at(key));
             }
         }
         if rate_hz.is_some() {
             scenario.check_sampled("sensing.rate_hz")?;
         }
         latency("sensing.latency_s", "the latency of measurements", latency_s, scenario.time.duration_s)?;
-        let near = "the latency of what is seen of near ones";
+        let near = "the latency of measurements of near vehicles";
         latency("sensing.near_latency_s", near, near_latency_s.unwrap_or(0.0), scenario.time.duration_s).map(|_| ())
     }
 

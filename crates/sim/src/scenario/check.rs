@@ -1,7 +1,7 @@
-//! Checks the tree of a file against the schema, and brings it into the form that serde reads.
+//! Checks the tree of a file against the schema, and converts the tree into the form that serde reads.
 //!
-//! Every key, type, word and bound is checked here and nowhere else; what depends on several keys is checked in
-//! `validate`. TOML writes a table whose keys depend on a choice (`kind`, `shape`) flat; serde reads the choice as
+//! This module checks every key, type, word and bound; `validate` checks conditions on several keys. In TOML, a table
+//! holds its choice (`kind`, `shape`) and the keys of this choice side by side. serde reads the choice as
 //! `kind = { NAME = { keys } }`.
 
 use std::borrow::Cow;
@@ -18,11 +18,11 @@ use super::schema::{Node, tables_with};
 /// Longest part of an unknown name that a message repeats \[characters\].
 const NAME_CHARS: usize = 40;
 
-/// A value that the schema does not admit: the error, without a place, and the offending bytes.
+/// A value that the schema does not admit: an error without a place, and the bytes of the value.
 pub(super) struct Misfit {
     pub(super) error: ScenarioError,
     pub(super) span: Range<usize>,
-    /// Keys and entries down to the value, innermost first.
+    /// Keys and entries that lead to the value, innermost first.
     path: Vec<String>,
 }
 
@@ -37,15 +37,17 @@ impl Misfit {
         self
     }
 
-    /// The error with its dotted path as its key, for a scenario without a text.
+    /// Returns the error with its dotted path as its key, for a scenario without a text.
     pub(super) fn without_text(self) -> ScenarioError {
         let path: Vec<_> = self.path.into_iter().rev().collect();
         self.error.at(path.join("."))
     }
 }
 
-/// Checks a file against the schema and nests its choices. Spans from `overridden_from` on are those of overrides: a choice that an
-/// override makes drops the keys of the file that belong to another choice.
+/// Checks a file against the schema and nests its choices.
+///
+/// Spans from `overridden_from` on belong to overrides. A choice of an override drops the keys of the file that belong
+/// to another choice.
 pub(super) fn conform(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), Misfit> {
     Check { overridden_from }.value(file, Node::root(), "scenario", None)
 }
@@ -55,7 +57,7 @@ struct Check {
 }
 
 impl Check {
-    /// Checks a value. `name` is its key; `own_name` stands for a tag that is not given.
+    /// Checks a value. `name` is the key of the value; `own_name` replaces a missing tag.
     fn value(
         &self,
         value: &mut Spanned<DeValue<'_>>,
@@ -129,10 +131,11 @@ impl Check {
         for (key, value) in table.iter_mut() {
             let name = key.get_ref();
             let Some(node) = known(name) else {
+                let at = if value.span().start >= self.overridden_from { value.span() } else { key.span() };
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
-                return Err(unknown_key(name, known, key.span()));
+                return Err(unknown_key(name, known, at));
             };
-            // The tag is known already.
+            // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
                 self.value(value, node, name, None).map_err(|misfit| misfit.below(&**name))?;
             }
@@ -149,7 +152,7 @@ impl Check {
         Ok(())
     }
 
-    /// The alternative that a table takes by its tag, which is completed where it has a default.
+    /// Returns the alternative that the tag of a table selects. Inserts a missing tag from its default.
     fn chosen(
         &self,
         table: &mut DeTable<'_>,
@@ -171,7 +174,7 @@ impl Check {
             }
             (None, Some((own, at)), _) => ((*own).to_owned(), at.clone()),
             (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
-            // A table may do without, as `[[leg]]` does.
+            // Some tables, such as `[[leg]]`, need no tag.
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
                 let help = format!("give one of {}", listed(&names));
@@ -208,7 +211,7 @@ impl Check {
     }
 }
 
-/// Moves the keys of a choice into a table of its name, below its tag.
+/// Moves the keys of a choice into a table below the tag, named as the choice.
 fn nest(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
     let Some((tag_key, name)) = table.remove_entry(tag) else { return };
     let span = name.span();
@@ -224,7 +227,7 @@ fn nest(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
     table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
 }
 
-/// Whether a value is of the type of a part.
+/// Returns whether a value has the type of a part of the schema.
 fn admits(node: Node, value: &DeValue<'_>) -> bool {
     match value {
         DeValue::Table(_) => node.is_table(),
@@ -237,12 +240,13 @@ fn admits(node: Node, value: &DeValue<'_>) -> bool {
     }
 }
 
-/// Refuses a number that is not finite, too large or small to compute with, or out of the bounds of the schema.
+/// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
 fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), Misfit> {
     let (written, number) = match number {
         DeValue::Integer(written) => {
             let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
-                let message = format!("`{name}` must be at most {}, got {}", i64::MAX, written.as_str());
+                let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
+                let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
                 return Err(Misfit::new("scenario/out-of-range", message, about(node), span));
             };
             (whole.to_string(), whole as f64)
@@ -302,7 +306,7 @@ fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -
     Misfit::new("scenario/wrong-type", message, about(node), span)
 }
 
-/// A value in words.
+/// Returns a value in words.
 fn found(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("the text \"{}\"", short(text)),
@@ -315,7 +319,7 @@ fn found(value: &DeValue<'_>) -> String {
     }
 }
 
-/// The type of a part in words.
+/// Returns the type of a part of the schema in words.
 fn expected(node: Node) -> String {
     let words = node.words();
     if !words.is_empty() {
@@ -346,7 +350,7 @@ fn expected(node: Node) -> String {
     }
 }
 
-/// What a key means, in the first sentence of its description.
+/// Returns the first sentence of the description of a key.
 fn about(node: Node) -> String {
     let about = node.about().unwrap_or("`tautline schema` describes every key");
     about.split_once(". ").map_or(about, |(first, _)| first).replace('\n', " ")

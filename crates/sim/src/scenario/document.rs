@@ -339,7 +339,7 @@ pub(super) struct PlantTable {
     pub(super) kind: PlantSpec,
 }
 
-/// What must stay empty around each vehicle.
+/// Space around each vehicle that must stay empty.
 #[derive(Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SafetyTable {
@@ -351,8 +351,7 @@ pub(super) struct SafetyTable {
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NoiseTable {
-    /// Seed of every random number that is drawn in flight (`ChaCha8`, the same on every machine). The start has a seed of
-    /// its own.
+    /// Seed of the random numbers in flight (`ChaCha8`, the same on every machine). The start has its own seed.
     pub(super) seed: u64,
 }
 
@@ -405,7 +404,7 @@ fn right_angle_deg() -> f64 {
     90.0
 }
 
-/// Keys of a shape that has a spacing alone.
+/// Keys of a shape that has only a spacing.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SpacingKeys {
@@ -437,13 +436,13 @@ pub(super) struct HelixKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TextKeys {
-    /// What is written; a line break begins a line below.
+    /// The text; a line break begins a new line below.
     #[schemars(length(min = 1, max = 1000))]
     pub(super) text: String,
-    /// Height of all that is written in m.
+    /// Height of the whole text in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
-    /// Width of all that is written in m, in place of `height_m`.
+    /// Width of the whole text in m, in place of `height_m`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
@@ -455,11 +454,11 @@ pub(super) struct TextKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SvgKeys {
-    /// Path data, as the attribute `d` of SVG has it.
+    /// Path data, in the form of the attribute `d` of SVG.
     pub(super) path: Option<String>,
     /// An SVG file, in place of `path`; relative to the folder of the scenario file.
     pub(super) file: Option<PathBuf>,
-    /// Whether slots fill what the lines surround, instead of standing on them.
+    /// Whether slots fill the areas inside the lines, instead of standing on the lines.
     #[serde(default)]
     pub(super) filled: bool,
     /// Height of the drawing in m.
@@ -479,14 +478,15 @@ pub(super) struct SvgKeys {
 pub(super) struct ImageKeys {
     /// A PNG picture; relative to the folder of the scenario file.
     pub(super) file: PathBuf,
-    /// Which pixels are drawn: the opaque ones of a picture that has others, or else the dark ones, unless given.
+    /// Pixels that are drawn: unless given, the opaque pixels of a picture with transparent ones, otherwise the dark
+    /// pixels.
     #[serde(default)]
     #[schemars(with = "Ink")]
     pub(super) ink: Option<Ink>,
-    /// Height of what is drawn in m.
+    /// Height of the drawn pixels in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
-    /// Width of what is drawn in m, in place of `height_m`.
+    /// Width of the drawn pixels in m, in place of `height_m`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
     /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
@@ -507,13 +507,13 @@ pub(super) struct FileKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum PerVehicle {
-    /// The same for all.
+    /// One value for all vehicles.
     All(#[schemars(extend("exclusiveMinimum" = 0))] f64),
-    /// One for each.
+    /// One value for each vehicle.
     Each(#[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))] Vec<f64>),
 }
 
-/// x, y and, unless it is 0, z.
+/// A point: x, y and, unless it is 0, z.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
 #[serde(untagged)]
@@ -543,9 +543,9 @@ impl Point {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum Vehicles {
-    /// All of them.
+    /// All vehicles.
     All(All),
-    /// These.
+    /// The listed vehicles.
     Listed(#[schemars(inner(range(min = 1)))] Vec<u64>),
 }
 
@@ -553,7 +553,7 @@ pub(super) enum Vehicles {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum All {
-    /// All of them.
+    /// All vehicles.
     All,
 }
 
@@ -561,7 +561,7 @@ pub(super) enum All {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum LegStart {
-    /// Once the one before it is reached.
+    /// As soon as the previous leg is reached.
     When(Reached),
     /// At this time in s.
     At(f64),
@@ -571,7 +571,7 @@ pub(super) enum LegStart {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Reached {
-    /// Once the one before it is reached.
+    /// As soon as the previous leg is reached.
     Reached,
 }
 

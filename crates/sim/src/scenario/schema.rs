@@ -1,6 +1,7 @@
-//! The JSON Schema of the scenario file: the one statement of its keys, their types, bounds, defaults and units.
+//! The JSON Schema of the scenario file: its keys, their types, bounds, defaults and units.
 //!
-//! The types of `document` give the schema, doc comments included. [`check`](super::check) reads files by it.
+//! The schema is generated from the types of `document` and their doc comments. [`check`](super::check) checks files
+//! against the schema.
 
 use std::sync::LazyLock;
 
@@ -13,7 +14,7 @@ use super::overrides::Override;
 use super::source::Source;
 use super::text::Text;
 
-/// Tables with the kind that holds where the file names none.
+/// Tables with their default kind.
 const DEFAULT_KINDS: [(&str, &str); 3] =
     [("LawTable", "edge-tension"), ("ReferenceTable", "rest"), ("SafetyTable", "ball")];
 
@@ -45,7 +46,7 @@ fn generate() -> Value {
     schema
 }
 
-/// Removes what TOML has no form for: null as a type and as a default, and defaults of whole tables.
+/// Removes parts that TOML cannot express: null as a type and as a default, and defaults of whole tables.
 fn tidy(schema: &mut Value) {
     match schema {
         Value::Object(object) => {
@@ -71,17 +72,17 @@ fn tidy(schema: &mut Value) {
 #[derive(Clone, Copy)]
 pub(super) struct Node {
     schema: &'static Value,
-    /// What the key is, where a key has the part.
+    /// Description of the key, if the part belongs to a key.
     about: Option<&'static str>,
 }
 
 impl Node {
-    /// The part for the whole file.
+    /// Returns the part for the whole file.
     pub(super) fn root() -> Self {
         Self::of(&SCHEMA)
     }
 
-    /// The part that a reference leads to. The description of the key comes before that of its type.
+    /// Returns the part that a reference points to. The description of the key precedes the description of its type.
     fn of(schema: &'static Value) -> Self {
         let about = schema["description"].as_str();
         let definition = schema["$ref"].as_str().and_then(|path| SCHEMA.pointer(path.trim_start_matches('#')));
@@ -91,58 +92,58 @@ impl Node {
         })
     }
 
-    /// A part of the same key, which has the key's description unless it has its own.
+    /// Returns a part of the same key, with the description of the key.
     fn part(self, schema: &'static Value) -> Self {
         let part = Self::of(schema);
-        Self { about: part.about.or(self.about), ..part }
+        Self { about: self.about.or(part.about), ..part }
     }
 
-    /// What the key or the type means, in one sentence or more.
+    /// Returns the description of the key or of the type.
     pub(super) fn about(self) -> Option<&'static str> {
         self.about
     }
 
-    /// The value of a keyword, such as `minimum`.
+    /// Returns the value of a keyword, such as `minimum`.
     pub(super) fn keyword(self, name: &str) -> &'static Value {
         &self.schema[name]
     }
 
-    /// The name of its type, such as `number`; empty for one of several types.
+    /// Returns the name of the type, such as `number`; empty for several types.
     pub(super) fn kind(self) -> &'static str {
         self.schema["type"].as_str().unwrap_or_default()
     }
 
-    /// Part for a key of a table, alternatives apart.
+    /// Returns the part for a key of a table, without the keys of alternatives.
     pub(super) fn property(self, key: &str) -> Option<Self> {
         self.schema["properties"].get(key).map(Self::of)
     }
 
-    /// The keys of a table, alternatives apart.
+    /// Returns the keys of a table, without those of alternatives.
     pub(super) fn keys(self) -> impl Iterator<Item = &'static str> {
         self.schema["properties"].as_object().into_iter().flat_map(|keys| keys.keys().map(String::as_str))
     }
 
-    /// Part for every value of a table whose keys are free.
+    /// Returns the part for every value of a table with free keys.
     pub(super) fn values(self) -> Option<Self> {
         self.schema["additionalProperties"].is_object().then(|| Self::of(&self.schema["additionalProperties"]))
     }
 
-    /// Part for the entries of a list.
+    /// Returns the part for the entries of a list.
     pub(super) fn items(self) -> Option<Self> {
         self.schema["items"].is_object().then(|| self.part(&self.schema["items"]))
     }
 
-    /// Whether a table needs a key.
+    /// Returns whether a table needs a key.
     pub(super) fn requires(self, key: &str) -> bool {
         self.required().any(|name| name == key)
     }
 
-    /// The keys that a table needs.
+    /// Returns the keys that a table needs.
     pub(super) fn required(self) -> impl Iterator<Item = &'static str> {
         self.schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str)
     }
 
-    /// The parts of which one applies, nested ones included.
+    /// Returns the alternatives, nested ones included; exactly one applies to a value.
     pub(super) fn alternatives(self) -> Vec<Self> {
         let listed = ["oneOf", "anyOf"].into_iter().filter_map(|of| self.schema[of].as_array()).flatten();
         let parts = listed.filter(|part| part.as_object().is_some_and(|part| !part.is_empty()));
@@ -151,26 +152,26 @@ impl Node {
         parts.flat_map(|part| if is_nested(&part) { part.alternatives() } else { vec![part] }).collect()
     }
 
-    /// The words of which one is the value; empty for other values.
+    /// Returns the admitted words; empty for other values.
     pub(super) fn words(self) -> Vec<&'static str> {
         let words = |part: Self| part.schema["const"].as_str();
         self.schema["oneOf"].as_array().into_iter().flatten().filter_map(|part| words(Self::of(part))).collect()
     }
 
-    /// Whether it is for a table.
+    /// Returns whether the part describes a table.
     pub(super) fn is_table(self) -> bool {
         self.kind() == "object"
             || self.schema["properties"].is_object()
             || self.alternatives().iter().any(|part| part.tag().is_some())
     }
 
-    /// The key whose constant value tells an alternative apart, and that value.
+    /// Returns the tag of an alternative: the key with a constant value, and this value.
     pub(super) fn tag(self) -> Option<(&'static str, &'static str)> {
         let keys = self.schema["properties"].as_object()?;
         keys.iter().find_map(|(key, value)| Some((key.as_str(), value["const"].as_str()?)))
     }
 
-    /// The alternative that a table of the file takes, by its tag.
+    /// Returns the alternative that the tag of a table of the file selects.
     pub(super) fn alternative_of(self, table: &DeValue<'_>) -> Option<Self> {
         self.alternatives().into_iter().find(|part| {
             part.tag().is_some_and(|(key, name)| match table.get(key) {
@@ -180,7 +181,7 @@ impl Node {
         })
     }
 
-    /// The part below for a key or the number of an entry, in a value of the file.
+    /// Returns the part below for a key or the number of an entry, in a value of the file.
     fn below(self, value: Option<&Spanned<DeValue<'_>>>, key: &str) -> Option<Self> {
         if let Some(part) = self.property(key).or_else(|| self.values()).or_else(|| self.items()) {
             return Some(part);
@@ -191,7 +192,7 @@ impl Node {
     }
 }
 
-/// Whether a key of a scenario takes integers only, as its type says. False for a key that does not exist.
+/// Returns whether the type of a key of a scenario is an integer; `false` for a key that does not exist.
 #[must_use]
 pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
     let Ok((name, toml)) = source.text() else { return false };
@@ -210,7 +211,8 @@ pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -
     at.0.is_some_and(|node| node.kind() == "integer")
 }
 
-/// The tables of the scenario file that have a key of this name: `[swarm]`, or `[law] with kind = "laplacian"`.
+/// Returns the tables of the scenario file that have a key of this name, such as `[swarm]`, or
+/// `[law] with kind = "laplacian"`.
 pub(super) fn tables_with(key: &str) -> Vec<String> {
     let mut found = Vec::new();
     for table in Node::root().keys() {

@@ -58,7 +58,7 @@ impl<'a> Text<'a> {
                 .with_place(Place::new(self.name, self.toml, 0..0)));
         }
         conform(&mut root, self.toml.len() + 1).map_err(|misfit| misfit.error.with_place(self.locate(misfit.span)))?;
-        // The schema describes what serde reads: an error here is one of the schema.
+        // `conform` accepts only what serde reads. An error of serde is a defect of the schema.
         Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             ScenarioError::new(error.message())
                 .coded("scenario/wrong-type")
@@ -67,7 +67,7 @@ impl<'a> Text<'a> {
         })
     }
 
-    /// Whether the text or an override gives a key, by its dotted path.
+    /// Returns whether the text or an override gives a key, by its dotted path.
     pub(super) fn gives(&self, path: &str) -> bool {
         let tree = self.tree();
         tree.is_ok_and(|tree| path.split('.').try_fold(&tree, |value, key| value.get_ref().get(key)).is_some())
@@ -79,7 +79,9 @@ impl<'a> Text<'a> {
         let (None, Ok(root)) = (error.place(), self.tree()) else { return error };
         let spans = error.fields().iter().map(|field| find(&root, field, self.toml.len() + 1));
         let overridden = spans.clone().find(|span| span.start > self.toml.len());
-        match overridden.or_else(|| spans.clone().next()) {
+        // A key that is not in the text has no span.
+        let written = || spans.clone().find(|span| !span.is_empty());
+        match overridden.or_else(written).or_else(|| spans.clone().next()) {
             Some(span) => {
                 let place = self.locate(span);
                 error.with_place(place)
@@ -98,7 +100,7 @@ impl<'a> Text<'a> {
         error.with_place(self.locate(span))
     }
 
-    /// The text as a tree with its overrides applied.
+    /// Returns the text as a tree with its overrides applied.
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("this is not TOML: {}", error.message()))
@@ -115,7 +117,7 @@ impl<'a> Text<'a> {
         Ok(root)
     }
 
-    /// The place of a span of the common address space.
+    /// Returns the place of a span of the common address space.
     fn locate(&self, span: Range<usize>) -> Place {
         let mut base = self.toml.len() + 1;
         if span.start >= base {
@@ -131,13 +133,13 @@ impl<'a> Text<'a> {
     }
 }
 
-/// The tables `[laws.NAME]`.
+/// Returns the tables `[laws.NAME]`.
 fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
     root.get_ref().get("laws")?.get_ref().as_table()
 }
 
-/// The span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its table
-/// if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
+/// Returns the span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its
+/// table if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
     let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
@@ -157,7 +159,7 @@ fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<
     first_span_from(value, overridden).unwrap_or_else(|| value.span())
 }
 
-/// The first span within a list, or of the value, that starts at `least` or later.
+/// Returns the first span within a list, or of the value, that starts at `least` or later.
 fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<usize>> {
     if value.span().start >= least {
         return Some(value.span());

@@ -1,4 +1,4 @@
-//! What a recording of `tautline run` holds beside positions: its limit, its obstacles and the run's own audit.
+//! Contents of a recording of `tautline run` besides positions: limit, obstacles and the run's own audit.
 
 use std::path::Path;
 
@@ -12,52 +12,54 @@ use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING
 use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
-use tautline_core::text::exact;
+use tautline_core::text::{at_least, exact, seconds};
 use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
 use tautline_recordings::read;
 use tautline_recordings::read::ReadOptions;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::{scenario, sim};
 
-/// Relative difference of two distances of the same instant that were computed in two ways.
+/// Relative rounding difference of two distances at the same instant, computed in two ways.
 const SAME: f64 = 1e-9;
 
-/// What a flight of `tautline run` holds beside positions.
+/// Contents of a recording of `tautline run` besides positions.
 #[derive(Clone, Debug)]
 pub struct OwnRecording {
-    /// Safety distance \[m\]; 2, as a scaled distance, where the scenario has ellipsoids.
+    /// Safety distance \[m\]; 2, as a scaled distance, if the scenario has ellipsoids.
     pub(super) limit_m: f64,
     /// Half axes of the ellipsoid around each vehicle \[m\].
     pub(super) ellipsoid_m: Option<Vector3<f64>>,
     /// Obstacles of the scenario.
     pub(super) obstacles: Vec<Obstacle>,
-    /// Where the flight ended before its time.
+    /// Early end of the flight, if it has one.
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
-    /// Whether the run's audit is not to be used.
+    /// Violations and approaches of the events of the run.
+    witnessed: Vec<RunFinding>,
+    /// Whether the audit ignores the run's audit.
     is_independent: bool,
-    /// Whether positions and times are read as the run wrote them.
+    /// Whether positions and times are read unchanged.
     is_read_as_written: bool,
     /// Metres of a length as the run wrote it.
     scale: f64,
     /// Times of the samples \[s\].
     samples_s: Vec<f64>,
-    /// The law that was flown, where it is not the scenario's.
+    /// The flown law, if it differs from the law of the scenario.
     other_law: Option<String>,
 }
 
-/// How the run's audit takes part in the audit of its recording.
+/// Use of the run's audit in the audit of its recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum RunAnswer {
-    /// The samples were judged.
+    /// The verdict is that of the samples.
     Samples,
-    /// The samples were judged and are clear, but the run's audit leaves the question undecided, for this reason.
+    /// The samples are clear, but the run's audit leaves the question undecided, for this reason.
     Undecided(String),
-    /// The answer of the run's audit.
+    /// The verdict is that of the run's audit.
     Repeated,
 }
 
-/// Returns the audit that a run writes into its recording when it closes it.
+/// Returns the audit that a run writes at the end of its recording.
 #[must_use]
 pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
     let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
@@ -103,7 +105,7 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
 }
 
 impl OwnRecording {
-    /// Returns what the recording of a flight that is in memory holds.
+    /// Returns the contents for a flight in memory.
     #[must_use]
     pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>) -> Self {
         let early_end = report.run.ended_early.clone().map(|reason| EarlyEnd {
@@ -115,7 +117,7 @@ impl OwnRecording {
         Self { early_end, audit, other_law, ..Self::of(scenario, scenario.delta_m, 1.0) }
     }
 
-    /// Returns the limits of a scenario, with lengths that are multiplied by `scale`.
+    /// Returns the limits of a scenario, with lengths multiplied by `scale`.
     fn of(scenario: &Scenario, delta_m: f64, scale: f64) -> Self {
         let ellipsoid_m = scenario.half_axes_m().map(|axes| Vector3::from(axes) * scale);
         Self {
@@ -124,6 +126,7 @@ impl OwnRecording {
             obstacles: scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect(),
             early_end: None,
             audit: StoredAudit::None,
+            witnessed: Vec::new(),
             is_independent: false,
             is_read_as_written: true,
             scale,
@@ -132,11 +135,11 @@ impl OwnRecording {
         }
     }
 
-    /// Reads what the recording holds beside positions; `None` where the file is no recording of `tautline run`. A damaged
-    /// recording is read up to the damage.
+    /// Reads the contents of a recording besides positions; `None` if the file is not a recording of `tautline run`.
+    /// Reads a damaged recording up to the damage.
     ///
     /// # Errors
-    /// [`Failure`] where the scenario of the recording cannot be read: then its obstacles are not known.
+    /// [`Failure`] if the scenario of the recording cannot be read, because its obstacles are then unknown.
     pub fn read(path: &Path, options: &ReadOptions, monitor: &dyn Monitor) -> Result<Option<Self>, Failure> {
         let Some(mut recording) = read::open_run(path) else { return Ok(None) };
         let header = recording.header();
@@ -167,7 +170,7 @@ impl OwnRecording {
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(Event::EndedEarly { reason: why, .. }) => reason = Some(why),
-                Entry::Event(_) => {}
+                Entry::Event(event) => own.witnessed.extend(witnessed(&event, &scenario)),
             }
         }
         if reason.is_some() || last_step < scenario.time.steps() {
@@ -190,18 +193,18 @@ impl OwnRecording {
         }
     }
 
-    /// Whether the recording is as the run wrote it, so that every sample contains every vehicle.
+    /// Returns whether the recording is unchanged, so that every sample contains every vehicle.
     pub(super) fn is_unaltered(&self) -> bool {
         self.run_audit().is_some()
     }
 
-    /// Whether the samples are known to be all steps of the run, each of them straight.
+    /// Returns whether the samples are all steps of the run, each with straight motion.
     pub(crate) fn holds_every_step(&self) -> bool {
         self.run_audit().is_some_and(|audit| audit.holds_every_step)
     }
 
-    /// Replaces the findings of the samples by those of the run's audit where the question is the one that the run answered.
-    /// Adds a note where the samples are judged although the recording is one of a run.
+    /// Replaces the findings of the samples by those of the run's audit if the question is the same. Otherwise adds a
+    /// note with the reason.
     pub(super) fn answer(
         &self,
         outcome: &mut Outcome,
@@ -213,12 +216,12 @@ impl OwnRecording {
         let audit = match &self.audit {
             _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
-                note("the recording holds no audit of its run, which an ended run writes last");
-                return RunAnswer::Samples;
+                note("the recording holds no audit of its run; a run writes its audit at its end");
+                return self.of_samples(outcome, settings, &[&self.witnessed]);
             }
             StoredAudit::Altered => {
-                note("the recording is not as the run wrote it, so that the run's audit is not of these samples");
-                return RunAnswer::Samples;
+                note("the recording is not as the run wrote it, so the run's audit may be of other samples");
+                return self.of_samples(outcome, settings, &[&self.witnessed]);
             }
             StoredAudit::AsWritten(audit) => audit,
         };
@@ -226,7 +229,7 @@ impl OwnRecording {
             [Status::Clear, Status::Violation, Status::Undecided].into_iter().find(|of| of.name() == audit.status);
         let status = status.unwrap_or_default();
         if audit.holds_every_step {
-            // The samples are all that the run judged: their own verdict is a proof.
+            // The run judged exactly these samples, so the verdict of the samples is a proof.
             if status == Status::Undecided && outcome.status == Status::Violation {
                 notes.push(UNDECIDED_RUN.to_owned());
             }
@@ -238,10 +241,7 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return match self.objection(outcome, settings, audit) {
-                Some(why) => undecided(outcome, why),
-                None => RunAnswer::Samples,
-            };
+            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.witnessed]);
         }
         if self.is_contradicted(outcome, audit, status) {
             note("they show vehicles closer than the run's audit says");
@@ -250,7 +250,7 @@ impl OwnRecording {
         match status {
             Status::Clear | Status::Undecided if !audit.ended_early.is_empty() => RunAnswer::Samples,
             Status::Clear if !settings.envelope.is_empty() => {
-                note("the run's audit of every step says nothing of limits of single vehicles");
+                note("the run's audit of every step does not cover limits of single vehicles");
                 RunAnswer::Samples
             }
             Status::Clear | Status::Violation => {
@@ -267,17 +267,29 @@ impl OwnRecording {
         }
     }
 
-    /// Why a clear answer to a question that the run's audit does not answer is not certain: the run found two closer, between
-    /// samples, than the question allows. Distances in another metric, and motion that is shifted in time, are not compared.
-    fn objection(&self, outcome: &Outcome, settings: &Settings, audit: &RunAudit) -> Option<String> {
-        let is_shifted = settings.vehicles.values().any(|of| of.offset_s != 0.0);
-        if outcome.separation != Some(Status::Clear) || is_shifted {
+    /// Leaves the answer to the samples, unless the run objects.
+    fn of_samples(&self, outcome: &mut Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> RunAnswer {
+        match self.objection(outcome, settings, findings) {
+            Some(why) => undecided(outcome, why),
+            None => RunAnswer::Samples,
+        }
+    }
+
+    /// Returns why a clear answer of the samples is not certain: the run found two closer, between samples, than the
+    /// question allows. Distances of another metric are compared by an upper bound. Motion that `--offset` shifts in time is
+    /// not that of the run.
+    fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<String> {
+        if outcome.separation != Some(Status::Clear) {
             return None;
         }
-        let given_m = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS)).unwrap_or(0.0);
-        let limit_m = outcome.closest.iter().map(|of| of.limit_m).fold(given_m, f64::max);
-        let same_metric = settings.ellipsoid_m == self.ellipsoid_m;
-        let length_scale = if self.ellipsoid_m.is_some() { 1.0 } else { self.scale };
+        let offset_s = |vehicle: usize| settings.vehicles.get(&(vehicle + 1).to_string()).map_or(0.0, |of| of.offset_s);
+        let given = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS)).unwrap_or(0.0);
+        let limit = outcome.closest.iter().map(|of| of.limit_m).fold(given, f64::max);
+        // A distance in half axes is at most that in metres over the shortest axis, and at least that over the longest.
+        let metres = self.ellipsoid_m.map_or(self.scale, |axes_m| axes_m.max());
+        let asked = settings.ellipsoid_m.map_or(1.0, |axes_m| 1.0 / axes_m.min());
+        let is_same_metric = settings.ellipsoid_m.is_some() && settings.ellipsoid_m == self.ellipsoid_m;
+        let factor = if is_same_metric { 1.0 } else { metres * asked };
         let is_judged =
             |vehicle: usize| settings.only.as_ref().is_none_or(|only| only.contains(&(vehicle + 1).to_string()));
         let in_window = |found: &RunFinding| {
@@ -287,39 +299,36 @@ impl OwnRecording {
         };
         let is_closer = |found: &&RunFinding| match object_pair(found) {
             Some(ObjectPair::Vehicles(pair)) => {
-                same_metric
-                    && is_judged(pair.first())
+                is_judged(pair.first())
                     && is_judged(pair.second())
-                    && found.min_m * length_scale < limit_m
+                    && offset_s(pair.first()) == offset_s(pair.second())
+                    && found.min_m * factor < limit
                     && in_window(found)
             }
-            Some(ObjectPair::Obstacle { vehicle, .. }) => {
-                settings.obstacles == self.obstacles
+            Some(ObjectPair::Obstacle { vehicle, obstacle }) => {
+                self.obstacles.get(obstacle).is_some_and(|of| settings.obstacles.contains(of))
                     && is_judged(vehicle)
                     && found.min_m < found.limit_m
                     && in_window(found)
             }
             None => false,
         };
-        let found = audit.violations.iter().chain(&audit.closest).filter(is_closer);
+        let found = findings.iter().copied().flatten().filter(is_closer);
         let deepest = found.min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-        if let Some(found) = deepest {
+        deepest.map(|found| {
             let other = match found.obstacle {
                 0 => found.other_vehicle.to_string(),
                 obstacle => format!("obstacle {obstacle}"),
             };
-            let (min_m, at_s) = (found.min_m * length_scale, found.min_at_s);
-            return Some(format!(
-                "the run's audit of every step found {} and {other} {min_m:.3} apart at {at_s:.2} s",
-                found.vehicle
-            ));
-        }
-        let is_listed = audit.violations_count == audit.violations.len() as u64;
-        (!is_listed).then(|| format!("the run's audit of every step found {} violations", audit.violations_count))
+            let unit = if self.ellipsoid_m.is_some() && found.obstacle == 0 { "half axes" } else { "m" };
+            let (min, at) = (at_least(found.min_m, 3), seconds(found.min_at_s));
+            format!("the run's audit of every step found {} and {other} {min} {unit} apart at {at}", found.vehicle)
+        })
     }
 
-    /// Whether a question is the one that the run's audit answers: its limit and obstacles, all vehicles, the whole flight,
-    /// its own clock, and no assumption on the motion. Limits of single vehicles are a question of their own.
+    /// Returns whether the run's audit answers a question. The question must have the limit and obstacles of the run,
+    /// all vehicles, the whole flight, the run's clock, and no assumption on the motion. Limits of single vehicles are
+    /// checked separately.
     fn is_same_question(&self, settings: &Settings, request: &AuditRequest<'_>) -> bool {
         let limit_m = settings.delta_m.or(settings.ellipsoid_m.map(|_| TOUCHING_ELLIPSOIDS));
         self.is_read_as_written
@@ -332,8 +341,8 @@ impl OwnRecording {
             && (request.settings.motion, request.settings.max_gap_s) == (None, None)
     }
 
-    /// Whether the samples themselves show two closer than the run's audit says. Straight lines between samples show nothing of
-    /// the run.
+    /// Returns whether the samples contradict the run's audit with a smaller distance. Distances between samples are
+    /// ignored: straight lines there may differ from the motion of the run.
     fn is_contradicted(&self, outcome: &Outcome, audit: &RunAudit, status: Status) -> bool {
         let has_sample = |from_s: f64, to_s: f64| {
             let rounding_s = SAME * (1.0 + to_s.abs());
@@ -352,9 +361,41 @@ impl OwnRecording {
             || (status == Status::Clear && outcome.violations.iter().any(|of| has_sample(of.from_s, of.to_s)))
     }
 
-    /// Returns a note where another law was flown than the scenario's.
+    /// Returns a note if the flown law differs from the law of the scenario.
     pub(super) fn note_on_law(&self) -> Option<String> {
-        self.other_law.as_ref().map(|name| format!("flown under the law {name}, and not the scenario's"))
+        self.other_law.as_ref().map(|name| format!("flown under the law {name} instead of the scenario's"))
+    }
+}
+
+/// Returns the violation or the approach of an event, in the lengths of [`run_audit`].
+fn witnessed(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
+    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
+    let finding = |vehicle: usize, time_s: f64, limit_m: f64, min_m: f64| RunFinding {
+        vehicle: vehicle as u64 + 1,
+        limit_m,
+        from_s: time_s,
+        to_s: time_s,
+        min_m,
+        min_at_s: time_s,
+        ..RunFinding::default()
+    };
+    let of_pair = |pair: Pair, time_s: f64, min_m: f64| RunFinding {
+        other_vehicle: pair.second() as u64 + 1,
+        ..finding(pair.first(), time_s, scenario.delta_m * scale, min_m * scale)
+    };
+    let of_obstacle = |vehicle: usize, obstacle: usize, time_s: f64, min_m: Option<f64>| {
+        let limit_m = scenario.obstacles.get(obstacle)?.clearance_m;
+        let found = finding(vehicle, time_s, limit_m, min_m.unwrap_or(limit_m.next_down()));
+        Some(RunFinding { obstacle: obstacle as u64 + 1, ..found })
+    };
+    match *event {
+        Event::ViolationBegan { pair, time_s } => Some(of_pair(pair, time_s, scenario.delta_m.next_down())),
+        Event::Approach { pair, time_s, separation_m } => Some(of_pair(pair, time_s, separation_m)),
+        Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => of_obstacle(vehicle, obstacle, time_s, None),
+        Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
+            of_obstacle(vehicle, obstacle, time_s, Some(distance_m))
+        }
+        _ => None,
     }
 }
 
@@ -368,7 +409,7 @@ fn undecided(outcome: &mut Outcome, why: String) -> RunAnswer {
 const UNDECIDED_RUN: &str =
     "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)";
 
-/// The pair of a finding; `None` where its numbers name none.
+/// Returns the pair of a finding; `None` if its numbers name no pair.
 fn object_pair(found: &RunFinding) -> Option<ObjectPair> {
     let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
     let vehicle = index(found.vehicle)?;
@@ -396,7 +437,8 @@ fn repeat(audit: &RunAudit, status: Status, outcome: &mut Outcome) {
     outcome.undecided.clear();
     outcome.tallies.undecided = Tally::all(0);
     outcome.deciding_rate_hz = None;
-    // The figure of the smallest distance over time shows samples; between them no pair is closer than the run's closest.
+    // The figure of the smallest distance over time has samples. Between samples no pair is closer than the run's
+    // closest approach.
     if let Some(nearest) = of_pairs.first() {
         for slice in &mut outcome.smallest {
             let drawn = &mut slice.closest;
