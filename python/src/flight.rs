@@ -34,6 +34,8 @@ struct Samples {
     separations_m: Vec<f64>,
     /// The law that was flown, where it is not the scenario's.
     other_law: Option<String>,
+    /// Reason of an early end.
+    ended_early: Option<String>,
 }
 
 impl Sink for Samples {
@@ -52,8 +54,10 @@ impl Sink for Samples {
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        if let Event::OtherLaw { name, .. } = event {
-            self.other_law = Some(name.clone());
+        match event {
+            Event::OtherLaw { name, .. } => self.other_law = Some(name.clone()),
+            Event::EndedEarly { reason, .. } => self.ended_early = Some(reason.clone()),
+            _ => {}
         }
         Ok(())
     }
@@ -175,6 +179,6 @@ pub(crate) fn fly(
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
-    let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone());
+    let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone(), samples.ended_early.clone());
     Flown::new(py, &report, samples, own)
 }

@@ -105,14 +105,12 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
 }
 
 impl OwnRecording {
-    /// Returns the contents for a flight in memory.
+    /// Returns the contents for a flight in memory, with the reason of its early end and the name of its law where the law
+    /// is not the scenario's.
     #[must_use]
-    pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>) -> Self {
-        let early_end = report.run.ended_early.clone().map(|reason| EarlyEnd {
-            at_s: report.run.duration_s,
-            duration_s: scenario.time.duration_s,
-            reason: Some(reason),
-        });
+    pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>, reason: Option<String>) -> Self {
+        let (at_s, duration_s) = (report.run.duration_s, scenario.time.duration_s);
+        let early_end = report.run.ended_early.is_some().then_some(EarlyEnd { at_s, duration_s, reason });
         let audit = StoredAudit::AsWritten(Box::new(run_audit(scenario, report)));
         Self { early_end, audit, other_law, ..Self::of(scenario, scenario.delta_m, 1.0) }
     }
