@@ -54,7 +54,7 @@ pub fn metres_below(number: f64, limit_m: f64) -> String {
         return format!("just below {}", exact(limit_m));
     }
     let is_told = |&decimals: &u8| {
-        let shown = at_least(number, decimals);
+        let shown = fixed(number, usize::from(decimals));
         shown != fixed(limit_m, usize::from(decimals)) && (number == 0.0 || shown.parse() != Ok(0.0))
     };
     (3..=17).find(is_told).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))

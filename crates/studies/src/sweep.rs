@@ -251,13 +251,9 @@ impl Experiment for Options {
             let flight = scenario.and_then(|of| batch.fly(&of, runs.seed(run)).map_err(|error| error.to_string()));
             Ok::<_, Failure>(flight.transpose())
         })?;
-        let mut flown = flown.into_iter();
-        let of_point = |values: Vec<f64>| {
-            let runs: Vec<_> = flown.by_ref().take(count).collect();
-            let runs = runs.into_iter().collect::<Option<Vec<_>>>();
-            runs.map(|runs| Point::new(values, self.question, runs))
-        };
-        let flown: Vec<_> = points.iter().cloned().filter_map(of_point).collect();
+        let of_point =
+            |(values, runs): (&Vec<f64>, Option<Vec<_>>)| Some(Point::new(values.clone(), self.question, runs?));
+        let flown: Vec<_> = points.iter().zip(complete_groups(flown, count)).filter_map(of_point).collect();
         let own = base.own();
         let sweep = Sweep {
             about: About::new(own),
@@ -273,6 +269,17 @@ impl Experiment for Options {
         };
         Ok((!sweep.points.is_empty()).then_some(sweep))
     }
+}
+
+/// Returns groups of `count` results each; a group that lacks a result is `None`.
+fn complete_groups<T>(results: Vec<Option<T>>, count: usize) -> Vec<Option<Vec<T>>> {
+    let mut results = results.into_iter();
+    let mut groups = Vec::new();
+    while results.len() > 0 {
+        let group: Vec<_> = results.by_ref().take(count).collect();
+        groups.push(group.into_iter().collect());
+    }
+    groups
 }
 
 impl Point {

@@ -360,6 +360,12 @@ fn a_closed_file_with_a_record_beyond_its_end_is_damaged_and_not_merely_unfinish
 }
 
 #[test]
+fn two_recordings_joined_in_one_file_are_refused() {
+    let bytes = recorded(&Run::new(5, 10));
+    assert!(matches!(fault(&[&bytes[..], &bytes[..]].concat()), ReadFault::Damaged { .. }));
+}
+
+#[test]
 fn samples_of_another_number_of_vehicles_are_refused() {
     let mut run = Run::new(5, 3);
     run.samples[2] = sample(6, 2);

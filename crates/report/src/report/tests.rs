@@ -292,9 +292,9 @@ fn a_violation_is_told_with_its_pair_distance_and_time() {
     let case = Case { audit: passing(1.5327), certificate: Certificate::void(Void::NoBarrier), ..Case::good() };
     assert_eq!(
         case.reason(),
-        "Vehicles 1 and 2 came to 1.533 m of each other at 0.50 s; the safety distance is 2.000 m."
+        "Vehicles 1 and 2 came to 1.532 m of each other at 0.50 s; the safety distance is 2.000 m."
     );
-    assert_eq!(case.report().headline(), "VIOLATION: vehicles 1-2 came to 1.533 m (delta 2.000 m) at 0.50 s");
+    assert_eq!(case.report().headline(), "VIOLATION: vehicles 1-2 came to 1.532 m (delta 2.000 m) at 0.50 s");
     let violation = &case.report().audit.violations[0];
     assert_eq!((violation.pair, violation.min_m), (Pair::new(0, 1), 1.5327));
 }

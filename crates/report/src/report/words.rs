@@ -10,7 +10,7 @@ impl Report {
     /// The verdict in one line, with what refused the flight before its first step behind it.
     ///
     /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
-    /// `VIOLATION: vehicles 2-3 came to 1.533 m (delta 2.000 m) at 3.63 s`.
+    /// `VIOLATION: vehicles 2-3 came to 1.532 m (delta 2.000 m) at 3.63 s`.
     #[must_use]
     pub fn headline(&self) -> String {
         let refused = match &self.verdict.refused[..] {

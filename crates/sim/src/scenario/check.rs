@@ -131,7 +131,10 @@ impl Check {
         for (key, value) in table.iter_mut() {
             let name = key.get_ref();
             let Some(node) = known(name) else {
-                let at = if value.span().start >= self.overridden_from { value.span() } else { key.span() };
+                // The key of the file may have a value of an override.
+                let is_of_override = |span: Range<usize>| span.start >= self.overridden_from;
+                let at =
+                    if !is_of_override(key.span()) && is_of_override(value.span()) { value.span() } else { key.span() };
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
                 return Err(unknown_key(name, known, at));
             };

@@ -259,6 +259,7 @@ fn a_scenario_has_no_choice_of_precision() {
 #[test]
 fn an_error_that_an_override_causes_stands_in_the_override() {
     let cases: &[(&str, &str, usize)] = &[
+        ("law={kind=\"laplacian\", delta_m=2, alpha=1}", "scenario/unknown-key", 35),
         ("formation.side_m=2", "scenario/within-delta", 18),
         ("law.delta_m=3", "scenario/within-delta", 13),
         ("start.positions_m.1.x=6", "scenario/within-delta", 23),
@@ -286,6 +287,13 @@ fn an_error_that_an_override_causes_stands_in_the_override() {
         assert!(error.place().is_some_and(|place| place.source == "--set" && place.text == set), "{error}");
         assert!(error.help().is_some(), "{error}");
     }
+    // The file has the key too.
+    let left = read_builtin("pentagon", &["formation.side_m=5", "formation.shape=circle", "formation.radius_m=4"]);
+    let left = left.expect_err("a circle has no side");
+    assert!(left.place().is_some_and(|place| place.text == "formation.side_m=5"), "{left}");
+    // One of two keys is in the file.
+    let short = read(&RIGHT.replace("duration_s = 1.0", "duration_s = 0.5")).expect_err("shorter than the hold");
+    assert_eq!((short.code(), place(&short)), ("scenario/outside-flight", (14, 14)), "{short}");
 }
 
 #[test]

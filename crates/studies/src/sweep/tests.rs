@@ -102,9 +102,12 @@ fn swept_seeds_and_jitters_are_those_of_the_grid() {
     assert_eq!(still.flights[0].state_hash, still.flights[1].state_hash, "a jitter of 0 moves nothing");
     assert_ne!(moved.flights[0].state_hash, moved.flights[1].state_hash);
     assert!(sweep.jitter_m.is_none());
-    let seeds = swept(&options(&["start.seed=1,2"], 2));
-    let hash = |point: usize, run: usize| seeds.points[point].flights[run].state_hash.clone();
-    assert!(hash(0, 0) == hash(0, 1) && hash(0, 0) != hash(1, 0));
+    let seeds = swept(&options(&["start.seed=1,2", "start.jitter_m=0.2"], 1));
+    assert_ne!(seeds.points[0].flights[0].state_hash, seeds.points[1].flights[0].state_hash);
+    // Two runs of one seed are one flight, which must not count twice.
+    let equal = options(&["start.seed=1,2", "start.jitter_m=0.2"], 2);
+    let refused = batch(1, &mut |batch| equal.fly(&base(pair(), &[]), batch)).expect_err("equal runs");
+    assert_eq!(refused.code(), "study/equal-runs");
 }
 
 #[test]
@@ -142,4 +145,11 @@ fn an_interrupted_sweep_has_the_points_that_were_flown() {
     let sweep = fly(3 * steps).expect("a point");
     assert!(sweep.interrupted && !sweep.is_good() && sweep.points.len() == 1, "{}", sweep.points.len());
     assert_eq!(sweep.notes()[0], "interrupted: of 3 points 1 were flown");
+}
+
+#[test]
+fn a_group_that_lacks_a_result_takes_none_of_the_next_group() {
+    let results = vec![None, Some(1), Some(2), Some(3), Some(4), None];
+    assert_eq!(super::complete_groups(results, 2), [None, Some(vec![2, 3]), None]);
+    assert_eq!(super::complete_groups(vec![Some(7)], 1), [Some(vec![7])]);
 }
