@@ -75,7 +75,7 @@ fn wrong_input_is_refused_with_its_remedy() {
         (&["--key", "law.alfa=1,2"], "scenario/unknown-key"),
         (&["--key", "law..alpha=1,2"], "scenario/override"),
         (&["--key", "law.delta_m=9,10"], "scenario/within-delta"),
-        (&["--key", "start.seed=1,2", "--runs", "3"], "study/equal-runs"),
+        (&["--key", "start.seed=1,2", "--runs", "3"], "request/equal-runs"),
         // Values that the command line itself refuses have no code.
         (&[], ""),
         (&["--key", "law.alpha=1", "--runs", "0"], ""),

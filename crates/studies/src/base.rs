@@ -110,7 +110,7 @@ impl Runs {
             return Ok(());
         }
         let message = format!("--runs: must be 1 for values of {key}, got {}", self.count);
-        Err(Failure::input("study/equal-runs", message, "leave --runs out: all runs of one seed are the same flight"))
+        Err(Failure::input("request/equal-runs", message, "leave --runs out: all runs of one seed are the same flight"))
     }
 
     /// Returns the seed of a run, from 0.

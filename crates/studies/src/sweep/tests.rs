@@ -107,7 +107,7 @@ fn swept_seeds_and_jitters_are_those_of_the_grid() {
     // Two runs of one seed are one flight, which must not count twice.
     let equal = options(&["start.seed=1,2", "start.jitter_m=0.2"], 2);
     let refused = batch(1, &mut |batch| equal.fly(&base(pair(), &[]), batch)).expect_err("equal runs");
-    assert_eq!(refused.code(), "study/equal-runs");
+    assert_eq!(refused.code(), "request/equal-runs");
 }
 
 #[test]
