@@ -339,7 +339,7 @@ impl Study for Margin {
             .column(&self.key, &self.key, Kind::Exact, |probe| probe.value)
             .column("runs", "", Kind::Count, |probe| probe.held.of)
             .column("held", &does, Kind::Share, |probe| probe.held)
-            .column("min", "Smallest separation [m]", Kind::Metres, |probe| probe.min_m)
+            .column("min", "Smallest separation [m]", Kind::AtLeast, |probe| probe.min_m)
             .build()
     }
 

@@ -406,6 +406,8 @@ impl Study for Sweep {
         let does = self.question.words()[0];
         let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
         let table = Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.points);
+        // The median of one flight is its separation.
+        let median = if self.runs == 1 { "" } else { "Separation, median [m]" };
         let keys = self.keys.iter().enumerate();
         let table = keys.fold(table, |table, (k, SweptKey { key, .. })| {
             table.column(key, key, Kind::Exact, |point| point.values.get(k).copied())
@@ -414,7 +416,7 @@ impl Study for Sweep {
             .column("held", &does, Kind::Share, |point| point.held)
             .column("violated", "Violated", Kind::Share, |point| point.violated)
             .column("min_smallest", "Separation, smallest [m]", Kind::AtLeast, |point| point.min_smallest_m)
-            .column("min_median", "Separation, median [m]", Kind::Estimate, |point| point.min_median_m)
+            .column("min_median", median, Kind::Estimate, |point| point.min_median_m)
             .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |point| point.reached_median_s);
         table
             .column("refused_count", "Refused", Kind::Count, |point| point.refused)

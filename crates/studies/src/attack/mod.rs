@@ -461,9 +461,9 @@ impl Study for Attack {
             .column("flight", "Flight", Kind::Count, |of| of.flight)
             .column("noise_seed", "", Kind::Integer, |of| of.flown.seed)
             .column("outcome", "Verdict", Kind::Text, |of| of.flown.outcome.name())
-            .column("min", "Separation [m]", Kind::Metres, |of| of.flown.min_m)
+            .column("min", "Separation [m]", Kind::AtLeast, |of| of.flown.min_m)
             .column("min_at", "At [s]", Kind::Exact, |of| of.flown.min_at_s)
-            .column("certified", "Certified [m]", Kind::Metres, |of| of.flown.certified_m);
+            .column("certified", "Certified [m]", Kind::AtLeast, |of| of.flown.certified_m);
         let keys = self.bounds.iter().enumerate();
         keys.fold(table, |table, (k, bound)| {
             table.column(&bound.key, &bound.key, Kind::Exact, |of| of.values.get(k).copied())
@@ -479,8 +479,8 @@ impl Study for Attack {
         let flights: Vec<_> = std::iter::once(own).chain(worst).collect();
         let flights = Table::of("The scenario as it is, and the worst found", &flights)
             .column("", "Flight", Kind::Text, |(what, _)| *what)
-            .column("", "Separation [m]", Kind::Metres, |(_, flown)| flown.min_m)
-            .column("", "Certified [m]", Kind::Metres, |(_, flown)| flown.certified_m)
+            .column("", "Separation [m]", Kind::AtLeast, |(_, flown)| flown.min_m)
+            .column("", "Certified [m]", Kind::AtLeast, |(_, flown)| flown.certified_m)
             .column("", "Verdict", Kind::Text, |(_, flown)| flown.outcome.name().replace('_', " "))
             .build();
         let worst = |k: usize| self.worst().and_then(|worst| worst.values.get(k).copied());
