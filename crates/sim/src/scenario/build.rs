@@ -14,14 +14,13 @@ use super::limits::{CONTACT_PREDICTION_M, check_count, check_lengths, check_memo
 use super::reference::ReferenceTable;
 use super::spec::{Safety, Scenario, Space};
 use super::start;
-use super::text::Text;
 use super::time::bounded_record_hz;
 use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
 
 /// Completes a scenario. It still has to be validated.
-pub(super) fn scenario(document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
+pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
     check_memory(count, edge_count(&document.graph.kind, document.law.kind.keeps_edges(), count))?;
@@ -48,9 +47,9 @@ pub(super) fn scenario(document: Document, text: &Text<'_>) -> Result<Scenario, 
         hull_radius_m.iter().fold(0.5 * delta_m, |most_m, &radius_m| most_m.max(radius_m + CONTACT_PREDICTION_M));
     let obstacles = document.obstacle.iter().enumerate();
     let obstacles = obstacles.map(|(number, table)| table.obstacle(number, clearance_m)).collect::<Result<_, _>>()?;
-    let (gives_step, gives_halvings) = (text.gives("time.dt_s"), text.gives("time.max_halvings"));
+    let (gives_step, gives_halvings) = (document.given.dt_s, document.given.max_halvings);
     let mut time = document.time;
-    if !text.gives("time.record_hz") {
+    if !document.given.record_hz {
         time.record_hz = bounded_record_hz(count, time.duration_s, document.arrival.hold_s);
     }
     if airframe.quadrotor().is_some() {

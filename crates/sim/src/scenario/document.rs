@@ -93,6 +93,16 @@ pub(super) struct Document {
     /// Chance in flight.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) noise: NoiseTable,
+    #[serde(skip)]
+    pub(super) given: Given,
+}
+
+/// Keys of `[time]` that the file gives; the others depend on other tables.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Given {
+    pub(super) dt_s: bool,
+    pub(super) record_hz: bool,
+    pub(super) max_halvings: bool,
 }
 
 impl Document {

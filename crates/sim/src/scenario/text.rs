@@ -10,7 +10,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 use toml::{Spanned, map::Map};
 
 use super::check::conform;
-use super::document::Document;
+use super::document::{Document, Given};
 use super::error::{Field, Place, ScenarioError};
 use super::overrides::Override;
 
@@ -57,20 +57,18 @@ impl<'a> Text<'a> {
                 .with_help("start from a built-in scenario, such as `pentagon`")
                 .with_place(Place::new(self.name, self.toml, 0..0)));
         }
+        let time = root.get_ref().get("time");
+        let gives = |key: &str| time.is_some_and(|time| time.get_ref().get(key).is_some());
+        let given = Given { dt_s: gives("dt_s"), record_hz: gives("record_hz"), max_halvings: gives("max_halvings") };
         conform(&mut root, self.toml.len() + 1).map_err(|misfit| misfit.error.with_place(self.locate(misfit.span)))?;
         // `conform` accepts only what serde reads. An error of serde is a defect of the schema.
-        Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
+        let document = Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             ScenarioError::new(error.message())
                 .coded("scenario/wrong-type")
                 .with_help("`tautline schema` describes every key")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
-        })
-    }
-
-    /// Returns whether the text or an override gives a key, by its dotted path.
-    pub(super) fn gives(&self, path: &str) -> bool {
-        let tree = self.tree();
-        tree.is_ok_and(|tree| path.split('.').try_fold(&tree, |value, key| value.get_ref().get(key)).is_some())
+        })?;
+        Ok(Document { given, ..document })
     }
 
     /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
