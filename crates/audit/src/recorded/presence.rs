@@ -135,7 +135,7 @@ const OPENING: usize = 65_536;
 const MOST_INTERVALS: usize = 64;
 /// Fewest intervals of a vehicle that make a rate of its own; with fewer, all vehicles' intervals do.
 const FEWEST_INTERVALS: usize = 3;
-/// An interval longer than so many usual ones misses a sample.
+/// Ratio of an interval to the usual interval above which a sample is missing.
 const GAP_OVER_USUAL: f64 = 1.5;
 
 /// Longest interval without a gap, for each vehicle and for those that are not known yet \[s\].
@@ -147,7 +147,7 @@ pub(super) struct Rates {
 }
 
 impl Rates {
-    /// Learns from the opening of a recording of so many vehicles.
+    /// Returns the usual intervals in the first items of a recording with `vehicles` vehicles.
     pub(super) fn learn(items: &[Item], vehicles: usize) -> Self {
         let mut last_s: Vec<Option<f64>> = vec![None; vehicles];
         let mut intervals_s: Vec<Vec<f64>> = vec![Vec::new(); vehicles];

@@ -271,7 +271,7 @@ pub enum RecordedError {
         /// How long after it \[days\].
         days: u64,
     },
-    /// A sample or a curve that is none: a number that is not finite or too large, no coefficients.
+    /// Invalid sample or curve: a number that is not finite or too large, or a curve without coefficients.
     #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
     Item {
         /// The vehicle.
@@ -308,7 +308,7 @@ pub enum RecordedError {
     /// The work was interrupted ([`super::TrackAuditor::with_interruption`]).
     #[error("interrupted")]
     Interrupted,
-    /// An obstacle that is none.
+    /// Invalid obstacle.
     #[error(transparent)]
     Obstacle(#[from] ObstacleError),
 }

@@ -337,7 +337,7 @@ fn candidate(column: usize, name: &str) -> Option<Candidate> {
     if heading::is_time(name) {
         return Some(Candidate { column, stem, unit: known });
     }
-    // `sec`, `tv_usec`, `header.stamp.nanosec`: the last word is a unit that nobody abbreviates to a letter.
+    // `sec`, `tv_usec`, `header.stamp.nanosec`: the last word is a unit of more than one letter.
     let name = name.trim().to_lowercase();
     let (before, word) = name.rsplit_once(['.', '/', '_', ' ']).unwrap_or(("", &name));
     let unit = TimeUnit::from_name(word).filter(|_| word.len() > 1)?;

@@ -403,7 +403,7 @@ impl Tracks for Joined {
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
             part.fill(vehicle, self.is_planar)?;
         }
-        // Up to here nothing can come between what is known.
+        // Unread items of any part are not earlier than this.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
         for part in &mut self.parts {
             items.extend(std::iter::from_fn(|| part.waiting.next_if(|item| item.time_s() <= until_s)));

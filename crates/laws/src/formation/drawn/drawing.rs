@@ -195,7 +195,7 @@ pub enum DrawingError {
         height: u32,
     },
     /// Lines that are not finite, or too far apart to compute with.
-    #[error("what is drawn reaches to where numbers end")]
+    #[error("drawing coordinates overflow")]
     NotFinite,
     /// No line and no area.
     #[error("nothing is drawn")]

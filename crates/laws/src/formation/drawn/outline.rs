@@ -250,7 +250,7 @@ fn length([x0, y0]: Point, [x1, y1]: Point) -> f64 {
     libm::hypot(x1 - x0, y1 - y0)
 }
 
-/// Points inside what is drawn: `count` of the middles of its pixels, or of equal parts of them, the others evenly
+/// Points inside a mask: `count` of the middles of its pixels, or of equal parts of them, the others evenly
 /// left out; with them the side of a part. None where nothing is drawn.
 pub(super) fn inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
     let drawn = mask.count();

@@ -118,7 +118,7 @@ pub(super) struct Splits {
     /// The current file, and what it is read from.
     open: Option<(TopicReader, Source)>,
     options: ReadOptions,
-    /// Fewest messages that they have by what is said of them.
+    /// Lower bound of the number of messages.
     least_messages: u64,
     /// What is to be said of files that were not closed, which the user accepts.
     pub(super) notes: Vec<String>,

@@ -283,7 +283,7 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
     Ok(())
 }
 
-/// Words of topics that tell where somebody is asked to be, and not where a vehicle is: of MAVROS
+/// Words in topics of setpoints, which hold commanded instead of measured positions: of MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
 /// (`motion_reference/pose`), planners, and what is clicked in a viewer.
 const WISHES: [&str; 20] = [
@@ -329,7 +329,7 @@ pub(super) fn space(topic: &str) -> &str {
     if matches!(last(topic), "tf" | "tf_static") { namespace(topic) } else { "" }
 }
 
-/// Whether a name says that it is of what somebody is asked to do: it has a word of it, in the singular or the plural.
+/// Returns whether a name contains a word for setpoints, in the singular or the plural.
 pub(super) fn is_wish(name: &str) -> bool {
     let is_one = |word: &str| WISHES.contains(&word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(&one));
     words(name).split(' ').any(is_one)
