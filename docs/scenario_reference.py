@@ -1,4 +1,4 @@
-"""Makes docs/scenario.md of the schema of the program:
+"""Generates docs/scenario.md from the schema of the program:
 
     tautline schema | python3 docs/scenario_reference.py > docs/scenario.md
 """
@@ -14,37 +14,42 @@ Schema = dict[str, Any]
 HEAD = """\
 # Scenario reference
 
-Every key of a scenario file: [ten-minutes.md](ten-minutes.md) flies one, `tautline list --show pentagon` prints one to start from, and
-`tautline schema` prints the JSON Schema that this page is made of by `docs/scenario_reference.py`. An editor that knows the schema
-completes and checks as you type. An unknown key is refused with its line, its column and the nearest name; so is a value out of range.
+This page lists every key of a scenario file. `tautline list --show pentagon` prints a file to start from;
+[ten-minutes.md](ten-minutes.md) explains one.
 
-`tautline run`, `check`, `margin`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
+An unknown key or a value out of range is refused with its line and column; an unknown key also with the nearest name.
+`docs/scenario_reference.py` generates this page from the JSON Schema that `tautline schema` prints. An editor with this
+schema completes and checks keys as you type.
+
+`tautline run`, `check`, `margin`, `sweep`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
 `--set 'start={shape="grid", spacing_m=2}'`, `--set start.positions_m.4.x=-1`. Lists count from 1.
 
-*Unit* is that of the key's name. *Default* is what stands where the key does not; `needed` says that the key has to be there, and `-`
-that nothing does, or what the last column says. *Range* says which values are taken; what it does not say is checked all the same, and
-refused with a remedy.
+| column | meaning |
+| --- | --- |
+| unit | unit in the name of the key |
+| default | value without the key; `needed`: the key is required; `-`: no value, or as in the last column |
+| range | valid values; further conditions are checked and refused with a remedy |
 """
 
-# The order in which a flight is told; what the schema has and this list does not, comes last.
+# Order of the tables on the page; other tables of the schema come last.
 ORDER = (
-    "name swarm start formation leg law laws graph reference breathing arrival obstacle safety vehicle wind sensing network "
-    "actuation failure noise time plant"
+    "name swarm start formation leg law laws graph reference breathing arrival obstacle safety vehicle wind sensing "
+    "network actuation failure noise time plant"
 ).split()
 
-# Ends of names and what they say, longest first.
+# Suffixes of keys and their units, longest first.
 UNITS = {
-    "_n_per_rpm2": "N/rpm^2", "_n_per_rpm": "N/rpm", "_n_s2_m2": "N s^2/m^2", "_m4_per_s2": "m^4/s^2", "_s_per_m2": "s/m^2",
-    "_n_s_m": "N s/m", "_per_s2": "1/s^2", "_kg_m2": "kg m^2", "_per_s": "1/s", "_m_s2": "m/s^2", "_rad_s": "rad/s", "_m_s": "m/s",
-    "_deg": "degrees", "_hz": "Hz", "_kg": "kg", "_m": "m", "_s": "s", "_n": "N",
+    "_n_per_rpm2": "N/rpm^2", "_n_per_rpm": "N/rpm", "_n_s2_m2": "N s^2/m^2", "_m4_per_s2": "m^4/s^2",
+    "_s_per_m2": "s/m^2", "_n_s_m": "N s/m", "_per_s2": "1/s^2", "_kg_m2": "kg m^2", "_per_s": "1/s", "_m_s2": "m/s^2",
+    "_rad_s": "rad/s", "_m_s": "m/s", "_deg": "degrees", "_hz": "Hz", "_kg": "kg", "_m": "m", "_s": "s", "_n": "N",
 }  # fmt: skip
 UNNAMED = {"alpha": "m^2/s^2"}
 
-COLUMNS = "| key | type | unit | default | range | what it means |\n| --- | --- | --- | --- | --- | --- |"
+COLUMNS = "| key | type | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |"
 
 
 class Reference:
-    """The page, made of a schema."""
+    """The page for a schema."""
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
@@ -57,20 +62,21 @@ class Reference:
         plain = {name: keys[name] for name in names if name not in tables}
         required = self.schema["required"]
         parts = [HEAD, "## The file\n", self.rows(plain, required), ""]
-        parts.append(f"The tables {listed([f'[`[{name}]`](#{name})' for name in required], 'and')} are needed, and no others.\n")
+        links = [f"[`[{name}]`](#{name})" for name in required]
+        parts.append(f"Required tables: {listed(links, 'and')}.\nAll others are optional.\n")
         for name in tables:
             parts.extend(self.section(name, keys[name], 2))
         return "\n".join(parts)
 
     def section(self, path: str, use: Schema, level: int) -> Iterator[str]:
-        """A table of the file, and then the tables in it."""
+        """Yields the section of a table, then those of its subtables."""
         table = self.followed(use)
         several = table.get("type") == "array"
         table = self.followed(table["items"]) if several else table
         table, both = self.one_of_several(table)
         yield f"{'#' * level} {self.heading(path, several)}\n"
         used, own = sentence(use.get("description", "")), sentence(table.get("description", ""))
-        yield max(used, own, key=len) + (" A `[[table]]` for each, or a list." if both else "") + "\n"
+        yield max(used, own, key=len) + (" Give a `[[table]]` for each, or a list." if both else "") + "\n"
         values = table.get("additionalProperties")
         if isinstance(values, dict):
             table = self.followed(values)
@@ -89,18 +95,19 @@ class Reference:
                 yield from self.section(f"{path}.{name}", key, min(level + 1, 3))
 
     def varied(self, path: str, table: Schema, variants: list[Schema]) -> Iterator[str]:
-        """The keys that depend on the value of one of them."""
+        """Yields the keys that depend on the value of another key."""
         said = next((name for name in ("formation", "law") if name != path and self.same(name, variants)), None)
         if said:
             tag = self.tag(variants[0])
-            yield f"{'Beside these, ' if table.get('properties') else ''}`{tag}` with the keys of its own, as in [`[{said}]`](#{said}).\n"
+            also = "Also " if table.get("properties") else ""
+            yield f"{also}`{tag}` with the keys of that value, as in [`[{said}]`](#{said}).\n"
             return
         tag = self.tag(variants[0])
         names = [variant["properties"][tag]["const"] for variant in variants]
-        yield f"`{tag}` is {alternatives(names)}. The keys below each are its own.\n"
+        yield f"`{tag}` is {alternatives(names)}. Each value has the keys below it.\n"
         rows = [COLUMNS]
         for name, variant in zip(names, variants):
-            default = "" if tag in variant.get("required", []) else f" This is what stands where no `{tag}` is given."
+            default = "" if tag in variant.get("required", []) else f" This is the default."
             rows.append(f"| **`{tag} = \"{name}\"`** | | | | | {cell(variant['description'])}{default} |")
             own = {key: value for key, value in variant["properties"].items() if key != tag}
             rows += [self.row(key, value, key in variant.get("required", [])) for key, value in own.items()]
@@ -129,7 +136,8 @@ class Reference:
             few = kind.get("minItems"), kind.get("maxItems")
             count = "" if few == (None, None) else f"{few[0]} " if few[0] == few[1] else f"{few[0]} to {few[1]} "
             return f"list of {count}{plural(self.type_of(kind['items']))}"
-        return {"number": "number", "integer": "whole number", "boolean": "`true` or `false`", "string": "text"}[kind["type"]]
+        names = {"number": "number", "integer": "whole number", "boolean": "`true` or `false`", "string": "text"}
+        return names[kind["type"]]
 
     def range_of(self, kind: Schema) -> str:
         if "anyOf" in kind:
@@ -151,14 +159,14 @@ class Reference:
         return f"`[[{path}]]`" if several else f"`[{path}]`"
 
     def one_of_several(self, table: Schema) -> tuple[Schema, bool]:
-        """The table where one of them or a list of them is taken, and whether a list is."""
+        """Returns the table of a choice of table or list, and whether a list is allowed."""
         options = [self.followed(one) for one in table.get("anyOf", [])]
         found = [one for one in options if "properties" in one]
         lists = any(one.get("type") == "array" for one in options)
         return (found[0], lists) if len(found) == 1 and "properties" not in table else (table, False)
 
     def variants(self, table: Schema) -> list[Schema]:
-        """The tables that the value of one key tells apart."""
+        """Returns the alternative tables that the value of one key selects."""
         options = table.get("oneOf", [])
         for one in table.get("anyOf", []):
             options = options or one.get("oneOf", [])
