@@ -29,6 +29,13 @@ if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
     npm install --silent --no-audit --no-fund --prefix target/typescript 'typescript@5'
 fi
 
+# The builder of the book, which tests/docs runs.
+if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
+    cargo install --quiet --locked --debug --no-default-features --features search --root target/mdbook \
+        --target-dir target/mdbook/build 'mdbook@0.5.4'
+    rm -rf target/mdbook/build
+fi
+
 # A driver in software where no graphics driver is installed: tests/viewer fails without one.
 if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
