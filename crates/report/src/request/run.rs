@@ -122,9 +122,6 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     for reason in &report.verdict.reasons {
         monitor.say(reason);
     }
-    if let Some(verification) = &report.verification {
-        monitor.say(&format!("{:<12} {}", "verified", verification.text()));
-    }
     monitor.say(&format!(
         "wrote {}, {} and {}",
         folder.file(RECORDING).display(),
