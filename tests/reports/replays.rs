@@ -96,7 +96,7 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
         "{found}"
     );
     assert!(found["reds"].as_u64() > Some(20), "who is too near is red: {found}");
-    assert!(text(&found["violation"]["said"]).starts_with("Violation: vehicles 4-5 came to 1.532 m (δ 2.000) at"));
+    assert!(text(&found["violation"]["said"]).starts_with("Violation: 4-5 came to 1.532 m (limit 2.000) at"));
     assert!(
         text(&found["end"]["state"]).starts_with("1 violation so far · nearest so far 1.532 m, 4 and 5 · "),
         "{found}"
