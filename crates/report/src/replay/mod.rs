@@ -14,14 +14,11 @@ mod motion;
 mod obstacle_meshes;
 mod stage;
 mod statements;
-mod targets;
-mod visible;
 
 pub use chart::Chart;
 pub use data::{Judged, Replay};
-pub use decimate::{MOST_INSTANTS, Span, chosen};
+pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
 pub use stage::Stage;
-pub use visible::MOST_VEHICLES;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;

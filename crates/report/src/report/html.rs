@@ -11,6 +11,7 @@ use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
 use tautline_core::text::{at_least, metres, seconds, significant};
 use tautline_laws::formation::Freedom;
+use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::vehicle::Airframe;
 
@@ -25,8 +26,8 @@ const LONGEST_SCENARIO: usize = 100_000;
 pub struct RunPage<'a> {
     /// What was flown.
     pub scenario: &'a Scenario,
-    /// What was known to be doubtful before the first step.
-    pub warnings: &'a [(String, String)],
+    /// Findings before the first step.
+    pub preflight: &'a Preflight,
     /// The flight itself, or why it cannot be replayed.
     pub replay: &'a Result<Replay, NoReplay>,
     /// The run as charts.
@@ -45,7 +46,9 @@ impl Report {
     pub fn to_html(&self, about: &RunPage<'_>) -> String {
         let badge = Badge::judged(self.verdict.pass);
         let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, self.headline());
-        (page.reasons, page.warnings) = (self.verdict.reasons.clone(), about.warnings.to_vec());
+        page.reasons.clone_from(&self.verdict.reasons);
+        let warnings = about.preflight.warnings.iter();
+        page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();
         page.add("Replay", [page::replay(&self.scenario.name, about.replay, Start::AtOnce)]);
         let rows = self.rows().into_iter().map(<[String; 2]>::from);
         page.add("Findings", [page::words("Findings", &["Part", "Finding"], rows)]);
