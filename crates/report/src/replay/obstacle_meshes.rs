@@ -204,7 +204,7 @@ mod tests {
         let circle = |k: u32| (f64::from(k) * 0.01).sin_cos();
         let path: Vec<_> = (0..5000).map(|k| (f64::from(k), Vector3::new(circle(k).0, circle(k).1, 0.0))).collect();
         let (kept, off_m) = simplified(&path, &[1234.5], 50);
-        assert!(kept.len() == 50 && kept.contains(&1234) && kept.contains(&1235), "{kept:?}");
+        assert!((45..=50).contains(&kept.len()) && kept.contains(&1234) && kept.contains(&1235), "{kept:?}");
         assert!((0.01..1.5).contains(&off_m), "{off_m}");
         let line = |at: f64| {
             let k = kept.partition_point(|&k| (k as f64) < at).max(1);

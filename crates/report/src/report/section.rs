@@ -65,8 +65,8 @@ impl Section {
         let content = if self.columns.is_empty() {
             page::list(&rows.flatten().chain(&self.more(most)).collect::<Vec<_>>())
         } else {
-            let more = self.more(most);
-            maud::html! { (page::numbers(&self.caption, self.columns, rows)) @if let Some(more) = more { p { (more) } } }
+            let (caption, more) = (format!("{}: {}", self.heading, self.caption), self.more(most));
+            maud::html! { (page::numbers(&caption, self.columns, rows)) @if let Some(more) = more { p { (more) } } }
         };
         page::section(self.heading, &[content])
     }
