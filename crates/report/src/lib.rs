@@ -17,5 +17,6 @@ pub mod replay;
 pub mod report;
 pub mod request;
 pub mod run;
+mod simplify;
 
 pub use tautline_sim::scenario;

@@ -12,7 +12,7 @@ use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::table::Table;
 use tautline_report::figures::Figure;
-use tautline_report::report::page::{self, Badge, Markup, Page, section};
+use tautline_report::report::page::{self, Badge, Markup, Page};
 use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::outputs::{self, Called, is_standard_output, write};
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
@@ -93,32 +93,20 @@ pub trait Study: Serialize {
     /// Returns the answer as a self-contained page. Two answers to the same question give the same bytes, except for
     /// the last section, on performance.
     fn to_html(&self, page: &StudyPage) -> String {
-        let mut sections: Vec<_> = self.sections().into_iter().map(Section::html).collect();
-        let mut add = |heading: &str, blocks: Vec<Markup>| {
-            if !blocks.is_empty() {
-                sections.push(section(heading, &blocks));
-            }
-        };
-        let list = |items: Vec<String>| if items.is_empty() { Vec::new() } else { vec![page::list(&items)] };
-        add("What to know", list(self.notes()));
-        for Section { heading, blocks, .. } in page.sections.clone() {
-            add(&heading, blocks.into_iter().map(Block::html).collect());
+        let mut whole = Page::new(self.kind(), self.title(), self.badge(), self.headline());
+        for Section { heading, blocks, .. } in self.sections() {
+            whole.add(&heading, blocks.into_iter().map(Block::html));
         }
-        add("What was assumed", list(self.assumptions()));
-        add("Repeat it", page.commands.iter().map(|command| page::command(command)).collect());
+        whole.add("What to know", [page::list(&self.notes())]);
+        for Section { heading, blocks, .. } in page.sections.clone() {
+            whole.add(&heading, blocks.into_iter().map(Block::html));
+        }
+        whole.add("What was assumed", [page::list(&self.assumptions())]);
+        whole.add("Repeat it", page.commands.iter().map(|command| page::command(command)));
         let repeat = |(what, command): &(String, String)| [page::list(&[what]), page::command(command)];
-        add("Fly it again", page.repeats.iter().flat_map(repeat).collect());
-        add("Performance", self.performance().iter().map(Table::html).collect());
-        let whole = Page {
-            title: self.title(),
-            kind: self.kind(),
-            badge: self.badge(),
-            verdict: self.headline(),
-            reasons: Vec::new(),
-            warnings: Vec::new(),
-            sections,
-        };
-        if page.has_replays { whole.render_with_replays() } else { whole.render() }
+        whole.add("Fly it again", page.repeats.iter().flat_map(repeat));
+        whole.add("Performance", self.performance().iter().map(Table::html));
+        whole.render()
     }
 }
 
@@ -163,10 +151,6 @@ impl Section {
     pub fn detail(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
         Self { is_detail: true, ..Self::new(heading, blocks) }
     }
-
-    fn html(self) -> Markup {
-        section(&self.heading, &self.blocks.into_iter().map(Block::html).collect::<Vec<_>>())
-    }
 }
 
 impl Block {
@@ -188,8 +172,6 @@ pub struct StudyPage {
     pub repeats: Vec<(String, String)>,
     /// More sections, such as pictures.
     pub sections: Vec<Section>,
-    /// Whether a section replays a flight, for which the page needs a script.
-    pub has_replays: bool,
 }
 
 /// Options of a study.
@@ -337,7 +319,7 @@ pub fn answer<E: Experiment>(
         let sections = options.illustrate(&base, &study, pictures);
         let arguments = options.arguments(&study);
         let command = scenario.command(E::COMMAND, arguments.iter().map(String::as_str), []);
-        let page = StudyPage { commands: vec![command], repeats, sections, has_replays: false };
+        let page = StudyPage { commands: vec![command], repeats, sections };
         write(file, study.to_html(&page).as_bytes(), monitor)?;
     }
     for (_, file) in files.outputs().filter(|(_, file)| !is_standard_output(file)) {

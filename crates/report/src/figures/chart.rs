@@ -115,6 +115,17 @@ impl Chart {
         self.line([self.x.from, self.x.to].map(|x| (x, y)).to_vec(), stroke, label);
     }
 
+    /// Adds a vertical line across the chart, which the legend may explain.
+    pub(super) fn upright(&mut self, x: f64, stroke: Stroke, label: Option<String>) {
+        self.lines.push(Line { points: [self.y.from, self.y.to].map(|y| (x, y)).to_vec(), stroke, label });
+    }
+
+    /// Adds the vertical line between the ends of an interval, if there is one.
+    pub(super) fn interval(&mut self, x: f64, ends: Option<[f64; 2]>, stroke: Stroke) {
+        let points = ends.into_iter().flatten().map(|y| (x, y)).collect();
+        self.lines.push(Line { points, stroke, label: None });
+    }
+
     /// Draws the chart under a title.
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };

@@ -15,8 +15,8 @@
 //! | [`smallest`] | the smallest distance of all of a recording |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
-//! | [`attack`](attack()) | the smallest separation that a search had found over its flights |
-//! | [`margin`](margin()) | the share of flights that show something over the values of a key |
+//! | [`attack`] | the smallest separation that a search had found over its flights |
+//! | [`margin`] | the share of flights that show something over the values of a key |
 //! | [`shares`] | the same of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
 //! | [`heat_map`](heat_map()) | a number over a grid of two keys |
@@ -29,28 +29,24 @@
 //! Charts use no fonts and no style but their own. They are drawn on a panel that is white, and dark where the reader
 //! prefers dark pages, in colours that colour-blind people tell apart.
 
-mod attack;
 mod axis;
 mod chart;
 mod distances;
 mod heat_map;
-mod histogram;
-mod margin;
 mod over_time;
 mod paths;
 mod recorded;
 mod spans;
+mod studies;
 mod svg;
 mod validation;
 
-pub use attack::attack;
 pub use distances::distances;
 pub use heat_map::{GridAxis, heat_map};
-pub use histogram::{Histogram, histograms};
-pub use margin::{Separation, Share, margin, separations, shares};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paths::{paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
+pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares};
 pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;

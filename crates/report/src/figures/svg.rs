@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use maud::{PreEscaped, html};
 
 use super::Figure;
+use crate::simplify::needed;
 
 /// A place on the drawing, to the right and down \[px\].
 pub(super) type Point = (f64, f64);
@@ -266,8 +267,7 @@ const TOLERANCE: f64 = 0.1;
 /// Most corners of a drawing, the ends of its lines not counted: some 120 kB.
 const MOST_CORNERS: usize = 12_000;
 
-/// The corners of lines that show: every corner left out lies within a tolerance of the line through the others
-/// (Ramer 1972, Douglas and Peucker 1973). The tolerance is a tenth of a pixel, and as much larger as it takes to keep at
+/// The corners of lines that show: every corner left out lies within a tolerance of the line through the others. The tolerance is a tenth of a pixel, and as much larger as it takes to keep at
 /// most [`MOST_CORNERS`]. The ends are kept, so are extremes.
 pub(super) fn thinned<T>(mut lines: Vec<(T, Vec<Point>)>) -> Vec<(T, Vec<Point>)> {
     let weights: Vec<_> = lines.iter().map(|(_, points)| weights(points)).collect();
@@ -289,16 +289,8 @@ fn weights(points: &[Point]) -> Vec<f64> {
     let mut weights = vec![0.0; points.len()];
     let Some(end) = points.len().checked_sub(1) else { return weights };
     (weights[0], weights[end]) = (f64::INFINITY, f64::INFINITY);
-    let mut stretches = vec![(0, end)];
-    while let Some((from, to)) = stretches.pop() {
-        let farthest = (from + 1..to)
-            .map(|k| (k, distance(points[k], points[from], points[to])))
-            .fold((from, TOLERANCE), |farthest, candidate| if candidate.1 > farthest.1 { candidate } else { farthest });
-        if farthest.0 != from {
-            // A point is only looked at where both ends of its stretch are kept.
-            weights[farthest.0] = farthest.1.min(weights[from]).min(weights[to]);
-            stretches.extend([(from, farthest.0), (farthest.0, to)]);
-        }
+    for (k, weight) in needed(&[0, end], TOLERANCE, |k, from, to| distance(points[k], points[from], points[to])) {
+        weights[k] = weight;
     }
     weights
 }

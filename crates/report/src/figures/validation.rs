@@ -28,8 +28,7 @@ pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
     let x = Axis::linear("distance l [m]", [0.0, far], false);
     let mut chart = Chart::new(x, Axis::linear("tension V [m²/s²]", [0.0, top], true));
     chart.line(points, Stroke::solid(PALETTE[0], 1.8), "V(l)");
-    let barrier = [chart.y.from, chart.y.to].map(|y| (delta_m, y)).to_vec();
-    chart.line(barrier, Stroke::solid(INK, 1.6), format!("barrier δ = {delta_m} m"));
+    chart.upright(delta_m, Stroke::solid(INK, 1.6), Some(format!("barrier δ = {delta_m} m")));
     let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m²/s²", tension.minimum());
     let description = format!("Edge tension over distance: it grows without bound towards {delta_m} m; {minimum}.");
     chart.marks.push(Mark::ring((rest_m, 0.0), PALETTE[1], Some(minimum)));

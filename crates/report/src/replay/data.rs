@@ -4,13 +4,11 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::chart::Chart;
-use super::decimate::{MOST_INSTANTS, Span, around_worst, chosen};
+use super::decimate::{MOST_INSTANTS, Span, around_worst, breaks, chosen, place_of_weightiest, present, shown};
 use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
-use super::stage::Extent;
+use super::stage::{Extent, Targets, targets_of};
 use super::statements::{self, Statement, Words};
-use super::targets::{self, Targets};
-use super::visible::{breaks, place_of_weightiest, present, shown};
 use super::{
     Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
 };
@@ -156,7 +154,7 @@ impl Replay {
         let shown = shown(&times_s, &present, listed, room_bytes);
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
         let plan = stage.plan_of(log);
-        let (targets, guides) = targets::of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
+        let (targets, guides) = targets_of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let (nearest, holds) = (log.nearest(), log.holds);
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
         let [near_s, near_who] = statements::pairs(&near, end_s, place);

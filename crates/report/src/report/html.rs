@@ -2,18 +2,21 @@
 
 use maud::{Markup, html};
 
-use super::flight::{Performance, Report, Violation};
-use super::page::{self, Badge, Page, Picture, Start, noted, section};
+use super::flight::{Report, Violation};
+use super::obstacles::Obstacles;
+use super::page::{self, Badge, Page, Picture, Start};
+use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
-use tautline_core::text::{at_least, seconds, significant};
+use tautline_core::text::{at_least, metres, seconds, significant};
 use tautline_laws::formation::Freedom;
+use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::vehicle::Airframe;
 
 /// Most violations, or hits of hulls, that are listed one by one.
-pub(super) const LISTED: usize = 50;
+const LISTED: usize = 50;
 
 /// Most bytes of a scenario on a page.
 const LONGEST_SCENARIO: usize = 100_000;
@@ -23,8 +26,8 @@ const LONGEST_SCENARIO: usize = 100_000;
 pub struct RunPage<'a> {
     /// What was flown.
     pub scenario: &'a Scenario,
-    /// What was known to be doubtful before the first step.
-    pub warnings: &'a [(String, String)],
+    /// Findings before the first step.
+    pub preflight: &'a Preflight,
     /// The flight itself, or why it cannot be replayed.
     pub replay: &'a Result<Replay, NoReplay>,
     /// The run as charts.
@@ -38,140 +41,43 @@ pub struct RunPage<'a> {
 impl Report {
     /// The report as a self-contained HTML page.
     ///
-    /// Two runs of one scenario give the same bytes but for the table of performance.
+    /// Two runs of one scenario give the same bytes but for the last section, on performance.
     #[must_use]
-    pub fn to_html(&self, page: &RunPage<'_>) -> String {
-        self.page(page).render_with_replays()
+    pub fn to_html(&self, about: &RunPage<'_>) -> String {
+        let badge = Badge::judged(self.verdict.pass);
+        let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, self.headline());
+        page.reasons.clone_from(&self.verdict.reasons);
+        let warnings = about.preflight.warnings.iter();
+        page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();
+        page.add("Replay", [page::replay(&self.scenario.name, about.replay, Start::AtOnce)]);
+        let rows = self.rows().into_iter().map(<[String; 2]>::from);
+        page.add("Findings", [page::words("Findings", &["Part", "Finding"], rows)]);
+        page.sections.extend(self.sections().iter().map(|section| section.html(LISTED)));
+        page.add("Pictures", [page::pictures(about.pictures)]);
+        page.add("Figures", [page::figures(about.figures)]);
+        page.add("What was assumed", [page::list(&self.assumptions(about.scenario))]);
+        page.add("Repeat it", [self.repetition(about)]);
+        page.add("Performance", self.performance.map(|times| page::list(&[times.line()])));
+        page.render()
     }
 
-    fn page(&self, page: &RunPage<'_>) -> Page {
-        let tables = [self.separation_table(), self.formation_table(), self.control_table(), self.run_table()];
-        let replay = match page.replay {
-            Ok(replay) => page::replay(&self.scenario.name, replay, Start::AtOnce),
-            Err(why) => page::no_replay(&why.to_string()),
-        };
-        let mut sections = vec![section("Replay", &[replay])];
-        sections.push(section("Numbers", &[html! { div.tables { @for table in tables { (table) } } }]));
-        if !self.legs.is_empty() {
-            sections.push(section("Legs", &[super::legs::table(&self.legs)]));
-        }
-        if !self.audit.violations.is_empty() {
-            sections.push(section("Violations", &[self.violations()]));
-        }
-        if let Some(bounces) = self.hulls.bounces.as_deref().filter(|bounces| !bounces.is_empty()) {
-            sections.push(section("Hulls that hit", &[hits(bounces)]));
-        }
-        if !page.pictures.is_empty() {
-            sections.push(section("Pictures", &[page::pictures(page.pictures)]));
-        }
-        if let Some(obstacles) = &self.obstacles {
-            sections.push(section("Obstacles", &[obstacles.table()]));
-        }
-        if !page.figures.is_empty() {
-            sections.push(section("Figures", &[page::figures(page.figures)]));
-        }
-        sections.push(section("What was assumed", &[page::list(&self.assumptions(page.scenario))]));
-        sections.push(section("Repeat it", &[self.repetition(page)]));
-        sections.extend(self.performance.map(|times| section("Performance", &[times.table()])));
-        Page {
-            title: self.scenario.name.clone(),
-            kind: "Flight report",
-            badge: Badge::judged(self.verdict.pass),
-            verdict: self.headline(),
-            reasons: self.verdict.reasons.clone(),
-            warnings: page.warnings.to_vec(),
-            sections,
-        }
-    }
-
-    fn separation_table(&self) -> Markup {
-        let Self { separation, audit, .. } = self;
-        let pair = separation.min_pair.map(|[first, second]| format!("vehicles {first} and {second}"));
-        let at = separation.min_at_s.map(|at_s| format!("at {}", seconds(at_s)));
-        let closest = [pair, at].into_iter().flatten().collect::<Vec<_>>().join(" ");
-        let certificate = if separation.certified_m.is_some() {
-            let anew = self.changes().map(|changes| format!(", and anew at {changes}"));
-            let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
-            format!("promised before the first step{}{}", anew.unwrap_or_default(), until.unwrap_or_default())
-        } else {
-            separation.certificate_void.join(" ")
-        };
-        let sweep = format!("{} steps and {} pairs swept", audit.steps, audit.pairs_checked);
-        let contacts = audit.rapier.contact_pairs.map_or(NOT_KNOWN.to_owned(), |pairs| pairs.to_string());
-        let caption = match &separation.ellipsoid {
-            Some(ellipsoid) => &format!("Separation, in lengths scaled to ellipsoids; {}", ellipsoid.line()),
-            None => "Separation",
-        };
-        numbers(
-            caption,
-            [
-                ("Safety distance δ", with_unit(Some(separation.delta_m), "m"), "what is judged by"),
-                ("Smallest distance", proved_m(separation.min_m), &closest),
-                ("Certified distance", proved_m(separation.certified_m), &certificate),
-                ("Audit", audit.status.name().to_owned(), &sweep),
-                ("Violations", audit.violations.len().to_string(), "times that a pair was closer than δ"),
-                ("Disagreements", audit.parry.disagreements.to_string(), "of closed form and shape cast"),
-                ("Contacts seen by the engine", contacts, "pairs whose keep-out balls overlapped"),
-            ],
-        )
-    }
-
-    fn formation_table(&self) -> Markup {
-        let Self { formation, velocity, .. } = self;
-        let reached = formation.reached_at_s.map_or("not reached".to_owned(), seconds);
-        numbers(
-            "Formation",
-            [
-                ("Reached", reached, "and kept from then on to the end"),
-                ("Largest edge error", with_unit(formation.max_edge_error_m, "m"), "at the end"),
-                ("Position error", with_unit(formation.max_position_error_m, "m"), "largest of a vehicle, at the end"),
-                ("Velocity disagreement", with_unit(velocity.disagreement_m_s, "m/s"), "at the end"),
-                ("Common velocity", with_unit(velocity.common_m_s, "m/s"), "at the end"),
-            ],
-        )
-    }
-
-    fn control_table(&self) -> Markup {
-        let Self { energy, control, .. } = self;
-        numbers(
-            "Energy and control",
-            [
-                ("Initial energy E(0)", with_unit(energy.initial, "m²/s²"), ""),
-                ("Final energy", with_unit(energy.at_end, "m²/s²"), ""),
-                ("Largest energy over E(0)", with_unit(energy.max_over_initial, ""), "over all steps"),
-                ("Peak control", with_unit(control.peak_m_s2, "m/s²"), "over all steps"),
-                ("Final control", with_unit(control.final_m_s2, "m/s²"), ""),
-            ],
-        )
-    }
-
-    fn run_table(&self) -> Markup {
-        let run = &self.run;
-        numbers(
-            "Run",
-            [
-                ("Vehicles", run.vehicles.to_string(), ""),
-                ("Duration", with_unit(Some(run.duration_s), "s"), ""),
-                ("Step", with_unit(Some(run.dt_s * 1e3), "ms"), ""),
-                ("Steps", run.steps.to_string(), ""),
-            ],
-        )
-    }
-
-    fn violations(&self) -> Markup {
-        let violations = &self.audit.violations;
-        let row = |violation: &Violation| {
+    /// Returns the lists of findings of the page.
+    fn sections(&self) -> Vec<Section> {
+        let violation = |violation: &Violation| {
             let [from, to, at] = [violation.from_s, violation.to_s, violation.min_at_s].map(seconds);
-            [violation.pair.to_string(), from, to, proved_m(Some(violation.min_m)), at]
+            [violation.pair.to_string(), from, to, format!("{} m", at_least(violation.min_m, 6)), at]
         };
-        html! {
-            (page::numbers(
-                "Times that a pair was closer than δ",
-                &["Vehicles", "From", "To", "Smallest", "At"],
-                violations.iter().take(LISTED).map(row),
-            ))
-            (more(violations.len()))
-        }
+        let columns = &["Vehicles", "From", "To", "Smallest", "At"];
+        let caption = "times that a pair was closer than delta";
+        let violations = Section::table("Violations", caption, columns, self.audit.violations.iter().map(violation));
+        let hit = |bounce: &Bounce| {
+            [bounce.pair.to_string(), seconds(bounce.time_s), format!("{} m/s", metres(bounce.closing_m_s))]
+        };
+        let caption = "after the first hit the motion is not governed by the law";
+        let hits = self.hulls.bounces.iter().flatten().map(hit);
+        let hits = Section::table("Hulls that hit", caption, &["Vehicles", "At", "Closing speed"], hits);
+        let obstacles = self.obstacles.iter().flat_map(Obstacles::sections);
+        [violations, hits].into_iter().chain(obstacles).filter(|section| !section.rows.is_empty()).collect()
     }
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
@@ -240,26 +146,6 @@ impl Report {
     }
 }
 
-impl Performance {
-    fn table(&self) -> Markup {
-        let spent = [
-            ("From first to last step", Some(self.wall_s), "s"),
-            ("Time flown over that", self.real_time_factor, ""),
-            ("In the law", Some(self.law_s), "s"),
-            ("In its energy", Some(self.energy_s), "s"),
-            ("In the physics", Some(self.physics_s), "s"),
-            ("Of that, in forces, rotors and attitude loops", Some(self.airframe_s), "s"),
-            ("In the audit", Some(self.audit_s), "s"),
-            ("In the recorders", Some(self.record_s), "s"),
-        ];
-        page::numbers(
-            "Wall-clock time, which alone differs from run to run",
-            &["Where", "Time"],
-            spent.map(|(name, number, unit)| [name.to_owned(), with_unit(number, unit)]),
-        )
-    }
-}
-
 /// The resolved scenario, or so many of its lines as a page has room for.
 fn folded_scenario(toml: &str, sha256: &str) -> Markup {
     let end = toml.floor_char_boundary(LONGEST_SCENARIO);
@@ -271,29 +157,6 @@ fn folded_scenario(toml: &str, sha256: &str) -> Markup {
         details {
             summary { "The resolved scenario, SHA-256 " (sha256) (part) }
             pre tabindex="0" { code { (toml[..end]) } }
-        }
-    }
-}
-
-/// The times that two hulls hit.
-fn hits(bounces: &[Bounce]) -> Markup {
-    let row =
-        |bounce: &Bounce| [bounce.pair.to_string(), seconds(bounce.time_s), with_unit(Some(bounce.closing_m_s), "m/s")];
-    html! {
-        (page::numbers(
-            "From the first on, a bounce is flown and not the law's motion",
-            &["Vehicles", "At", "Closing speed"],
-            bounces.iter().take(LISTED).map(row),
-        ))
-        (more(bounces.len()))
-    }
-}
-
-/// The number of entries of a list that are not on the page.
-pub(super) fn more(all: usize) -> Markup {
-    html! {
-        @if let Some(more @ 1..) = all.checked_sub(LISTED) {
-            p { (more) " more are in report.json." }
         }
     }
 }
@@ -343,30 +206,6 @@ fn plant(scenario: &Scenario) -> (String, &'static str) {
             "recorded; the motion between follows the law in continuous time",
         ),
     }
-}
-
-const NOT_KNOWN: &str = "–";
-
-/// A table of quantities: their names, their values, and remarks on them.
-fn numbers<const N: usize>(caption: &str, rows: [(&str, String, &str); N]) -> Markup {
-    let row = |(name, value, remark): (&str, String, &str)| {
-        let name = if remark.is_empty() {
-            html! { (name) }
-        } else {
-            noted(name, remark)
-        };
-        [name, html! { (value) }]
-    };
-    page::numbers(caption, &["Quantity", "Value"], rows.map(row))
-}
-
-fn with_unit(number: Option<f64>, unit: &str) -> String {
-    number.map_or(NOT_KNOWN.to_owned(), |number| format!("{} {unit}", short(number)).trim_end().to_owned())
-}
-
-/// A distance that is not larger than what was found.
-fn proved_m(distance_m: Option<f64>) -> String {
-    distance_m.map_or(NOT_KNOWN.to_owned(), |distance_m| format!("{} m", at_least(distance_m, 6)))
 }
 
 /// A number with six significant digits at most, without zeros at its end; very small and very large ones in powers of

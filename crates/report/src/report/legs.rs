@@ -1,10 +1,8 @@
 //! The legs of a flight, one after the other.
 
-use maud::Markup;
 use serde::{Deserialize, Serialize};
 
 use super::flight::{FlightResult, finite};
-use super::page;
 use tautline_core::text::{at_least, seconds};
 use tautline_sim::metrics::LegSummary;
 
@@ -94,19 +92,4 @@ pub(super) fn lines(legs: &[LegNumbers]) -> Vec<(String, String)> {
         (format!("leg {}", leg.leg), said + &certified.unwrap_or_default())
     };
     legs.iter().map(line).collect()
-}
-
-pub(super) fn table(legs: &[LegNumbers]) -> Markup {
-    let dash = || "-".to_owned();
-    let row = |leg: &LegNumbers| {
-        vec![
-            leg.leg.to_string(),
-            leg.from_s.map_or_else(dash, seconds),
-            leg.reached_at_s.map_or_else(|| "not reached".to_owned(), seconds),
-            leg.to_s.map_or_else(dash, seconds),
-            leg.certified_m.map_or_else(dash, |certified_m| format!("{} m", at_least(certified_m, 6))),
-        ]
-    };
-    let heads = ["Leg", "Began", "Reached", "Ended", "Certified distance"];
-    page::numbers("Legs, one after the other", &heads, legs.iter().map(row))
 }

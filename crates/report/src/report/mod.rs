@@ -14,6 +14,7 @@ mod moments;
 mod obstacles;
 pub mod page;
 pub mod recorded;
+mod section;
 mod verdict;
 mod words;
 

@@ -1,11 +1,9 @@
 //! How vehicles kept clear of obstacles.
 
-use maud::{Markup, html};
 use serde::{Deserialize, Serialize};
 
 use super::flight::{FlightResult, finite};
-use super::html::{LISTED, more};
-use super::page;
+use super::section::Section;
 use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
@@ -143,35 +141,26 @@ impl Obstacles {
         violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
     }
 
-    /// The closest approaches, with what is certified, and the violations, for a page.
-    pub(super) fn table(&self) -> Markup {
+    /// Returns the closest approaches, with the certified distance, and the violations.
+    pub(super) fn sections(&self) -> [Section; 2] {
         let cells = |approach: &ObstacleApproach| {
             let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = approach;
             [vehicle.to_string(), obstacle.clone(), metres(*clearance_m), shown(*min_m), seconds(*min_at_s)]
         };
         let certified = match self.certified_room_m {
-            Some(room_m) => format!("certified {} m beyond every clearance", at_least(room_m, 6)),
-            None => "nothing is certified".to_owned(),
+            Some(room_m) => format!("closest approaches; certified {} m beyond every clearance", at_least(room_m, 6)),
+            None => "closest approaches; nothing is certified".to_owned(),
         };
-        let violations = self.violations.iter().take(LISTED);
-        html! {
-            (page::numbers(
-                &format!("The closest that vehicles came to obstacles; {certified}"),
-                &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At"],
-                self.closest.iter().map(cells),
-            ))
-            @if !self.violations.is_empty() {
-                (page::numbers(
-                    "Times that a vehicle was nearer to an obstacle than its clearance",
-                    &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At", "From", "To"],
-                    violations.map(|violation| {
-                        let [vehicle, obstacle, clearance, min, at] = cells(&violation.approach);
-                        [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
-                    }),
-                ))
-                (more(self.violations.len()))
-            }
-        }
+        let violations = self.violations.iter().map(|violation| {
+            let [vehicle, obstacle, clearance, min, at] = cells(&violation.approach);
+            [vehicle, obstacle, clearance, min, at, seconds(violation.from_s), seconds(violation.to_s)]
+        });
+        let columns = &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At"];
+        let longer = &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At", "From", "To"];
+        [
+            Section::table("Obstacles", certified, columns, self.closest.iter().map(cells)),
+            Section::table("Violations of clearance", "times that a vehicle was too near", longer, violations),
+        ]
     }
 
     /// One line of a table.

@@ -35,7 +35,7 @@ impl Verdict {
             report.hulls.reason(),
             disagreement(result),
             undecided(result),
-            broken_certificate(result),
+            broken_certificate(report),
             steps_too_long(result),
             risen_energy(result),
             ended_early(report),
@@ -226,11 +226,9 @@ fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
 
 /// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
 /// numbers that ran out of digits.
-fn broken_certificate(result: &FlightResult<'_>) -> Option<String> {
-    let (certified_m, closest) = (result.flight.certificate.certified_m?, result.flight.audit.closest?);
-    let holds = result.flight.certificate.certified_until_s.is_none_or(|until_s| closest.time_s <= until_s);
-    let breaks = holds && breaks_certificate(closest.separation_m, certified_m, result.scenario.delta_m);
-    breaks.then(|| {
+fn broken_certificate(report: &Report) -> Option<String> {
+    let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
+    report.breaks_certificate().then(|| {
         format!(
             "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
              the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",

@@ -1,6 +1,7 @@
 //! A report in words: one line, and a table.
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
+use super::obstacles::Obstacles;
 use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds, table};
@@ -108,7 +109,7 @@ impl Report {
             Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
             None => String::new(),
         };
-        let room = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::room);
+        let room = self.obstacles.as_ref().and_then(Obstacles::room);
         let room = room.map(|room| format!(", {room}")).unwrap_or_default();
         format!(
             "{closest}{} (delta {} m){room}{broken}{rose}, {}",
@@ -153,7 +154,7 @@ impl Report {
     }
 
     fn deepest_in_words(&self) -> String {
-        let of_obstacles = self.obstacles.as_ref().and_then(super::obstacles::Obstacles::brief);
+        let of_obstacles = self.obstacles.as_ref().and_then(Obstacles::brief);
         if let Some(of_obstacles) = of_obstacles {
             let is_alone = self.audit.violations.is_empty();
             return if is_alone { of_obstacles } else { format!("{}; {of_obstacles}", self.deepest_pair_in_words()) };
@@ -176,32 +177,39 @@ impl Report {
         )
     }
 
-    /// The numbers as a short table, a line each, with a line end.
+    /// The findings as a short table, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
+        let times = self.performance.map(|times| ("performance".to_owned(), times.line()));
+        table(self.rows().into_iter().chain(times))
+    }
+
+    /// Returns the name of each part of the flight, and the finding on it. Wall-clock times are not part of it.
+    pub(super) fn rows(&self) -> Vec<(String, String)> {
         let (control, velocity) = (&self.control, &self.velocity);
         let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
         let [disagreement, common] = [velocity.disagreement_m_s, velocity.common_m_s].map(or_dash);
-        let mut rows: Vec<(String, String)> =
-            vec![("separation".to_owned(), self.separation_line()), ("audit".to_owned(), self.audit_line())];
-        let ellipsoid = self.separation.ellipsoid.iter();
-        rows.extend(ellipsoid.map(|ellipsoid| ("ellipsoids".to_owned(), ellipsoid.line())));
-        rows.extend(self.obstacles.iter().map(|obstacles| ("obstacles".to_owned(), obstacles.line())));
-        rows.extend(self.network.iter().map(|network| ("network".to_owned(), network_line(network))));
         let failed = (!self.failures.is_empty()).then(|| FailedVehicle::line(&self.failures));
-        rows.extend(failed.map(|line| ("failed".to_owned(), line)));
-        rows.extend(self.vehicle.iter().map(|vehicle| ("vehicle".to_owned(), vehicle.line())));
-        rows.extend(super::legs::lines(&self.legs));
-        let rest = [
-            ("formation", self.formation_line()),
-            ("energy", self.energy_line()),
-            ("control", format!("peak {peak}, final {last} m/s^2")),
-            ("velocity", format!("disagreement {disagreement}, common {common} m/s")),
-            ("run", self.run_line()),
+        let first = [
+            ("separation", Some(self.separation_line())),
+            ("audit", Some(self.audit_line())),
+            ("ellipsoids", self.separation.ellipsoid.as_ref().map(Ellipsoid::line)),
+            ("obstacles", self.obstacles.as_ref().map(Obstacles::line)),
+            ("network", self.network.as_ref().map(network_line)),
+            ("failed", failed),
+            ("vehicle", self.vehicle.as_ref().map(VehicleNumbers::line)),
         ];
-        let times = self.performance.map(|times| ("performance", times.line()));
-        rows.extend(rest.into_iter().chain(times).map(|(name, line)| (name.to_owned(), line)));
-        table(rows)
+        let rest = [
+            ("formation", Some(self.formation_line())),
+            ("energy", Some(self.energy_line())),
+            ("control", Some(format!("peak {peak}, final {last} m/s^2"))),
+            ("velocity", Some(format!("disagreement {disagreement}, common {common} m/s"))),
+            ("run", Some(self.run_line())),
+            ("verified", self.verification.as_ref().map(Verification::line)),
+        ];
+        let named = |(name, line): (&str, Option<String>)| Some((name.to_owned(), line?));
+        let legs = super::legs::lines(&self.legs);
+        first.into_iter().filter_map(named).chain(legs).chain(rest.into_iter().filter_map(named)).collect()
     }
 
     fn separation_line(&self) -> String {
@@ -284,7 +292,7 @@ impl Report {
 }
 
 impl Performance {
-    fn line(self) -> String {
+    pub(super) fn line(self) -> String {
         let Self { wall_s, real_time_factor, law_s, energy_s, physics_s, airframe_s, audit_s, record_s } = self;
         let airframe = if airframe_s > 0.0 { format!(", {airframe_s:.3} of it airframes") } else { String::new() };
         let factor = real_time_factor.map_or("-".to_owned(), |factor| format!("{factor:.1}"));
@@ -296,8 +304,7 @@ impl Performance {
 }
 
 impl Ellipsoid {
-    /// In words, without the name of the line.
-    pub(super) fn line(&self) -> String {
+    fn line(&self) -> String {
         let axes = self.half_axes_m.map(metres).join(", ");
         let closest = self.min_distance_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
         let pair = self.min_distance_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
@@ -319,7 +326,7 @@ impl FailedVehicle {
 }
 
 impl VehicleNumbers {
-    pub(super) fn line(&self) -> String {
+    fn line(&self) -> String {
         let Self { model, max_tilt_deg, thrust_share } = self;
         format!(
             "{model}, tilted by {max_tilt_deg:.1} degrees at most, rotors at {:.0} % of their most",
@@ -329,9 +336,7 @@ impl VehicleNumbers {
 }
 
 impl Verification {
-    /// In one line.
-    #[must_use]
-    pub fn text(&self) -> String {
+    fn line(&self) -> String {
         let firm = if self.firm { "firm" } else { "NOT FIRM, what happens depends on the step" };
         let pass = if self.pass { "passes" } else { "does not pass" };
         let min_m = self.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));

@@ -13,20 +13,16 @@
 pub mod audit;
 mod export;
 mod failure;
-mod folder;
 mod monitor;
 pub mod outputs;
-mod pictures;
 mod run;
 mod scenario;
-mod text_file;
 
 pub use audit::{AuditRequest, Audited, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
 pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
-pub use folder::{OutFolder, try_to_write_in};
-pub use monitor::{Monitor, Quiet, Silent};
-pub use pictures::{NamedPicture, PICTURES_BYTES, Pictures};
+pub use monitor::{Monitor, NamedPicture, PICTURES_BYTES, Pictures, Quiet, Silent};
+pub use outputs::{OutFolder, try_to_write_in};
 pub use run::{RECORDING, RunFiles, RunRequest, flight_page, replay_of_run, run_into, svg_files, threads, write_files};
 pub use scenario::{ScenarioRequest, command_line};
 pub use tautline_recordings::read::ReadOptions;

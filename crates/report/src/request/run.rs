@@ -109,7 +109,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let replay = replay_of_run(scenario, &log, &report, PAGE_BYTES);
     let page = RunPage {
         scenario,
-        warnings: &warnings(&preflight),
+        preflight: &preflight,
         replay: &replay,
         figures: &figures,
         pictures: &pictures.iter().map(|(_, picture)| picture.clone()).collect::<Vec<_>>(),
@@ -121,9 +121,6 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     monitor.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
         monitor.say(reason);
-    }
-    if let Some(verification) = &report.verification {
-        monitor.say(&format!("{:<12} {}", "verified", verification.text()));
     }
     monitor.say(&format!(
         "wrote {}, {} and {}",
@@ -203,11 +200,6 @@ fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure>
     figures::of_run(log, &criteria)
 }
 
-/// Codes and messages of the warnings before the first step.
-fn warnings(preflight: &Preflight) -> Vec<(String, String)> {
-    preflight.warnings.iter().map(|warning| (warning.code.name().to_owned(), warning.message.clone())).collect()
-}
-
 /// The page on a flight that the caller has flown itself, which `command` flies again; without pictures.
 #[must_use]
 pub fn flight_page(
@@ -222,8 +214,7 @@ pub fn flight_page(
     }
     let figures = figures(scenario, &log, report);
     let replay = replay_of_run(scenario, &log, report, PAGE_BYTES);
-    let warnings = warnings(preflight);
-    let page = RunPage { scenario, warnings: &warnings, replay: &replay, figures: &figures, pictures: &[], command };
+    let page = RunPage { scenario, preflight, replay: &replay, figures: &figures, pictures: &[], command };
     report.to_html(&page)
 }
 

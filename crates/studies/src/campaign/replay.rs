@@ -54,16 +54,12 @@ impl WorstFlight {
         if flights.is_empty() {
             blocks.push(page::list(&["There are none."]));
         }
-        if !pictures.is_empty() {
-            blocks.push(page::pictures(&pictures));
-        }
+        blocks.push(page::pictures(&pictures));
         for flight in flights {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
             blocks.push(page::list(&std::iter::once(flight.said.clone()).chain(recording).collect::<Vec<_>>()));
-            blocks.extend(flight.replay.as_ref().map(|replay| match replay {
-                Ok(replay) => page::replay(&flight.said, replay, Start::OnDemand),
-                Err(why) => page::no_replay(&why.to_string()),
-            }));
+            let replay = flight.replay.as_ref();
+            blocks.extend(replay.map(|replay| page::replay(&flight.said, replay, Start::OnDemand)));
             blocks.push(page::command(&flight.command));
         }
         Section::new("The worst flights", blocks.into_iter().map(Block::Page))

@@ -254,7 +254,6 @@ fn answer(
     let page = StudyPage {
         commands: vec![command, folder.campaign().manifest().spec.clone()],
         sections: vec![WorstFlight::section(&flights)],
-        has_replays: flights.iter().any(|flight| flight.replay.is_some()),
         ..StudyPage::default()
     };
     write_atomically(&path, summary.to_html(&page).as_bytes())?;

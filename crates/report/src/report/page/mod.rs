@@ -8,7 +8,7 @@ mod replay;
 
 use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
-pub use replay::{Start, no_replay, replay};
+pub use replay::{Start, replay};
 
 use crate::figures::Figure;
 use tautline_core::text::in_order;
@@ -87,19 +87,24 @@ impl Render for Badge {
 }
 
 impl Page {
-    /// The page as HTML, in which nothing runs.
+    /// Returns a page without reasons, warnings and sections.
+    #[must_use]
+    pub fn new(kind: &'static str, title: String, badge: Badge, verdict: String) -> Self {
+        Self { title, kind, badge, verdict, reasons: Vec::new(), warnings: Vec::new(), sections: Vec::new() }
+    }
+
+    /// Adds a [`section`], unless its content is empty.
+    pub fn add(&mut self, heading: &str, content: impl IntoIterator<Item = Markup>) {
+        let content: Vec<_> = content.into_iter().filter(|block| !block.0.is_empty()).collect();
+        if !content.is_empty() {
+            self.sections.push(section(heading, &content));
+        }
+    }
+
+    /// Returns the page as HTML. Only if a section holds a [`replay`], the page has a script, which draws it.
     #[must_use]
     pub fn render(&self) -> String {
-        self.whole(false)
-    }
-
-    /// The page as HTML with the one script that draws the [`replay`]s of its sections.
-    #[must_use]
-    pub fn render_with_replays(&self) -> String {
-        self.whole(true)
-    }
-
-    fn whole(&self, replays: bool) -> String {
+        let replays = self.sections.iter().any(|section| section.0.contains(replay::ELEMENT));
         let policy = if replays { format!("{POLICY}; {}", replay::script_source()) } else { POLICY.to_owned() };
         let page = html! {
             (DOCTYPE)
@@ -152,20 +157,20 @@ pub fn section(heading: &str, content: &[Markup]) -> Markup {
     }
 }
 
-/// A list of sentences.
+/// A list of sentences; nothing if there are none.
 #[must_use]
 pub fn list(items: &[impl Render]) -> Markup {
-    html! { ul { @for item in items { li { (item) } } } }
+    html! { @if !items.is_empty() { ul { @for item in items { li { (item) } } } } }
 }
 
-/// Figures side by side, as many as fit.
+/// Figures side by side, as many as fit; nothing if there are none.
 #[must_use]
 pub fn figures(figures: &[Figure]) -> Markup {
     let figure = |figure: &Figure| (PreEscaped(&figure.svg).render(), figure.description.clone());
     side_by_side(figures.iter().map(figure))
 }
 
-/// Pictures side by side, as many as fit.
+/// Pictures side by side, as many as fit; nothing if there are none.
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
     side_by_side(pictures.iter().map(|Picture { description, data_uri }| {
@@ -174,7 +179,12 @@ pub fn pictures(pictures: &[Picture]) -> Markup {
 }
 
 fn side_by_side(drawn: impl Iterator<Item = (Markup, String)>) -> Markup {
-    html! { div.figures { @for (drawn, description) in drawn { figure { (drawn) figcaption { (description) } } } } }
+    let mut drawn = drawn.peekable();
+    html! {
+        @if drawn.peek().is_some() {
+            div.figures { @for (drawn, description) in drawn { figure { (drawn) figcaption { (description) } } } }
+        }
+    }
 }
 
 /// A command to be typed.

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use maud::{Markup, PreEscaped, html};
 use sha2::{Digest as _, Sha256};
 
-use crate::replay::{Chart, Replay};
+use crate::replay::{Chart, NoReplay, Replay};
 use tautline_core::text::{counted, metres};
 
 /// How they look.
@@ -52,10 +52,16 @@ pub enum Start {
     OnDemand,
 }
 
-/// A replay with a name for those who cannot see it. The page is to be rendered with
-/// [`render_with_replays`](super::Page::render_with_replays).
+/// The beginning of the element of a replay. Escaped text cannot contain it.
+pub(super) const ELEMENT: &str = "<div class=\"replay\"";
+
+/// A replay with a name for readers who cannot see it, or the reason why there is no replay.
 #[must_use]
-pub fn replay(label: &str, replay: &Replay, start: Start) -> Markup {
+pub fn replay(label: &str, replay: &Result<Replay, NoReplay>, start: Start) -> Markup {
+    let replay = match replay {
+        Ok(replay) => replay,
+        Err(why) => return html! { p { "There is no replay: " (why) "." } },
+    };
     let on_demand = start == Start::OnDemand;
     html! {
         div.replay data-label=(label) data-start=[on_demand.then_some("later")] {
@@ -88,12 +94,6 @@ fn chart(chart: &Chart) -> Markup {
             }
         }
     }
-}
-
-/// Why there is none.
-#[must_use]
-pub fn no_replay(why: &str) -> Markup {
-    html! { p { "There is no replay: " (why) "." } }
 }
 
 /// What of it is true and what is for the eye.

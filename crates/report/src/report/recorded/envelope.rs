@@ -62,11 +62,9 @@ impl OfCorners {
 
 impl OfLimit {
     pub(super) fn new(found: &LimitOutcome, outcome: &Outcome) -> Self {
-        let named = |of: &Exceeding| OfVehicle { vehicle: outcome.name(of.vehicle), finding: *of };
-        let corners = found.corners.map(|of| OfCorners {
-            count: of.count,
-            largest: OfVehicle { vehicle: outcome.name(of.largest.vehicle), finding: of.largest },
-        });
+        let named = |of: &Exceeding| OfVehicle::new(outcome, of.vehicle, *of);
+        let largest = |of: Corner| OfVehicle::new(outcome, of.vehicle, of);
+        let corners = found.corners.map(|of| OfCorners { count: of.count, largest: largest(of.largest) });
         let assumes: Vec<_> = found.assumes.iter().cloned().chain(corners.as_ref().map(OfCorners::assumed)).collect();
         Self {
             quantity: found.limit.quantity.key(),

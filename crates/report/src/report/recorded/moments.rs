@@ -7,7 +7,6 @@ use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::envelope::Exceeding;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair};
 use tautline_audit::{Undecided, Violation};
-use tautline_core::text::{exact, metres_below};
 
 impl RecordedReport {
     /// The closest approach, every violation, every time that cannot be decided and every gap, the weightiest first, with the
@@ -18,8 +17,12 @@ impl RecordedReport {
         let mut violations: Vec<_> = self.violations.iter().map(OfPair::short).collect();
         violations.sort_by(|a, b| over(&a.finding).total_cmp(&over(&b.finding)));
         let closest = self.closest.first().or(self.obstacles.closest.first());
-        let closest = closest.map(|of| self.closest_moment(&of.short()));
-        let violations = violations.iter().map(|of| self.violation(of));
+        let unit = self.judgement().unit;
+        let closest = closest.map(OfPair::short).map(|of| {
+            let &Approach { pair, lower_m, upper_m, time_s, .. } = &of.finding;
+            Moment::closest(pair, &of.names(), &format!("{} {unit}", interval(lower_m, upper_m)), time_s)
+        });
+        let violations = violations.iter().map(|of| Moment::violation(&of.finding, &of.names(), unit));
         let undecided = self.undecided.iter().map(|of| undecided(&of.short()));
         let gaps = self.gaps.iter().map(|of| unseen(&of.short()));
         let of_limits = self.moments_of_limits();
@@ -32,23 +35,6 @@ impl RecordedReport {
     pub fn judgement(&self) -> Judged {
         let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
         Judged { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
-    }
-
-    fn closest_moment(&self, OfPair { who: [first, second], finding }: &OfPair<Approach>) -> Moment {
-        let &Approach { pair, lower_m, upper_m, time_s, .. } = finding;
-        let (apart, unit) = (interval(lower_m, upper_m), self.judgement().unit);
-        let said = format!("Closest approach: {apart} {unit}, {first} and {second} at {time_s:.3} s");
-        let span = Span { from_s: time_s, to_s: time_s, at_s: time_s };
-        moment(Kind::Closest, pair, span, [String::new(), said])
-    }
-
-    fn violation(&self, of: &OfPair<Violation<ObjectPair>>) -> Moment {
-        let Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = of.finding;
-        let ([first, second], unit) = (&of.who, self.judgement().unit);
-        let (least, limit) = (metres_below(min_m, limit_m), exact(limit_m));
-        let brief = format!("{first} and {second} come to {least} {unit} (limit {limit})");
-        let span = Span { from_s, to_s, at_s: min_at_s };
-        moment(Kind::Violation, pair, span, [brief, format!("Violation: {}", of.words())])
     }
 
     fn moments_of_limits(&self) -> Vec<Moment> {
@@ -77,8 +63,8 @@ impl RecordedReport {
 fn undecided(of: &OfPair<Undecided<ObjectPair>>) -> Moment {
     let Undecided { pair, from_s, to_s, .. } = of.finding;
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
-    let brief = format!("{} and {} may come too near", of.who[0], of.who[1]);
-    moment(Kind::Undecided, pair, span, [brief, format!("Undecided: {}", of.words())])
+    let brief = format!("{} may come too near", of.names());
+    Moment::new(Kind::Undecided, pair, span, brief, format!("Undecided: {}", of.words()))
 }
 
 fn unseen(of: &OfVehicle<Gap>) -> Moment {
@@ -88,12 +74,12 @@ fn unseen(of: &OfVehicle<Gap>) -> Moment {
     Moment { kind: Kind::Unseen, vehicles: vec![vehicle], obstacle: None, span, brief, said }
 }
 
-fn moment(kind: Kind, pair: ObjectPair, span: Span, [brief, said]: [String; 2]) -> Moment {
-    let (vehicles, obstacle) = match pair {
-        ObjectPair::Vehicles(pair) => (vec![pair.first(), pair.second()], None),
-        ObjectPair::Obstacle { vehicle, obstacle } => (vec![vehicle], Some(obstacle)),
-    };
-    Moment { kind, vehicles, obstacle, span, brief, said }
+impl<T> OfPair<T> {
+    /// The names of both.
+    pub(super) fn names(&self) -> String {
+        let [first, second] = &self.who;
+        format!("{first} and {second}")
+    }
 }
 
 impl<T: Clone> OfPair<T> {
@@ -120,8 +106,9 @@ mod tests {
         let pair = ObjectPair::Vehicles(Pair::new(0, 1));
         let finding = Violation { pair, from_s: 1.0, to_s: 2.0, min_m: 0.25, min_at_s: 1.5, limit_m: 1.0 };
         let of = OfPair { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };
-        let said = in_order(&of.short().words());
-        let expected = "… and drone \u{fffd}b: 0.250 at 1.500 s, below 1.000 from 1.000 s to 2.000 s";
-        assert!(said.ends_with(expected) && said.chars().count() < 120, "{said}");
+        let said = in_order(&Moment::violation(&finding, &of.short().names(), "m").said);
+        let expected =
+            "… and drone \u{fffd}b came to 0.250 m (limit 1.000) at 1.500 s, below it from 1.000 s to 2.000 s";
+        assert!(said.ends_with(expected) && said.chars().count() < 150, "{said}");
     }
 }

@@ -175,9 +175,9 @@ impl SeenWhen {
     fn new(outcome: &Outcome, settings: &Settings) -> Self {
         let is_asked = |name: &&String| settings.only.as_ref().is_none_or(|only| only.contains(*name));
         let (asked, partly) = (outcome.vehicles.iter().filter(is_asked).count(), outcome.absences.len());
-        let seen = |of: &Absence| OfVehicle {
-            vehicle: outcome.name(of.vehicle),
-            finding: Seen { from_s: of.seen.map(|seen| seen.from_s), to_s: of.seen.map(|seen| seen.to_s) },
+        let seen = |of: &Absence| {
+            let seen = Seen { from_s: of.seen.map(|seen| seen.from_s), to_s: of.seen.map(|seen| seen.to_s) };
+            OfVehicle::new(outcome, of.vehicle, seen)
         };
         let (first_s, last_s) = (outcome.span_s.map(|span| span.0), outcome.span_s.map(|span| span.1));
         Self {
@@ -213,8 +213,10 @@ impl RecordedReport {
         let is_assumed = between.basis == Basis::Assumed || limits.iter().any(|limit| limit.assumes.is_some());
         let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
         let closest = |of: &[Approach]| of.iter().map(|a| OfPair { who: names(a.pair), finding: *a }).collect();
-        let violations: Vec<_> =
-            outcome.violations.iter().map(|v| OfPair { who: names(v.pair), finding: *v }).collect();
+        let violations = outcome.violations.iter().map(|v| OfPair { who: names(v.pair), finding: *v });
+        let violations: Vec<_> = violations.collect();
+        let alone = outcome.alone.iter();
+        let alone = alone.filter_map(|&of| Some(OfVehicle::new(outcome, of, outcome.presence[of]?)));
         Self {
             schema_version: SCHEMA_VERSION,
             status: outcome.status,
@@ -273,20 +275,10 @@ impl RecordedReport {
             run_objection: None,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
-            gaps: outcome
-                .gaps
-                .iter()
-                .map(|gap| OfVehicle { vehicle: outcome.name(gap.vehicle), finding: *gap })
-                .collect(),
-            alone: outcome
-                .alone
-                .iter()
-                .filter_map(|&of| Some(OfVehicle { vehicle: outcome.name(of), finding: outcome.presence[of]? }))
-                .collect(),
+            gaps: outcome.gaps.iter().map(|gap| OfVehicle::new(outcome, gap.vehicle, *gap)).collect(),
+            alone: alone.collect(),
             undecided: outcome.undecided.iter().map(|u| OfPair { who: names(u.pair), finding: *u }).collect(),
-            contradiction: outcome
-                .contradiction
-                .map(|finding| OfVehicle { vehicle: outcome.name(finding.vehicle), finding }),
+            contradiction: outcome.contradiction.map(|of| OfVehicle::new(outcome, of.vehicle, of)),
         }
     }
 
@@ -337,4 +329,11 @@ pub struct OfVehicle<T> {
     /// What was found.
     #[serde(flatten)]
     pub finding: T,
+}
+
+impl<T> OfVehicle<T> {
+    /// Returns the finding with the name of its vehicle.
+    pub(super) fn new(outcome: &Outcome, vehicle: usize, finding: T) -> Self {
+        Self { vehicle: outcome.name(vehicle), finding }
+    }
 }

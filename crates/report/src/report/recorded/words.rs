@@ -1,13 +1,12 @@
 //! The report on a recording in words and as a page.
 
-use std::fmt::Write as _;
-
 use super::envelope::OfLimit;
 use super::report::{EarlyEnd, RecordedReport, Seen};
 use super::report::{OfPair, OfVehicle};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
-use crate::report::page::{self, Badge, Markup, Page, Start, Tone, section};
+use crate::report::page::{self, Badge, Page, Start, Tone};
+use crate::report::section::Section;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
 use tautline_core::text::{at_least, at_most, counted, exact, fixed, in_order, metres_below, seconds};
@@ -172,31 +171,43 @@ impl RecordedReport {
         }
     }
 
-    /// What was found of each kind: how much, and a sentence for each finding that is listed.
-    fn lists(&self) -> [(&'static str, String, Vec<String>); 3] {
-        let of_limits = |tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).collect::<Vec<_>>();
+    /// Returns the sections of the text and of the page.
+    fn sections(&self) -> Vec<Section> {
+        let caption = format!("smallest distances in {}", self.unit().trim());
+        let closest = |heading: &'static str, closest: &[OfPair<Approach>]| {
+            let row = |OfPair { who: [first, second], finding }: &OfPair<Approach>| {
+                let apart = interval(finding.lower_m, finding.upper_m);
+                [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
+            };
+            let columns = &["who", "smallest distance", "at [s]", "limit"];
+            Section::table(heading, &caption, columns, closest.iter().map(row))
+        };
+        let columns = &["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
+        let limits = "limits, and the vehicles nearest to them";
+        let presence = &self.presence;
+        let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
+        let all = |of: Tally, tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).fold(of, sum);
         let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
-        let all = |of: Tally, more: Vec<Tally>| more.into_iter().fold(of, sum);
-        let beyond = self.limits.iter().flat_map(OfLimit::violations_in_words);
-        let undecided = self.limits.iter().flat_map(OfLimit::undecided_in_words);
-        let found = [
-            all(self.findings.violations, of_limits(|limit| limit.violations_tally)),
-            all(
-                self.findings.undecided,
-                [of_limits(|limit| limit.undecided_tally), vec![Tally::all(unknown)]].concat(),
-            ),
-            self.findings.gaps,
+        let violations = all(self.findings.violations, |limit| limit.violations_tally);
+        let undecided = sum(all(self.findings.undecided, |limit| limit.undecided_tally), Tally::all(unknown));
+        let list = |heading: &'static str, tally: Tally, lines: Vec<String>| {
+            Section::list(heading, shortened_in_words(tally), lines)
+        };
+        let violated = self.violations.iter().map(OfPair::<Violation<_>>::words);
+        let violated = violated.chain(self.limits.iter().flat_map(OfLimit::violations_in_words)).collect();
+        let open = self.undecided.iter().map(OfPair::<Undecided<_>>::words);
+        let open = open.chain(self.limits.iter().flat_map(OfLimit::undecided_in_words)).collect();
+        let sections = [
+            closest("Closest pairs", &self.closest),
+            closest("Closest to obstacles", &self.obstacles.closest),
+            Section::table("Each vehicle by itself", limits, columns, self.limits.iter().map(OfLimit::row)),
+            Section::list("Presence", seen, presence.listed.iter().map(OfVehicle::<Seen>::words).collect())
+                .of_all(presence.partly),
+            list("Violations", violations, violated),
+            list("Undecided", undecided, open),
+            list("Gaps", self.findings.gaps, self.gaps.iter().map(OfVehicle::<Gap>::words).collect()),
         ];
-        let [violations, open, gaps] = found.map(shortened_in_words);
-        [
-            (
-                "Violations",
-                violations,
-                self.violations.iter().map(OfPair::<Violation<_>>::words).chain(beyond).collect(),
-            ),
-            ("Undecided", open, self.undecided.iter().map(OfPair::<Undecided<_>>::words).chain(undecided).collect()),
-            ("Gaps", gaps, self.gaps.iter().map(OfVehicle::<Gap>::words).collect()),
-        ]
+        sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
     }
 
     /// What is left out of lists that are too long, a sentence each.
@@ -224,111 +235,40 @@ impl RecordedReport {
     /// The closest pairs and what was found, a line each, with a line end.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut text = String::new();
-        // Writing to a string cannot fail.
-        let mut line = |words: String| {
-            let _ = writeln!(text, "{}", one_line(&words));
-        };
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
-        line(format!(
+        let judged = format!(
             "judged       {span}, {}, {} of motion, {} swept",
             counted(self.judged as u64, "vehicle", "vehicles"),
             counted(self.audit.flight.steps, "stretch", "stretches"),
             self.audit.flight.pairs_checked
-        ));
-        for (heading, closest) in [("closest pairs", &self.closest), ("closest to obstacles", &self.obstacles.closest)]
-        {
-            if !closest.is_empty() {
-                line(format!("{heading} [{}]", self.unit().trim()));
-            }
-            for OfPair { who: [first, second], finding } in closest {
-                let (apart, at) = (interval(finding.lower_m, finding.upper_m), fixed(finding.time_s, 3));
-                line(format!("  {apart}  at {at} s  {first} and {second}"));
-            }
-        }
-        if !self.limits.is_empty() {
-            line("limits on each vehicle".to_owned());
-            self.limits.iter().for_each(|limit| line(format!("  {}", limit.brief())));
-        }
-        if self.presence.partly > 0 {
-            line(format!("seen throughout: {}, not throughout: {}", self.presence.throughout, self.presence.partly));
-            let lines = self.presence.listed.iter().map(OfVehicle::<Seen>::words).collect();
-            listed(lines, self.presence.partly, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
-        }
-        for (heading, count, lines) in self.lists() {
-            if !lines.is_empty() {
-                line(format!("{}: {count}", heading.to_lowercase()));
-            }
-            let all = lines.len();
-            listed(lines, all, LISTED_IN_WORDS).for_each(|words| line(format!("  {words}")));
-        }
-        text
+        );
+        let lines = self.sections().into_iter().flat_map(|section| section.text(LISTED_IN_WORDS));
+        std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
     }
 
     /// The report as a self-contained HTML page, with the replay of the recording or why there is none.
     #[must_use]
     pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
-        let replay = match replay {
-            Ok(replay) => page::replay(&self.source.recording, replay, Start::AtOnce),
-            Err(why) => page::no_replay(&why.to_string()),
+        let tone = match self.status {
+            Status::Clear => Tone::Good,
+            Status::Violation => Tone::Bad,
+            Status::Undecided => Tone::Neutral,
         };
-        let mut sections = vec![section("Replay", &[replay])];
-        if !self.closest.is_empty() {
-            sections.push(section("Closest pairs", &[closest_table(&self.closest)]));
-        }
-        if !self.limits.is_empty() {
-            let columns = ["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
-            let rows = self.limits.iter().map(OfLimit::row);
-            sections.push(section(
-                "Each vehicle by itself",
-                &[page::numbers("Limits, and who came nearest", &columns, rows)],
-            ));
-        }
-        if !figures.is_empty() {
-            sections.push(section("Figures", &[page::figures(figures)]));
-        }
-        if !self.obstacles.closest.is_empty() {
-            sections.push(section("Obstacles", &[closest_table(&self.obstacles.closest)]));
-        }
-        if self.presence.partly > 0 {
-            let columns = ["vehicle", "seen from [s]", "to [s]"];
-            let time = |time_s: Option<f64>| time_s.map_or("never".to_owned(), |time_s| fixed(time_s, 3));
-            let rows = self.presence.listed.iter().take(LISTED_ON_PAGE);
-            let rows = rows.map(|of| [of.vehicle.clone(), time(of.finding.from_s), time(of.finding.to_s)]);
-            let title = format!("The first of {} that are not seen throughout", self.presence.partly);
-            sections.push(section("Presence", &[page::numbers(&title, &columns, rows)]));
-        }
-        let lists = self.lists().map(|(heading, _, lines)| (heading, lines));
-        for (heading, lines) in lists.into_iter().chain([("How it was read", self.source.notes.clone())]) {
-            if !lines.is_empty() {
-                let all = lines.len();
-                let lines: Vec<_> = listed(lines, all, LISTED_ON_PAGE).collect();
-                sections.push(section(heading, &[page::list(&lines)]));
-            }
-        }
+        let badge = Badge { tone, word: self.verdict() };
+        let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, self.finding());
+        page.add("Replay", [page::replay(&self.source.recording, replay, Start::AtOnce)]);
+        page.add("Figures", [page::figures(figures)]);
+        page.sections.extend(self.sections().iter().map(|section| section.html(LISTED_ON_PAGE)));
+        page.add("How it was read", [page::list(&self.source.notes)]);
         let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
         let assumed = [
             format!("Motion: {} ({known}).", self.motion),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
-        sections.push(section("What was assumed", &[page::list(&assumed)]));
-        sections.push(section("Repeat it", &[page::command(command)]));
-        let tone = match self.status {
-            Status::Clear => Tone::Good,
-            Status::Violation => Tone::Bad,
-            Status::Undecided => Tone::Neutral,
-        };
-        Page {
-            title: self.source.recording.clone(),
-            kind: "Audit of a recording",
-            badge: Badge { tone, word: self.verdict() },
-            verdict: self.finding(),
-            reasons: Vec::new(),
-            warnings: Vec::new(),
-            sections,
-        }
-        .render_with_replays()
+        page.add("What was assumed", [page::list(&assumed)]);
+        page.add("Repeat it", [page::command(command)]);
+        page.render()
     }
 }
 
@@ -352,13 +292,6 @@ fn counted_in_words(tally: Tally) -> String {
 fn shortened_in_words(tally: Tally) -> String {
     let count = counted_in_words(tally);
     if tally.is_shortened() { format!("{count}, of which {} are listed", tally.listed) } else { count }
-}
-
-/// The first of some lines of so many, and how many more there are.
-fn listed(mut lines: Vec<String>, all: usize, most: usize) -> impl Iterator<Item = String> {
-    let rest = all.saturating_sub(most);
-    lines.truncate(most);
-    lines.into_iter().chain((rest > 0).then(|| format!("and {rest} more")))
 }
 
 impl EarlyEnd {
@@ -428,13 +361,4 @@ fn span(from_s: f64, to_s: f64) -> String {
 pub fn interval(lower: f64, upper: f64) -> String {
     let (low, high) = (at_least(lower, 6), at_most(upper, 6));
     if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
-}
-
-fn closest_table(closest: &[OfPair<Approach>]) -> Markup {
-    let row = |OfPair { who: [first, second], finding }: &OfPair<Approach>| {
-        let apart = interval(finding.lower_m, finding.upper_m);
-        [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
-    };
-    let columns = ["who", "smallest distance", "at [s]", "limit"];
-    page::numbers("Who came closest, and when", &columns, closest.iter().map(row))
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::super::{Failure, text_file};
+use super::super::Failure;
+use super::toml_file::TomlFile;
 use super::{AuditRequest, ConfigFile, ConfiguredAudit, Subject};
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Interpolation;
@@ -14,8 +15,7 @@ use tautline_recordings::read::{ArrayAxis, Axes, Scale};
 
 /// What the file is called.
 const NAME: &str = "tautline.toml";
-/// Largest file that is read \[bytes\].
-const MOST_BYTES: u64 = 1 << 20;
+const FILE: TomlFile = TomlFile { code: "audit/settings-file", help: HELP, most_bytes: 1 << 20 };
 const HELP: &str = "docs/ci.md lists the keys of [audit]; --no-config asks what the command line says alone";
 
 #[derive(Debug, Deserialize)]
@@ -74,7 +74,7 @@ pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudi
     }
     request.config = found.map_or(ConfigFile::None, ConfigFile::File);
     match request.config.clone() {
-        ConfigFile::File(path) => parse(&text_file::read(&path, MOST_BYTES, HELP)?, &path)?.fill(request, &path),
+        ConfigFile::File(path) => parse(&FILE.read(&path)?, &path)?.fill(request, &path),
         ConfigFile::Nearest | ConfigFile::None => Ok(ConfiguredAudit { request, asked_by: None }),
     }
 }
@@ -103,12 +103,7 @@ fn nearest(recording: &Path) -> Option<PathBuf> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<AuditTable, Failure> {
-    let document: Document = toml::from_str(text).map_err(|error| {
-        let start = error.span().map_or(0, |span| span.start.min(text.len()));
-        let line = 1 + text[..start].matches('\n').count();
-        Failure::input("audit/settings-file", format!("{}, line {line}: {}", path.display(), error.message()), HELP)
-    })?;
-    Ok(document.audit)
+    FILE.parse(text, path).map(|document: Document| document.audit)
 }
 
 impl AuditTable {

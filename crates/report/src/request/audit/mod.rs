@@ -5,6 +5,7 @@ mod own;
 mod places;
 mod proof;
 mod replays;
+mod toml_file;
 mod venue_file;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,11 +1,11 @@
 //! Files of obstacles and of a fence.
 
-use std::ops::Range;
 use std::path::Path;
 
 use serde::Deserialize;
 
-use super::super::{Failure, text_file};
+use super::super::Failure;
+use super::toml_file::TomlFile;
 use tautline_audit::Obstacle;
 use tautline_audit::envelope::Fence;
 use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
@@ -13,6 +13,11 @@ use tautline_sim::sim;
 
 /// Largest file that is read \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
+const OBSTACLES: TomlFile = TomlFile { code: "audit/obstacle-file", help: OBSTACLE_HELP, most_bytes: MOST_BYTES };
+const FENCE: TomlFile = TomlFile { code: "audit/fence-file", help: FENCE_HELP, most_bytes: MOST_BYTES };
+const FENCE_HELP: &str =
+    "write [fence] with polygon_m = [[x, y], ...] in metres, and where needed height_m = [from, to] and margin_m";
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObstacleDocument {
@@ -26,28 +31,19 @@ struct ObstacleDocument {
 
 /// Reads a file of obstacles.
 pub(super) fn read_obstacles(path: &Path) -> Result<Vec<Obstacle>, Failure> {
-    parse_obstacles(&text_file::read(path, MOST_BYTES, "give a TOML file of obstacles")?, path)
+    parse_obstacles(&OBSTACLES.read(path)?, path)
 }
 
 fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
-    let wrong = |message: String, place: Option<Range<usize>>| {
-        let line = place.map_or(1, |place| 1 + text[..place.start.min(text.len())].matches('\n').count());
-        Failure::input("audit/obstacle-file", format!("{}, line {line}: {message}", path.display()), OBSTACLE_HELP)
-    };
-    let document: ObstacleDocument =
-        toml::from_str(text).map_err(|error| wrong(error.message().to_owned(), error.span()))?;
+    let document: ObstacleDocument = OBSTACLES.parse(text, path)?;
     if document.obstacle.is_empty() {
-        return Err(wrong("there is no [[obstacle]]".to_owned(), None));
+        return Err(OBSTACLES.wrong(text, path, 0, "there is no [[obstacle]]"));
     }
-    let obstacles: Result<Vec<_>, _> = document
-        .obstacle
-        .into_iter()
-        .map(|entry| {
-            let place = entry.span();
-            obstacle(entry.into_inner()).map_err(|message| wrong(message, Some(place)))
-        })
-        .collect();
-    obstacles
+    let judged = |entry: toml::Spanned<ObstacleTable>| {
+        let start = entry.span().start;
+        obstacle(entry.into_inner()).map_err(|message| OBSTACLES.wrong(text, path, start, &message))
+    };
+    document.obstacle.into_iter().map(judged).collect()
 }
 
 fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
@@ -56,9 +52,6 @@ fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
     let obstacle = Obstacle { name, shape: sim::judged_shape(shape), clearance_m, path };
     obstacle.check().map(|()| obstacle).map_err(|error| error.to_string())
 }
-
-const FENCE_HELP: &str =
-    "write [fence] with polygon_m = [[x, y], ...] in metres, and where needed height_m = [from, to] and margin_m";
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -82,19 +75,14 @@ struct FenceTable {
 
 /// Reads the fence of a file.
 pub(super) fn read_fence(path: &Path) -> Result<Fence, Failure> {
-    parse_fence(&text_file::read(path, MOST_BYTES, FENCE_HELP)?, path)
+    parse_fence(&FENCE.read(path)?, path)
 }
 
 fn parse_fence(text: &str, path: &Path) -> Result<Fence, Failure> {
-    let wrong = |message: &str, start: Option<usize>| {
-        let line = start.map_or(1, |start| 1 + text[..start.min(text.len())].matches('\n').count());
-        Failure::input("audit/fence-file", format!("{}, line {line}: {message}", path.display()), FENCE_HELP)
-    };
-    let document: FenceDocument =
-        toml::from_str(text).map_err(|error| wrong(error.message(), error.span().map(|span| span.start)))?;
+    let document: FenceDocument = FENCE.parse(text, path)?;
     let start = document.fence.span().start;
     let FenceTable { polygon_m, height_m, margin_m } = document.fence.into_inner();
-    Fence::new(&polygon_m, height_m, margin_m).map_err(|error| wrong(&error.to_string(), Some(start)))
+    Fence::new(&polygon_m, height_m, margin_m).map_err(|error| FENCE.wrong(text, path, start, &error.to_string()))
 }
 
 #[cfg(test)]

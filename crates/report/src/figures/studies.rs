@@ -1,0 +1,216 @@
+//! Figures of studies: the worst of a search, shares and separations over the values of a key, histograms.
+
+use super::Figure;
+use super::axis::Axis;
+use super::chart::{Chart, Mark};
+use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use tautline_core::text::metres;
+
+/// The smallest separation \[m\] that a search had found after so many of `flights`, with delta and the separation of the flight
+/// that it began from. `found` has each flight, numbered from 1, that was worse than all before it.
+#[must_use]
+pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f64>) -> Figure {
+    let last = flights.max(1) as f64;
+    let lengths = found.iter().map(|&(_, min_m)| min_m).chain([delta_m]).chain(own_m);
+    let mut chart =
+        Chart::new(Axis::spanning("flights", 0.0, last, 6.0), Axis::linear("smallest separation [m]", lengths, true));
+    let mut points = Vec::with_capacity(2 * found.len() + 1);
+    for &(flight, min_m) in found {
+        points.extend(points.last().map(|&(_, before_m): &(f64, f64)| (flight as f64, before_m)));
+        points.push((flight as f64, min_m));
+    }
+    points.extend(points.last().map(|&(_, worst_m)| (last, worst_m)));
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "the worst found");
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
+    if let Some(own_m) = own_m {
+        chart.level(own_m, Stroke::dashed(SOFT_INK, 1.0), "the scenario as it is".to_owned());
+    }
+    let worst = found.last();
+    chart.marks.extend(worst.map(|&(flight, min_m)| Mark::ring((flight as f64, min_m), PALETTE[0], None)));
+    let found = worst.map(|(flight, min_m)| format!("{} m in flight {flight}", metres(*min_m)));
+    let found = found.unwrap_or_else(|| "nothing could be flown".to_owned());
+    let description = format!("The smallest separation found over the flights of the search: {found}.");
+    chart.figure("attack", "The worst found", &description)
+}
+
+/// The flights of one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// The value.
+    pub value: f64,
+    /// The share that showed what was asked, from 0 to 1.
+    pub share: f64,
+    /// Its 95 % interval, where there is one.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
+/// the verdict turns, and values that are `predicted`, each with what it is. The axis is logarithmic where asked.
+#[must_use]
+pub fn margin(
+    shares: &[Share],
+    key: &str,
+    does: &str,
+    bracket: Option<[f64; 2]>,
+    predicted: &[(f64, String)],
+    logarithmic: bool,
+) -> Figure {
+    let mut chart = chart_of_shares(key, does, shares.iter(), logarithmic);
+    for (k, share) in shares.iter().enumerate() {
+        chart.interval(share.value, share.interval, Stroke::solid(PALETTE[0], 1.2));
+        let flights = if share.interval.is_some() { "with its 95 % interval" } else { "one flight" };
+        let ring = Mark::ring((share.value, share.share), PALETTE[0], (k == 0).then(|| flights.to_owned()));
+        chart.marks.push(Mark { radius: 3.5, ..ring });
+    }
+    for (k, side) in bracket.into_iter().flatten().enumerate() {
+        let label = (k == 0).then(|| "the verdict turns in between".to_owned());
+        chart.upright(side, Stroke::dashed(SOFT_INK, 1.0), label);
+    }
+    for (k, (value, what)) in predicted.iter().enumerate() {
+        chart.upright(*value, Stroke::dashed(PALETTE[1 + k % 2], 1.5), Some(format!("predicted {what}")));
+    }
+    let description = match bracket {
+        Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),
+        None => format!("The share that {does} over {key}; the verdict does not turn."),
+    };
+    chart.figure("margin", &format!("Share that {does}"), &description)
+}
+
+/// Returns an empty chart of shares over the values of a key.
+fn chart_of_shares<'a>(key: &str, does: &str, shares: impl Iterator<Item = &'a Share>, logarithmic: bool) -> Chart {
+    let values = shares.map(|share| share.value);
+    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
+    Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0))
+}
+
+/// Shares of flights of several laws that show something over the values of a key, with their 95 % intervals.
+#[must_use]
+pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)], logarithmic: bool) -> Figure {
+    let mut chart = chart_of_shares(key, does, series.iter().flat_map(|(_, shares)| shares), logarithmic);
+    for (k, (law, shares)) in series.iter().enumerate() {
+        for share in shares {
+            chart.interval(share.value, share.interval, Stroke::of_line(k));
+        }
+        chart.line(shares.iter().map(|share| (share.value, share.share)).collect(), Stroke::of_line(k), law.clone());
+    }
+    let title = format!("Share that {does} over {key}");
+    chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
+}
+
+/// The smallest separations of the flights of one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Separation {
+    /// The value.
+    pub value: f64,
+    /// Smallest of all flights \[m\].
+    pub smallest_m: f64,
+    /// Median of the flights \[m\].
+    pub median_m: f64,
+    /// Its 95 % interval \[m\], where there is one.
+    pub interval_m: Option<[f64; 2]>,
+}
+
+/// Smallest separations of flights over the values of a key, with the safety distance delta \[m\].
+#[must_use]
+pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) -> Figure {
+    let lengths = flights
+        .iter()
+        .flat_map(|of| [of.smallest_m, of.median_m].into_iter().chain(of.interval_m.into_iter().flatten()));
+    let x = Axis::linear(key, flights.iter().map(|of| of.value), false);
+    let mut chart = Chart::new(x, Axis::linear("smallest separation [m]", lengths.chain([delta_m]), true));
+    for of in flights {
+        chart.interval(of.value, of.interval_m, Stroke::of_line(0));
+    }
+    let curve = |of: fn(&Separation) -> f64| flights.iter().map(|flight| (flight.value, of(flight))).collect();
+    chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
+    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
+    let title = format!("Smallest separation over {key}");
+    chart.figure(
+        name,
+        &title,
+        &format!("{title}: the median of the flights with its 95 % interval, and the smallest of all."),
+    )
+}
+
+/// Numbers of one kind counted in intervals of one width.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Histogram {
+    /// Lower end of the first interval.
+    pub from: f64,
+    /// Upper end of the last.
+    pub to: f64,
+    /// How many fell into each.
+    pub counts: Vec<u64>,
+}
+
+impl Histogram {
+    /// Counts the finite ones of `values` in so many intervals between the smallest and the largest; none of none.
+    #[must_use]
+    pub fn of(values: &[f64], intervals: usize) -> Option<Self> {
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        let (from, to) = (finite().reduce(f64::min)?, finite().reduce(f64::max)?);
+        let mut counts = vec![0; intervals.max(1)];
+        let width = (to - from) / counts.len() as f64;
+        let last = counts.len() - 1;
+        for value in finite() {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative, and small")]
+            let place = if width > 0.0 { ((value - from) / width).floor() as usize } else { 0 };
+            counts[place.min(last)] += 1;
+        }
+        Some(Self { from, to, counts })
+    }
+
+    /// The outline of its bars as shares of `of`.
+    fn outline(&self, of: u64) -> Vec<(f64, f64)> {
+        let width = (self.to - self.from) / self.counts.len() as f64;
+        let at = |number: usize| self.from + width * number as f64;
+        let bars = self.counts.iter().enumerate().flat_map(|(number, &count)| {
+            let share = count as f64 / of.max(1) as f64;
+            [(at(number), share), (at(number + 1), share)]
+        });
+        std::iter::once((self.from, 0.0)).chain(bars).chain([(self.to, 0.0)]).collect()
+    }
+}
+
+/// Histograms of several laws over one axis, as shares of each law's numbers, with a limit where there is one.
+#[must_use]
+pub fn histograms(
+    name: &str,
+    title: &str,
+    label: &str,
+    series: &[(String, Histogram)],
+    limit: Option<(f64, &str)>,
+) -> Figure {
+    let ends = series.iter().flat_map(|(_, histogram)| [histogram.from, histogram.to]);
+    let x = Axis::linear(label, ends.chain(limit.iter().map(|(at, _)| *at)), false);
+    let outlines: Vec<_> = series.iter().map(|(_, of)| of.outline(of.counts.iter().sum())).collect();
+    let highest = outlines.iter().flatten().map(|&(_, share)| share).fold(0.0, f64::max);
+    let mut chart = Chart::new(x, Axis::spanning("share of flights", 0.0, highest.max(0.01), 5.0));
+    for (k, (points, (law, _))) in std::iter::zip(outlines, series).enumerate() {
+        chart.line(points, Stroke::of_line(k), law.clone());
+    }
+    if let Some((at, what)) = limit {
+        chart.upright(at, Stroke::dashed(SOFT_INK, 1.0), Some(what.to_owned()));
+    }
+    let said = |(law, of): &(String, Histogram)| format!("{law} from {:.3} to {:.3}", of.from, of.to);
+    let description = series.iter().map(said).collect::<Vec<_>>().join("; ");
+    chart.figure(name, title, &format!("{title}: {description}."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finite_number_is_counted_once_the_largest_in_the_last_interval() {
+        let counted = Histogram::of(&[0.0, 0.9, 1.0, 3.9, 4.0, f64::NAN], 4).expect("numbers");
+        assert_eq!((counted.from, counted.to, counted.counts.clone()), (0.0, 4.0, vec![2, 1, 0, 2]));
+        assert_eq!(Histogram::of(&[2.0, 2.0], 3).expect("numbers").counts, [2, 0, 0]);
+        assert_eq!(Histogram::of(&[f64::INFINITY], 3), None);
+        assert!(counted.outline(5).iter().any(|&(x, share)| x == 1.0 && share == 0.4));
+        let figure =
+            histograms("h", "Clearance", "clearance [m]", &[("law".to_owned(), counted)], Some((0.0, "delta")));
+        assert!(figure.svg.contains("clearance [m]") && figure.svg.contains("delta"));
+    }
+}

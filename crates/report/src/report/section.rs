@@ -1,0 +1,73 @@
+//! Sections of a report, each written as text and as a part of a page.
+
+use super::page::{self, Markup};
+use tautline_core::text::aligned;
+
+/// A section of a report: a table, or lines if it has no columns.
+#[derive(Clone, Debug)]
+pub(super) struct Section {
+    pub(super) heading: &'static str,
+    /// Caption of the table, or what the lines are in a few words.
+    pub(super) caption: String,
+    pub(super) columns: &'static [&'static str],
+    pub(super) rows: Vec<Vec<String>>,
+    /// Number of rows that there are in all, listed or not.
+    pub(super) all: usize,
+}
+
+impl Section {
+    /// Returns a table whose first column names the rows.
+    pub(super) fn table<const N: usize>(
+        heading: &'static str,
+        caption: impl Into<String>,
+        columns: &'static [&'static str; N],
+        rows: impl IntoIterator<Item = [String; N]>,
+    ) -> Self {
+        let rows: Vec<_> = rows.into_iter().map(Vec::from).collect();
+        Self { heading, caption: caption.into(), columns, all: rows.len(), rows }
+    }
+
+    /// Returns lines of text.
+    pub(super) fn list(heading: &'static str, caption: impl Into<String>, lines: Vec<String>) -> Self {
+        let rows: Vec<_> = lines.into_iter().map(|line| vec![line]).collect();
+        Self { heading, caption: caption.into(), columns: &[], all: rows.len(), rows }
+    }
+
+    /// Returns the same section with `all` rows in all, of which only the first are listed.
+    pub(super) fn of_all(self, all: usize) -> Self {
+        Self { all, ..self }
+    }
+
+    /// Returns the number of rows beyond the first `most` in words.
+    fn more(&self, most: usize) -> Option<String> {
+        let rest = self.all.saturating_sub(self.rows.len().min(most));
+        (rest > 0).then(|| format!("and {rest} more"))
+    }
+
+    /// Returns the heading and the first `most` rows for a terminal, a line each.
+    pub(super) fn text(&self, most: usize) -> Vec<String> {
+        let rows = self.rows.iter().take(most);
+        let table = if self.columns.is_empty() {
+            rows.flatten().cloned().collect()
+        } else {
+            let head = self.columns.iter().map(ToString::to_string).collect();
+            let table = aligned(&std::iter::once(head).chain(rows.cloned()).collect::<Vec<_>>());
+            table.lines().map(str::to_owned).collect::<Vec<_>>()
+        };
+        let heading = format!("{}: {}", self.heading.to_lowercase(), self.caption);
+        let lines = table.into_iter().chain(self.more(most)).map(|line| format!("  {line}"));
+        std::iter::once(heading).chain(lines).collect()
+    }
+
+    /// Returns the first `most` rows under the heading for a page.
+    pub(super) fn html(&self, most: usize) -> Markup {
+        let rows = self.rows.iter().take(most);
+        let content = if self.columns.is_empty() {
+            page::list(&rows.flatten().chain(&self.more(most)).collect::<Vec<_>>())
+        } else {
+            let (caption, more) = (format!("{}: {}", self.heading, self.caption), self.more(most));
+            maud::html! { (page::numbers(&caption, self.columns, rows)) @if let Some(more) = more { p { (more) } } }
+        };
+        page::section(self.heading, &[content])
+    }
+}

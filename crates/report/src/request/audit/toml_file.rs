@@ -1,0 +1,51 @@
+//! Small TOML files: settings, obstacles, a fence.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use super::super::Failure;
+
+/// A kind of TOML file.
+pub(super) struct TomlFile {
+    /// Stable name of the problem of a wrong file.
+    pub(super) code: &'static str,
+    /// Remedy for a wrong file.
+    pub(super) help: &'static str,
+    /// Largest file that is read \[bytes\].
+    pub(super) most_bytes: u64,
+}
+
+impl TomlFile {
+    /// Returns the text of a file. Refuses a larger file and one without end.
+    pub(super) fn read(&self, path: &Path) -> Result<String, Failure> {
+        let cannot = |error: std::io::Error| {
+            Failure::input("files/cannot-read", format!("cannot read {}: {error}", path.display()), self.help)
+        };
+        let file = File::open(path).map_err(cannot)?;
+        let mut text = String::new();
+        file.take(self.most_bytes + 1).read_to_string(&mut text).map_err(cannot)?;
+        if text.len() as u64 > self.most_bytes {
+            let most = self.most_bytes;
+            let message = format!("{} has more than the {most} bytes that are read of such a file", path.display());
+            return Err(Failure::input("files/too-large", message, self.help));
+        }
+        Ok(text)
+    }
+
+    /// Returns the content of a text of this kind.
+    pub(super) fn parse<T: DeserializeOwned>(&self, text: &str, path: &Path) -> Result<T, Failure> {
+        toml::from_str(text).map_err(|error| {
+            let start = error.span().map_or(0, |span| span.start);
+            self.wrong(text, path, start, error.message())
+        })
+    }
+
+    /// Returns the failure of a text with a problem at this byte.
+    pub(super) fn wrong(&self, text: &str, path: &Path, start: usize, message: &str) -> Failure {
+        let line = 1 + text[..start.min(text.len())].matches('\n').count();
+        Failure::input(self.code, format!("{}, line {line}: {message}", path.display()), self.help)
+    }
+}
