@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::attack::{Bound, FLIGHTS};
-use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
+use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note, overlap};
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
@@ -162,8 +162,11 @@ impl Options {
             let why = format!("--key: a sweep has one key or two, got {}", self.keys.len());
             return grid(why, "give --key once or twice; other keys are set with --set");
         }
-        if self.keys.len() == 2 && self.keys[0].key == self.keys[1].key {
-            return grid(format!("--key: {} is given twice", self.keys[0].key), "give all its values in one --key");
+        if let [one, other] = &self.keys[..]
+            && overlap(&one.key, &other.key)
+        {
+            let why = format!("--key: {} and {} overlap", one.key, other.key);
+            return grid(why, "give two different keys; all values of a key are in one --key");
         }
         let points = self.keys.iter().map(|key| key.values.len()).fold(1, usize::saturating_mul);
         let flights = (points as u64).saturating_mul(self.runs);

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::Options;
-use crate::base::BaseScenario;
+use crate::base::{BaseScenario, overlap};
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::as_toml;
 use tautline_report::request::Failure;
@@ -231,9 +231,8 @@ impl SearchSpace {
 
     fn check_key(&self, key: &str) -> Result<(), Failure> {
         let Options { start_m, velocity_m_s, .. } = self.options;
-        let same = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}.")) || b.starts_with(&format!("{a}."));
-        let twice = self.bounds.iter().any(|bound| same(&numbered(&bound.key), &numbered(key)));
-        let of_start = (start_m.is_some() || velocity_m_s.is_some()) && same(key, "start");
+        let twice = self.bounds.iter().any(|bound| overlap(&bound.key, key));
+        let of_start = (start_m.is_some() || velocity_m_s.is_some()) && overlap(key, "start");
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
@@ -336,12 +335,6 @@ impl SearchSpace {
         };
         (0..rows.nrows()).map(point).collect::<Vec<_>>().join(", ")
     }
-}
-
-/// A key with the numbers of axes for their names.
-fn numbered(key: &str) -> String {
-    let number = |part: &str| AXES.iter().position(|axis| *axis == part).map(|axis| (axis + 1).to_string());
-    key.split('.').map(|part| number(part).unwrap_or_else(|| part.to_owned())).collect::<Vec<_>>().join(".")
 }
 
 /// Smallest distance of two starts in the lengths that delta is one of \[m\].

@@ -7,9 +7,9 @@ use std::sync::OnceLock;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::error::CampaignError;
 use crate::SCHEMA_VERSION;
 use tautline_report::report::write_atomically;
+use tautline_report::request::Failure;
 
 /// Everything that a shard needs to be flown anywhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,11 +64,11 @@ impl Program {
     /// The one that is running.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where its file cannot be read.
-    pub fn running() -> Result<Self, CampaignError> {
+    /// [`Failure`] where its file cannot be read.
+    pub fn running() -> Result<Self, Failure> {
         let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
-        let path = path.map_err(|error| CampaignError::reading(Path::new("the program"), error))?;
-        let program = fs::read(&path).map_err(|error| CampaignError::reading(&path, error))?;
+        let path = path.map_err(cannot("read", Path::new("the program")))?;
+        let program = fs::read(&path).map_err(cannot("read", &path))?;
         Ok(Self {
             name: tautline_core::PROGRAM.to_owned(),
             version: tautline_core::VERSION.to_owned(),
@@ -110,51 +110,65 @@ impl Manifest {
     /// Reads a manifest.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where it cannot be read, [`CampaignError::Foreign`] where it is none, was changed by hand, or
-    /// another program planned it.
-    pub fn read(path: &Path, program: &Program) -> Result<Self, CampaignError> {
-        let foreign =
-            |why: String, help: &str| Err(CampaignError::Foreign { path: path.to_owned(), why, help: help.to_owned() });
+    /// [`Failure`] `campaign/other-campaign` if the file is missing, is not a manifest, was changed by hand, or was planned by
+    /// another program.
+    pub fn read(path: &Path, program: &Program) -> Result<Self, Failure> {
+        let foreign = |problem: &str, remedy: &str| Err(other_campaign(path, problem, remedy));
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return foreign(
-                    "there is no campaign".to_owned(),
-                    "plan one with: tautline campaign plan SPEC.toml --out FOLDER",
-                );
+                return foreign("no such campaign", "plan one with: tautline campaign plan SPEC.toml --out FOLDER");
             }
-            Err(error) => return Err(CampaignError::reading(path, error)),
+            Err(error) => return Err(cannot("read", path)(error)),
         };
         let read = match serde_json::from_str::<Self>(&text) {
             Ok(read) => read,
-            Err(error) => return foreign(format!("this is no manifest: {error}"), "plan the campaign again"),
+            Err(error) => return foreign(&format!("not a manifest: {error}"), "plan the campaign again"),
         };
         if read.schema_version != SCHEMA_VERSION || read.shards == 0 || read.shards > read.runs {
-            let why = format!("a manifest of version {} with {} shards", read.schema_version, read.shards);
-            return foreign(why, "plan the campaign again with this program");
+            let problem = format!("a manifest of version {} with {} shards", read.schema_version, read.shards);
+            return foreign(&problem, "plan the campaign again with this program");
         }
         let hash = read.hash();
         if hash != read.campaign {
-            let why = format!("it says campaign {}, but its contents are {hash}", read.campaign);
-            return foreign(why, "a manifest is not edited: plan the campaign again, into another folder");
+            let problem =
+                format!("the manifest was edited: it names campaign {}, and its contents are {hash}", read.campaign);
+            return foreign(&problem, "plan the campaign again, into another folder");
         }
         if read.tool.sha256 != program.sha256 {
-            let why = format!(
-                "it was planned by {} {} with the hash {}, and this is {} with the hash {}",
+            let problem = format!(
+                "planned by {} {} with the SHA-256 {}, and this is {} with the SHA-256 {}",
                 read.tool.name, read.tool.version, read.tool.sha256, program.version, program.sha256
             );
-            return foreign(why, "use the same program everywhere, or plan the campaign again into another folder");
+            return foreign(
+                &problem,
+                "use the same program everywhere, or plan the campaign again into another folder",
+            );
         }
         Ok(read)
     }
 
-    /// Writes it.
+    /// Writes the manifest.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`].
-    pub fn write(&self, path: &Path) -> Result<(), CampaignError> {
-        let json = serde_json::to_string_pretty(self).map_err(|error| CampaignError::writing(path, error.into()))?;
+    /// [`Failure`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
+        let json = serde_json::to_string_pretty(self).map_err(|error| cannot("write", path)(error.into()))?;
         Ok(write_atomically(path, (json + "\n").as_bytes())?)
+    }
+}
+
+/// Returns the failure of a file or folder that belongs to another campaign or program.
+pub(super) fn other_campaign(path: &Path, problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Failure {
+    Failure::input("campaign/other-campaign", problem, remedy).of(path)
+}
+
+/// Returns a function that makes the failure of a file that cannot be read or written.
+pub(super) fn cannot(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Failure {
+    let path = path.display();
+    move |error| {
+        Failure::machine("files/cannot-access", format!("{path}: cannot {what} the file: {error}"))
+            .with_help("free some space or mend access, and start again: finished flights are kept")
     }
 }
 

@@ -7,7 +7,6 @@
 
 mod bins;
 mod document;
-mod error;
 mod flights;
 mod folder;
 mod manifest;
@@ -21,7 +20,6 @@ mod tally;
 mod vary;
 
 pub use bins::{Bin, BinShares, Varied};
-pub use error::{CampaignError, DamagedPart};
 pub use flights::{Campaign, Law, MOST_RUNS};
 pub use folder::{ANSWER, Folder, Merged, RESULTS, listed, parse};
 pub use manifest::{Manifest, Program};
@@ -29,7 +27,7 @@ pub use replay::{ReplayRequest, WorstFlight, replay};
 pub use request::{CampaignAnswer, CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
 pub use row::{Known, Row};
 pub use shard::{Found, Shard};
-pub use spec::{Method, Spec, SplittingKeys, Stop};
+pub use spec::{Method, Spec, Stop};
 pub use summary::{BadRun, LawSummary, Pair, Quantiles, Summary, Worst};
 pub use tally::{BoundKind, Intervals, Tally, UpperBound};
 pub use vary::{Grid, Variation};

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::folder::FAULTY;
 use super::{Campaign, Folder, Law, Summary, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateAt};
@@ -140,9 +141,6 @@ fn replay_run(
     }
     Ok(left.report.verdict.pass)
 }
-
-/// What helps where a flight that is flown again is another one.
-const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
 
 /// The number of a law of a campaign, from 0.
 fn number_of(campaign: &Campaign, law: &Law) -> usize {

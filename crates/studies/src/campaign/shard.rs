@@ -14,12 +14,12 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::error::CampaignError;
-use super::folder::{Folder, JOURNAL};
-use super::manifest::{Manifest, base16};
+use super::folder::{Folder, JOURNAL, different_results};
+use super::manifest::{Manifest, base16, cannot, other_campaign};
 use super::row::Row;
 use crate::SCHEMA_VERSION;
 use crate::batch::Batch;
+use tautline_report::request::Failure;
 
 /// What became of a shard.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,9 +42,9 @@ impl Folder {
     /// interruptions before.
     ///
     /// # Errors
-    /// [`CampaignError::Nondeterministic`] where another process flew it meanwhile with different results, [`CampaignError::Flight`] for a
-    /// flight that does not exist, [`CampaignError::Machine`] where the disk is full; what was flown is kept.
-    pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Shard, CampaignError> {
+    /// [`Failure`] if another process flew the shard with different results, a law cannot be built, or the disk is full. Finished
+    /// flights are kept.
+    pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Shard, Failure> {
         if let Found::Whole(rows) = self.read(shard)? {
             return Ok(Shard::Kept(rows));
         }
@@ -63,7 +63,7 @@ impl Folder {
             if let Some(row) = &row {
                 journal.lock().unwrap_or_else(PoisonError::into_inner).add(row)?;
             }
-            Ok::<_, CampaignError>(row)
+            Ok::<_, Failure>(row)
         })?;
         let Some(made) = made.into_iter().collect::<Option<Vec<_>>>() else { return Ok(Shard::Interrupted) };
         rows.extend(made);
@@ -77,7 +77,7 @@ impl Folder {
     }
 
     /// Rows that processes left which were killed, each once.
-    fn flown_before(&self, shard: u64) -> Result<Vec<Row>, CampaignError> {
+    fn flown_before(&self, shard: u64) -> Result<Vec<Row>, Failure> {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
         let manifest = self.campaign().manifest();
         let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
@@ -90,11 +90,7 @@ impl Folder {
                     Entry::Vacant(place) => drop(place.insert((row, path.clone()))),
                     Entry::Occupied(there) if there.get().0 == row => {}
                     Entry::Occupied(there) => {
-                        return Err(CampaignError::Nondeterministic {
-                            shard,
-                            kept: there.get().1.clone(),
-                            other: path,
-                        });
+                        return Err(different_results(shard, &there.get().1, &path));
                     }
                 }
             }
@@ -103,10 +99,10 @@ impl Folder {
     }
 
     /// Puts a part in its place, whole, unless there is one: then both must say the same.
-    fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), CampaignError> {
+    fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
         let (path, own) = (self.part(shard), self.own(shard, "partial"));
-        let failed = |error| CampaignError::writing(&own, error);
+        let failed = |error| cannot("write", &own)(error);
         let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
@@ -124,23 +120,23 @@ impl Folder {
     }
 
     /// Another process was faster: the same bytes are one part, others are an alarm.
-    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let kept = self.part(shard);
-        let there = fs::read(&kept).map_err(|error| CampaignError::reading(&kept, error))?;
+        let there = fs::read(&kept).map_err(cannot("read", &kept))?;
         if there == bytes {
-            return fs::remove_file(own).map_err(|error| CampaignError::writing(own, error));
+            return fs::remove_file(own).map_err(cannot("write", own));
         }
         let other = self.differs(shard);
-        fs::rename(own, &other).map_err(|error| CampaignError::writing(&other, error))?;
-        Err(CampaignError::Nondeterministic { shard, kept, other })
+        fs::rename(own, &other).map_err(cannot("write", &other))?;
+        Err(different_results(shard, &kept, &other))
     }
 
     /// Removes what is left of a shard that is whole.
-    fn sweep(&self, shard: u64) -> Result<(), CampaignError> {
+    fn sweep(&self, shard: u64) -> Result<(), Failure> {
         for path in self.left(shard, JOURNAL)? {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(CampaignError::writing(&path, error));
+                    return Err(cannot("write", &path)(error));
                 }
                 _ => {}
             }
@@ -181,8 +177,8 @@ pub enum Found {
 /// The part of a shard as bytes.
 ///
 /// # Errors
-/// [`CampaignError::Machine`] in no case that is known: every row has a JSON form.
-pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, CampaignError> {
+/// None in practice: every row has a JSON form.
+pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, Failure> {
     let heading =
         Heading { schema_version: SCHEMA_VERSION, campaign: manifest.campaign.clone(), shard, shards: manifest.shards };
     let mut bytes = line(&heading)?;
@@ -194,8 +190,8 @@ pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Ve
     Ok(bytes)
 }
 
-fn line(value: &impl Serialize) -> Result<Vec<u8>, CampaignError> {
-    let written = serde_json::to_vec(value).map_err(|error| CampaignError::writing(Path::new("a row"), error.into()));
+fn line(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
+    let written = serde_json::to_vec(value).map_err(|error| cannot("write", Path::new("a row"))(error.into()));
     written.map(|mut bytes| {
         bytes.push(b'\n');
         bytes
@@ -205,17 +201,17 @@ fn line(value: &impl Serialize) -> Result<Vec<u8>, CampaignError> {
 /// Reads the part of a shard.
 ///
 /// # Errors
-/// [`CampaignError::Foreign`] for a part of another campaign, [`CampaignError::Machine`] where the file cannot be read.
-pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, CampaignError> {
+/// [`Failure`] for a part of another campaign, and for a file that cannot be read.
+pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, Failure> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
-        Err(error) => return Err(CampaignError::reading(path, error)),
+        Err(error) => return Err(cannot("read", path)(error)),
     };
     decode(&bytes, manifest, shard, laws, path)
 }
 
-fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, CampaignError> {
+fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, Failure> {
     const TRUNCATED: &str = "it is truncated: the SHA-256 of its rows is missing";
     const ALTERED: &str = "it was altered: its rows do not have the SHA-256 at its end";
     let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Damaged(TRUNCATED)) };
@@ -231,14 +227,11 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
     if !is_ours {
-        return Err(CampaignError::Foreign {
-            path: path.to_owned(),
-            why: format!(
-                "this is shard {} of {} of campaign {}, not shard {shard} of {} of campaign {}",
-                heading.shard, heading.shards, heading.campaign, manifest.shards, manifest.campaign
-            ),
-            help: "remove it, or merge in the folder that it belongs to".to_owned(),
-        });
+        let problem = format!(
+            "shard {} of {} of campaign {}, not shard {shard} of {} of campaign {}",
+            heading.shard, heading.shards, heading.campaign, manifest.shards, manifest.campaign
+        );
+        return Err(other_campaign(path, problem, "remove the file, or move it to the folder of its campaign"));
     }
     let rows: Vec<Row> = lines.map_while(|line| serde_json::from_slice(line).ok()).collect();
     let places = manifest.range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
@@ -260,20 +253,20 @@ impl Journal {
     /// Begins a journal.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where the file cannot be made.
-    pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, CampaignError> {
-        let file = File::create(&path).map_err(|error| CampaignError::writing(&path, error))?;
+    /// [`Failure`] if the file cannot be made.
+    pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, Failure> {
+        let file = File::create(&path).map_err(cannot("write", &path))?;
         Ok(Self { path, file, campaign: manifest.campaign.clone() })
     }
 
     /// Adds a row.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where the disk is full; what was written before stays.
-    pub(super) fn add(&mut self, row: &Row) -> Result<(), CampaignError> {
+    /// [`Failure`] if the disk is full. Earlier rows stay.
+    pub(super) fn add(&mut self, row: &Row) -> Result<(), Failure> {
         let row = line(row)?;
         let written = [seal_of(&self.campaign, &row).as_bytes(), b" ", &row].concat();
-        self.file.write_all(&written).map_err(|error| CampaignError::writing(&self.path, error))
+        self.file.write_all(&written).map_err(cannot("write", &self.path))
     }
 
     /// Rows of a campaign in a journal that was left behind.
