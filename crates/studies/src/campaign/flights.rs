@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::manifest::{Manifest, Program, other_campaign};
-use super::row::Row;
+use super::folder::{Manifest, Program, other_campaign};
+use super::shard::Row;
 use super::spec::{Method, Spec, Stop, refused};
 use super::summary::{Gathered, Summary};
 use super::vary::Variation;

@@ -115,22 +115,11 @@ pub fn campaign(
         if tally.is_enough() {
             break;
         }
-        warn_of_damage(shard, folder.damaged(shard)?.as_deref(), monitor);
-        let rows = match folder.fly(shard, &batch)? {
-            Shard::Kept(rows) => {
-                monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
-                rows
-            }
-            Shard::Flown { rows, flown } => {
-                flights += flown;
-                rows
-            }
-            Shard::Interrupted => {
-                monitor.finish();
-                monitor.warn("interrupted: what was flown is kept, and the same command goes on from there");
-                return Ok(None);
-            }
-        };
+        let Some(Shard { rows, flown }) = fly_shard(&folder, shard, &batch, monitor)? else { return Ok(None) };
+        if flown == 0 {
+            monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
+        }
+        flights += flown;
         for row in &rows {
             tally.take(row);
         }
@@ -156,21 +145,27 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
     for &shard in shards {
-        warn_of_damage(shard, folder.damaged(shard)?.as_deref(), monitor);
-        monitor.say(&match folder.fly(shard, &batch)? {
-            Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
-            Shard::Flown { flown, .. } => format!("shard {shard}: {flown} flights flown"),
-            Shard::Interrupted => {
-                monitor.finish();
-                monitor.warn(&format!(
-                    "interrupted in shard {shard}: what was flown is kept, and the same command goes on"
-                ));
-                return Ok(false);
-            }
+        let Some(Shard { rows, flown }) = fly_shard(folder, shard, &batch, monitor)? else { return Ok(false) };
+        monitor.say(&match flown {
+            0 => format!("shard {shard}: {} flights had been flown", rows.len()),
+            flown => format!("shard {shard}: {flown} flights flown"),
         });
     }
     monitor.finish();
     Ok(true)
+}
+
+/// Flies a shard. Returns `None` after an interruption.
+fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monitor) -> Result<Option<Shard>, Failure> {
+    warn_of_damage(shard, folder.damaged(shard)?.as_deref(), monitor);
+    let flown = folder.fly(shard, batch)?;
+    if flown.is_none() {
+        monitor.finish();
+        monitor.warn(&format!(
+            "interrupted in shard {shard}: what was flown is kept, and the same command goes on from there"
+        ));
+    }
+    Ok(flown)
 }
 
 /// The shards of a campaign that are missing. Warns of damaged ones.
