@@ -172,11 +172,7 @@ fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes(
     let refused =
         ran_by(copy.to_str().expect("a path"), place.0.path(), &["campaign", "shard", "camp", "--shard", "0"]);
     assert_eq!(refused.exit, Some(2), "{}", refused.out);
-    assert!(
-        refused.err.contains("planned by") && refused.err.contains("use the same program"),
-        "{}",
-        refused.err
-    );
+    assert!(refused.err.contains("planned by") && refused.err.contains("use the same program"), "{}", refused.err);
 }
 
 #[test]

@@ -211,7 +211,7 @@ impl Folder {
     /// Returns the failure of shards that are missing or damaged.
     fn missing_shards(&self, missing: &[u64], damaged: &[String]) -> Failure {
         let (list, shards) = (listed(missing), self.campaign.manifest().shards);
-        let damages: String = damaged.iter().map(|damage| format!("; {damage}")).collect();
+        let damages = damaged.iter().fold(String::new(), |text, damage| text + "; " + damage);
         let replaced = if damaged.is_empty() { "" } else { ", which replaces damaged parts" };
         let command = format!("tautline campaign shard {} --shard {list}", self.path.display());
         Failure::input(
