@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use tautline::attack::Variation;
+use tautline::attack::Bound;
 use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
 use tautline::margin::Range;
@@ -159,7 +159,7 @@ pub(crate) fn attack(
     out: Option<PathBuf>,
     outputs: Outputs,
 ) -> PyResult<Answer> {
-    let vary = vary.iter().map(|(key, low, high)| Variation::new(key, *low, *high)).collect::<Result<_, _>>();
+    let vary = vary.iter().map(|(key, low, high)| Bound::new(key, *low, *high)).collect::<Result<_, _>>();
     let vary = vary.map_err(Failure::raised)?;
     let (start_m, velocity_m_s, apart_m) = (start, velocity, apart);
     let options = tautline::attack::Options { vary, start_m, velocity_m_s, apart_m, flights, seeds, seed, out };

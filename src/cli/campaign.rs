@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
-use super::pictures::pictures;
+use super::run::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::Study as _;
 use tautline_studies::campaign::{

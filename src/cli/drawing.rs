@@ -128,3 +128,27 @@ fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Optio
     }
     Ok(())
 }
+
+/// Environment variable that switches off the layer of Mesa that selects a device.
+#[cfg(target_os = "linux")]
+const NO_LAYER: &str = "NODEVICE_SELECT";
+/// Environment variable in which a user selects a device of this layer.
+#[cfg(target_os = "linux")]
+const CHOICE: &str = "MESA_VK_DEVICE_SELECT";
+
+/// Replaces the process by the same program without the layer, once, if there is no desktop. Without a desktop the layer writes
+/// complaints to standard error. If the program cannot be started again, this process continues.
+#[cfg(target_os = "linux")]
+pub(super) fn silence_driver() {
+    use std::env::{args_os, current_exe, var_os};
+    use std::os::unix::process::CommandExt as _;
+
+    let has_desktop = var_os("XDG_RUNTIME_DIR").is_some_and(|folder| Path::new(&folder).is_absolute());
+    if has_desktop || var_os(NO_LAYER).is_some() || var_os(CHOICE).is_some() {
+        return;
+    }
+    let (Ok(program), mut arguments) = (current_exe(), args_os()) else { return };
+    let called = arguments.next().unwrap_or_else(|| program.clone().into());
+    // `exec` returns only after a failure.
+    let _ = std::process::Command::new(program).arg0(called).args(arguments).env(NO_LAYER, "1").exec();
+}

@@ -1,4 +1,4 @@
-//! The command line, one file per command. Only this module prints.
+//! The command line: all commands, and a file for each command or group of commands. Only this module prints.
 //!
 //! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
 //! Human text goes to standard output, or to standard error where standard output carries data.
@@ -6,22 +6,15 @@
 mod audit;
 mod audit_formats;
 mod campaign;
-mod check;
-mod command;
 mod console;
-mod diagnostic;
 #[cfg(feature = "viewer")]
 mod drawing;
-#[cfg(all(feature = "viewer", target_os = "linux"))]
-mod driver;
 mod export;
 mod list;
-mod pictures;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
 mod run;
-mod scenario;
 mod studies;
 mod validate;
 #[cfg(feature = "viewer")]
@@ -29,12 +22,13 @@ mod view;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::sync::Once;
 
-use clap::Parser as _;
+use clap::{CommandFactory as _, Parser, Subcommand};
 
-use command::{Arguments, Command, dispatch, quiet_guarded_panics};
-use diagnostic::Exit;
-use tautline_report::request::command_line;
+use console::Exit;
+use tautline_recordings::read;
+use tautline_report::request::{Failure, command_line};
 
 /// Runs the program with the arguments of the process.
 #[must_use]
@@ -64,7 +58,109 @@ pub fn entry(arguments: &[OsString]) -> u8 {
         Command::Attack(attack) => attack.draws(),
         other => matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_)),
     } {
-        driver::silence();
+        drawing::silence_driver();
     }
-    dispatch(command, &line).unwrap_or_else(|failure| diagnostic::show(&failure)) as u8
+    dispatch(command, &line).unwrap_or_else(|failure| console::show(&failure)) as u8
+}
+
+/// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
+///
+/// Without a command, flies the built-in scenario `pentagon`.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+enum Command {
+    /// Fly a scenario, audit every step and leave a recording and a report.
+    Run(run::RunArguments),
+    /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
+    Audit(audit::AuditArguments),
+    /// Say what is known before the first step: stability, certified separation, step, traps.
+    Check(run::CheckArguments),
+    /// Reproduce the paper and judge every claim, ours and the paper's.
+    Validate(validate::ValidateArguments),
+    /// Fly the same starts under several laws and set them side by side.
+    Compare(studies::CompareArguments),
+    /// Find how much of one key a scenario survives: where between two values its verdict turns.
+    Margin(studies::MarginArguments),
+    /// Fly a grid over one key or two: how shares and separations depend on them.
+    Sweep(studies::SweepArguments),
+    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
+    Campaign(campaign::CampaignArguments),
+    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
+    Attack(studies::AttackArguments),
+    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    Export(export::ExportArguments),
+    /// Draw a recording: pictures, films and contact sheets, without a screen.
+    #[cfg(feature = "viewer")]
+    Render(render::RenderArguments),
+    /// Open a window on a recording, or on a scenario that is flown while it is watched.
+    #[cfg(feature = "viewer")]
+    View(view::ViewArguments),
+    /// List the built-in scenarios, or print one as TOML to start from.
+    List(list::ListArguments),
+    /// Print the JSON Schema of the scenario file.
+    Schema,
+    /// Print a completion script for a shell.
+    Completions(list::CompletionsArguments),
+}
+
+/// Keeps the panic hook from speaking of what becomes an error anyway.
+fn quiet_guarded_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let speak = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            #[cfg(feature = "viewer")]
+            if tautline_render::is_in_window_library() {
+                std::process::exit(view::lose_display() as i32);
+            }
+            if !read::is_guarded() {
+                speak(panic);
+            }
+        }));
+    });
+}
+
+/// Runs a command. `line` is the whole command line.
+fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
+    match command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Audit(arguments) => audit::audits(&arguments, line),
+        Command::Check(arguments) => run::check(&arguments),
+        Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Compare(arguments) => arguments.run(),
+        Command::Margin(arguments) => arguments.run(),
+        Command::Sweep(arguments) => arguments.run(),
+        Command::Campaign(arguments) => campaign::campaign(&arguments),
+        Command::Attack(arguments) => arguments.run(),
+        Command::Export(arguments) => export::export(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::Render(arguments) => render::render(&arguments),
+        #[cfg(feature = "viewer")]
+        Command::View(arguments) => view::view(&arguments),
+        Command::List(arguments) => list::list(&arguments),
+        Command::Schema => list::schema(),
+        Command::Completions(arguments) => list::completions(&arguments, &mut Arguments::command()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::Arguments;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
 }

@@ -1,14 +1,43 @@
-//! `tautline run`: fly a scenario and leave a recording, figures and a report.
+//! `tautline run` and `tautline check`, and what all commands on a scenario share.
 
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{Args, Parser};
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
-use super::pictures::pictures;
-use super::scenario::ScenarioArguments;
-use tautline_report::request::{Failure, RunRequest, ScenarioRequest, command_line, run_into};
+use tautline_report::request::{Failure, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
+use tautline_sim::preflight::Preflight;
+
+/// A scenario and its overrides.
+#[derive(Debug, Args)]
+pub(super) struct ScenarioArguments {
+    /// A scenario file, the name of a built-in scenario, or - for standard input.
+    #[arg(default_value = "pentagon")]
+    pub(super) scenario: String,
+    /// Set any key of the scenario; may be given several times.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    pub(super) overrides: Vec<String>,
+}
+
+impl ScenarioArguments {
+    /// Returns the scenario as a part of a request.
+    pub(super) fn request(&self) -> Result<ScenarioRequest, Failure> {
+        ScenarioRequest::named(&self.scenario, &self.overrides)
+    }
+}
+
+/// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
+#[cfg(feature = "viewer")]
+pub(super) fn pictures(adapter: &str, takes_snapshots: bool) -> Box<dyn Pictures> {
+    Box::new(tautline_render::RunPictures::new(adapter).with_snapshots(takes_snapshots))
+}
+
+/// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
+#[cfg(not(feature = "viewer"))]
+pub(super) fn pictures(_adapter: &str, _takes_snapshots: bool) -> Box<dyn Pictures> {
+    Box::new(())
+}
 
 /// Arguments of `tautline run`.
 #[derive(Debug, Parser)]
@@ -81,4 +110,34 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         console::json(&left.report)?;
     }
     Ok(Exit::good_if(left.report.verdict.pass))
+}
+
+/// Arguments of `tautline check`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane, \
+step-too-long, drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
+pub(super) struct CheckArguments {
+    #[command(flatten)]
+    what: ScenarioArguments,
+    /// Print what was found as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+    /// Print no summary: the exit code says it.
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let scenario = arguments.what.request()?.read()?;
+    let found = Preflight::of(&scenario)?;
+    console.say(&format!("{}\n{}", found.headline(), found.text()));
+    for warning in &found.warnings {
+        console.say(&warning.to_string());
+    }
+    if arguments.json {
+        console::json(&found)?;
+    }
+    Ok(Exit::good_if(!found.refuses()))
 }

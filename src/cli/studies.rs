@@ -7,11 +7,10 @@ use clap::builder::{PossibleValue, TypedValueParser};
 
 use super::Exit;
 use super::console::{Console, Terminal};
-use super::pictures::pictures;
 use super::reading::one_of;
-use super::scenario::ScenarioArguments;
+use super::run::{ScenarioArguments, pictures};
 use tautline_report::request::Failure;
-use tautline_studies::attack::{FLIGHTS, SEEDS_OF_A_CANDIDATE, Variation};
+use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
 use tautline_studies::sweep::SweptKey;
 use tautline_studies::{
@@ -238,7 +237,7 @@ impl AttackArguments {
 
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         self.study.answer(attack::Options {
-            vary: self.vary.iter().map(|text| Variation::parse(text)).collect::<Result<_, _>>()?,
+            vary: self.vary.iter().map(|text| Bound::parse(text)).collect::<Result<_, _>>()?,
             start_m: self.start,
             velocity_m_s: self.velocity,
             apart_m: self.apart,

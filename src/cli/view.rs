@@ -6,10 +6,10 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use clap::Args;
 
-use super::console::Console;
+use super::Exit;
+use super::console::{self, Console};
 use super::drawing;
 use super::reading::{self, ReadArguments};
-use super::{Exit, diagnostic};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_recordings::read::{Format, ReadOptions};
 use tautline_render::{LiveUpdate, Theme, Timeline, show};
@@ -124,5 +124,5 @@ impl Sink for LiveSink {
 pub(super) fn lose_display() -> Exit {
     let help = "open it again on a display that stays, or draw without one: tautline render RECORDING";
     let message = "the display is gone, and the window with it";
-    diagnostic::show(&Failure::machine("render/no-display", message).with_help(help))
+    console::show(&Failure::machine("render/no-display", message).with_help(help))
 }

@@ -115,7 +115,7 @@ fn a_mistake_is_shown_at_its_line_and_column_of_the_specification() {
     for (from, to, says, at) in [
         ("start.jitter_m", "start.jiter_m", "jiter_m", "spec.toml:7:1"),
         ("{ uniform", "{ unifrom", "unifrom", "spec.toml:7:22"),
-        ("[0.0, 0.3]", "[0.3, 0.0]", "nothing to draw", "spec.toml:7:1"),
+        ("[0.0, 0.3]", "[0.3, 0.0]", "vary.start.jitter_m: must be two", "spec.toml:7:1"),
         ("[0.0, 0.3]", "[-2.0, -1.0]", "jitter_m", "spec.toml:7:1"),
         ("time.duration_s", "time.duratoin_s", "duratoin_s", "spec.toml:5:6"),
         ("runs = 12", "runs = 0", "runs = 0", "spec.toml:2:1"),

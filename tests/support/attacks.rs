@@ -1,6 +1,6 @@
 //! CMA-ES beside uniform random search, and the worst start found for each law, as the tables of docs/attack.md.
 
-use tautline::attack::{Attack, Options, SearchSpace, Variation};
+use tautline::attack::{Attack, Bound, Options, SearchSpace};
 use tautline::request::{ScenarioRequest, Silent};
 use tautline::studies::base::BaseScenario;
 use tautline::studies::{Batch, StudyRequest, answer};
@@ -50,7 +50,7 @@ impl Case {
     fn request(&self, law: Option<&str>, seed: u64) -> StudyRequest<Options> {
         let law = law.map(|law| format!("law.kind={law}"));
         let sets: Vec<_> = law.into_iter().chain(self.sets.iter().map(|&set| set.to_owned())).collect();
-        let vary = self.vary.iter().map(|text| Variation::parse(text).expect("a variation")).collect();
+        let vary = self.vary.iter().map(|text| Bound::parse(text).expect("a variation")).collect();
         let (start_m, apart_m, flights) = (Some(self.start_m), Some(self.apart_m), self.flights);
         let options = Options { vary, start_m, apart_m, flights, seed, ..Options::default() };
         StudyRequest::new(ScenarioRequest::named(self.scenario, &sets).expect("a scenario"), options)

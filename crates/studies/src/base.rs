@@ -131,6 +131,21 @@ impl Runs {
     }
 }
 
+/// Returns whether two keys are the same or one contains the other. An axis may have its name or its number.
+pub(crate) fn overlap(one: &str, other: &str) -> bool {
+    fn parts(key: &str) -> Vec<&str> {
+        let number = |part| match part {
+            "x" => "1",
+            "y" => "2",
+            "z" => "3",
+            other => other,
+        };
+        key.split('.').map(number).collect()
+    }
+    let (one, other) = (parts(one), parts(other));
+    one.starts_with(&other) || other.starts_with(&one)
+}
+
 /// Refuses numbers of runs and seeds out of range.
 pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
     in_range("--runs", &runs, &(1..=MOST_RUNS))?;

@@ -95,6 +95,23 @@ impl<'a> Batch<'a> {
         made.into_iter().map(|(_, made)| made).collect()
     }
 
+    /// Calls `make` for each member of `count` groups of `size`, group after group, as [`Batch::run`] does. A group is `None` if a
+    /// result is missing.
+    ///
+    /// # Errors
+    /// As [`Batch::run`].
+    pub fn run_groups<T: Send, E: Send>(
+        &self,
+        count: usize,
+        size: usize,
+        make: impl Fn(usize, usize) -> Result<Option<T>, E> + Sync,
+    ) -> Result<Vec<Option<Vec<T>>>, E> {
+        let mut made = self.run(count.saturating_mul(size), |number| make(number / size, number % size))?.into_iter();
+        // All members are taken before they are collected, which stops at the first missing result.
+        let mut group = || made.by_ref().take(size).collect::<Vec<_>>().into_iter().collect();
+        Ok((0..count).map(|_| group()).collect())
+    }
+
     /// Flies a scenario to its end. Returns `None` if the batch was interrupted.
     ///
     /// # Errors
@@ -143,6 +160,15 @@ mod tests {
             assert_eq!(failed, Err(9));
         }
         assert!(Batch::new(Some(0), &monitor).is_err() && Batch::new(Some(257), &monitor).is_err());
+    }
+
+    #[test]
+    fn a_group_without_all_its_results_is_missing() {
+        let monitor = Silent::default();
+        let batch = Batch::new(Some(2), &monitor).expect("a batch");
+        let groups = batch.run_groups(3, 2, |group, member| Ok::<_, ()>((group != 1 || member > 0).then_some(member)));
+        assert_eq!(groups, Ok(vec![Some(vec![0, 1]), None, Some(vec![0, 1])]));
+        assert_eq!(batch.run_groups(0, 3, |_, member| Ok::<_, ()>(Some(member))), Ok(Vec::new()));
     }
 
     #[test]

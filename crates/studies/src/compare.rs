@@ -159,16 +159,20 @@ impl Experiment for Options {
         }
         (1..self.runs).try_for_each(|run| drawn(template, &laws[0], seed(run), jitter_m).map(drop))?;
 
-        let flights = usize::try_from(self.runs).unwrap_or(usize::MAX).saturating_mul(laws.len());
-        batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
+        let starts = usize::try_from(self.runs).unwrap_or(usize::MAX);
+        let steps = base.own().time.steps().saturating_mul(self.runs).saturating_mul(laws.len() as u64);
+        batch.monitor().begin(Self::COMMAND, Some(steps));
         let began = Instant::now();
         // Each start is flown under all laws before the next start, so an interruption leaves few incomplete starts.
-        let flown = batch.run(flights, |number| {
-            let (law, seed) = (&laws[number % laws.len()], seed((number / laws.len()) as u64));
+        let flown = batch.run_groups(starts, laws.len(), |run, law| {
+            let (law, seed) = (&laws[law], seed(run as u64));
             let flight = batch.fly(&drawn(template, law, seed, jitter_m)?, seed);
             flight.map_err(|error| Failure::from(error).under(&under(law, seed)))
         })?;
-        let flights = by_law(flown, laws.len());
+        let mut flights = vec![Vec::new(); laws.len()];
+        for start in flown.into_iter().flatten() {
+            flights.iter_mut().zip(start).for_each(|(flights, flight)| flights.push(flight));
+        }
         let runs = flights[0].len() as u64;
         if runs == 0 {
             return Ok(None);
@@ -229,23 +233,6 @@ fn under(law: &NamedLaw, seed: u64) -> String {
 fn drawn(template: &Template, law: &NamedLaw, seed: u64, jitter_m: Option<f64>) -> Result<Scenario, Failure> {
     let drawn = template.scenario(law, Draw { seed, jitter_m });
     drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))
-}
-
-/// Returns the flights of each law, from the starts that were flown under every law. `flown` holds start after start,
-/// and within a start law after law.
-fn by_law<T>(flown: Vec<Option<T>>, laws: usize) -> Vec<Vec<T>> {
-    let mut flights: Vec<Vec<T>> = (0..laws).map(|_| Vec::new()).collect();
-    let mut flown = flown.into_iter().peekable();
-    while flown.peek().is_some() {
-        // Takes all flights of a start, also those that were not flown.
-        let of_start: Vec<_> = flown.by_ref().take(laws).collect();
-        for (law, flight) in
-            flights.iter_mut().zip(of_start.into_iter().collect::<Option<Vec<_>>>().into_iter().flatten())
-        {
-            law.push(flight);
-        }
-    }
-    flights
 }
 
 /// Returns a picture for each law: the flight with the smallest separation, at the time of this separation.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::attack::{Bound, FLIGHTS};
-use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
+use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note, overlap};
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
@@ -162,8 +162,11 @@ impl Options {
             let why = format!("--key: a sweep has one key or two, got {}", self.keys.len());
             return grid(why, "give --key once or twice; other keys are set with --set");
         }
-        if self.keys.len() == 2 && self.keys[0].key == self.keys[1].key {
-            return grid(format!("--key: {} is given twice", self.keys[0].key), "give all its values in one --key");
+        if let [one, other] = &self.keys[..]
+            && overlap(&one.key, &other.key)
+        {
+            let why = format!("--key: {} and {} overlap", one.key, other.key);
+            return grid(why, "give two different keys; all values of a key are in one --key");
         }
         let points = self.keys.iter().map(|key| key.values.len()).fold(1, usize::saturating_mul);
         let flights = (points as u64).saturating_mul(self.runs);
@@ -242,18 +245,18 @@ impl Experiment for Options {
         let runs = Runs::new(self.runs, self.seed, base, is_random || keys.contains(&JITTER_KEY));
         runs.check_seeds(&keys, base, is_random)?;
         let count = usize::try_from(self.runs).unwrap_or(usize::MAX);
-        let flights = points.len() * count;
-        batch.monitor().begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(flights as u64)));
-        let flown = batch.run(flights, |number| {
-            let (values, run) = (&points[number / count], (number % count) as u64);
-            let scenario = base.with(&[runs.sets(run), sets(&self.keys, values)].concat());
+        let steps = base.own().time.steps().saturating_mul(points.len() as u64).saturating_mul(self.runs);
+        batch.monitor().begin(Self::COMMAND, Some(steps));
+        let flown = batch.run_groups(points.len(), count, |point, run| {
+            let run = run as u64;
+            let scenario = base.with(&[runs.sets(run), sets(&self.keys, &points[point])].concat());
             let scenario = scenario.map_err(|error| error.message().to_owned());
             let flight = scenario.and_then(|of| batch.fly(&of, runs.seed(run)).map_err(|error| error.to_string()));
             Ok::<_, Failure>(flight.transpose())
         })?;
         let of_point =
             |(values, runs): (&Vec<f64>, Option<Vec<_>>)| Some(Point::new(values.clone(), self.question, runs?));
-        let flown: Vec<_> = points.iter().zip(complete_groups(flown, count)).filter_map(of_point).collect();
+        let flown: Vec<_> = points.iter().zip(flown).filter_map(of_point).collect();
         let own = base.own();
         let sweep = Sweep {
             about: About::new(own),
@@ -269,17 +272,6 @@ impl Experiment for Options {
         };
         Ok((!sweep.points.is_empty()).then_some(sweep))
     }
-}
-
-/// Returns groups of `count` results each; a group that lacks a result is `None`.
-fn complete_groups<T>(results: Vec<Option<T>>, count: usize) -> Vec<Option<Vec<T>>> {
-    let mut results = results.into_iter();
-    let mut groups = Vec::new();
-    while results.len() > 0 {
-        let group: Vec<_> = results.by_ref().take(count).collect();
-        groups.push(group.into_iter().collect());
-    }
-    groups
 }
 
 impl Point {

@@ -76,7 +76,7 @@ fn wrong_requests_have_codes() {
     assert_eq!(refused(attack::Options { start_m: Some(-1.0), ..options() }), "attack/out-of-range");
     assert_eq!(refused(attack::Options { flights: 0, ..options() }), "request/out-of-range");
     assert_eq!(refused(attack::Options { seeds: 3, ..options() }), "attack/too-few-flights");
-    let seed = attack::Variation::new("noise.seed", 0.0, 9.0).expect("a range");
+    let seed = attack::Bound::new("noise.seed", 0.0, 9.0).expect("a range");
     assert_eq!(refused(attack::Options { vary: vec![seed], ..options() }), "attack/seed-varied");
 
     let missing = CampaignRequest::new("none.toml".into());

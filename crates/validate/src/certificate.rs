@@ -1,7 +1,6 @@
 //! The energy and what it certifies, on random starts.
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
 use super::flights::{COUNTS, DELTA_M, random_starts};
 use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
 use tautline_core::swarm::Swarm;

@@ -4,8 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated};
+use super::claim::{Claim, Judged, Progress, Untried, stated};
 use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
@@ -42,24 +41,17 @@ pub struct Refinement {
     pub energy_rise_m2_s2: f64,
 }
 
-/// What one flight gave.
-#[derive(Clone, Copy, Debug, Default)]
-struct Flown {
-    error_m: f64,
-    excess: f64,
-    rise: f64,
-}
-
 fn largest_distance_m(a: &Swarm, b: &Swarm) -> f64 {
     let distance = |i: usize| (row(&a.positions_m, i) - row(&b.positions_m, i)).norm();
     (0..a.count()).map(distance).fold(0.0, larger)
 }
 
-/// Flies with every step recorded and compares with the states of continuous time.
-fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Flown, Untried> {
-    let scenario = with_step(scenario, 1.0 / steps_hz);
+/// Flies with every step recorded and compares with the states of continuous time. The order is left out.
+fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Refinement, Untried> {
+    let dt_s = 1.0 / steps_hz;
+    let scenario = with_step(scenario, dt_s);
     let every = steps_hz / COMPARED_HZ;
-    let mut flown = Flown::default();
+    let mut flown = Refinement { dt_s, ..Refinement::default() };
     let (mut allowed, mut lowest, mut power) = (f64::NAN, f64::INFINITY, f64::NAN);
     engine(&scenario, |sample| {
         let entry = sample.step as f64 / every;
@@ -73,8 +65,8 @@ fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Flown,
         let power_now = relative_speed_squared(sample.swarm);
         // dE/dt = -sum |v~|^2, by the trapezoidal rule.
         allowed = if sample.step == 0 { energy } else { allowed - 0.5 * (power + power_now) / steps_hz };
-        flown.excess = larger(flown.excess, (energy - allowed).abs());
-        flown.rise = larger(flown.rise, energy - lowest);
+        flown.energy_excess_m2_s2 = larger(flown.energy_excess_m2_s2, (energy - allowed).abs());
+        flown.energy_rise_m2_s2 = larger(flown.energy_rise_m2_s2, energy - lowest);
         (lowest, power) = (lowest.min(energy), power_now);
     })?;
     Ok(flown)
@@ -89,19 +81,12 @@ pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untrie
     let mut scenario = builtin("pentagon")?;
     scenario.time.duration_s = DURATION_S;
     let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default())?.states;
-    let flown = STEPS_HZ
+    let mut refinements = STEPS_HZ
         .par_iter()
         .map(|&steps_hz| fly(&scenario, steps_hz, &reference).inspect(|_| progress(1)))
         .collect::<Result<Vec<_>, Untried>>()?;
-    let mut refinements: Vec<Refinement> = Vec::new();
-    for (steps_hz, Flown { error_m, excess, rise }) in STEPS_HZ.into_iter().zip(flown) {
-        refinements.push(Refinement {
-            dt_s: 1.0 / steps_hz,
-            error_m,
-            order: refinements.last().map(|coarse| order(coarse.error_m, error_m)),
-            energy_excess_m2_s2: excess,
-            energy_rise_m2_s2: rise,
-        });
+    for fine in 1..refinements.len() {
+        refinements[fine].order = Some(order(refinements[fine - 1].error_m, refinements[fine].error_m));
     }
     Ok(refinements)
 }

@@ -1,7 +1,6 @@
 //! Three detectors, one answer: the closed form, parry's shape cast and the engine's own contacts.
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated};
+use super::claim::{Claim, Judged, Progress, Untried, stated};
 use super::flights::{builtin, engine, separation_m};
 use tautline_audit::Status;
 use tautline_core::swarm::Pair;

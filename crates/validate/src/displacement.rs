@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
 use super::flights::{builtin, certified_m, continuous, larger, reached_at_s, separation_m, times};
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::{Graph, Pinning};

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
 use super::flights::{continuous, end};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;

@@ -1,7 +1,6 @@
 //! The law (8) at single instants: its matrix form, its sum, and what it does to the energy.
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated};
+use super::claim::{Claim, Judged, Progress, Untried, stated};
 use super::flights::{DELTA_M, random_starts};
 use super::flights::{larger, relative_speed_squared, relative_velocities};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, set_row};

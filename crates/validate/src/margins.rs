@@ -1,7 +1,6 @@
 //! Margins of delay and of held commands: where a disturbance of a millimetre begins to grow, against linear theory.
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
 use super::flights::{builtin, larger};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Swarm, mean_row, row, set_row};

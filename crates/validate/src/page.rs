@@ -1,8 +1,6 @@
 //! The result in words: a line a claim for the terminal, tables for `docs/validation.md`.
 
-use super::claim::Untried;
-use super::claim::Validation;
-use super::claim::{Claim, Group, Kind};
+use super::claim::{Claim, Group, Kind, Untried, Validation};
 use super::convergence::Refinement;
 use super::detectors::{Flights, Flown};
 use super::tension;

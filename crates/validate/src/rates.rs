@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
 use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
 use tautline_core::swarm::{Rows, Swarm, mean_row, set_row};
 use tautline_core::text::bound;

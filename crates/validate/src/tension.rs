@@ -1,7 +1,6 @@
 //! The edge tension (5), (6): its minimum and its derivatives.
 
-use super::claim::Claim;
-use super::claim::{Judged, Progress, Untried, stated};
+use super::claim::{Claim, Judged, Progress, Untried, stated};
 use tautline_core::text::bound;
 use tautline_laws::law::EdgeTension;
 

@@ -74,13 +74,6 @@ impl Failure {
         self.under(&file.display().to_string())
     }
 
-    /// Replaces the word FOLDER of the remedy.
-    #[must_use]
-    pub fn naming(mut self, folder: &str) -> Self {
-        self.help = self.help.map(|help| blanked(&help.replace("FOLDER", folder)));
-        self
-    }
-
     /// Says where in a text the problem stands.
     #[must_use]
     pub fn at(mut self, place: &Place) -> Self {

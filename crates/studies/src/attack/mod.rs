@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-pub use space::{Bound, SearchSpace, Variation};
+pub use space::{Bound, SearchSpace};
 
 use crate::base::BaseScenario;
 use crate::batch::Batch;
@@ -56,7 +56,7 @@ const ASSUMED: [&str; 4] = [
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Keys, each between two values.
-    pub vary: Vec<Variation>,
+    pub vary: Vec<Bound>,
     /// How far each start may be from that of the scenario along each axis \[m\].
     pub start_m: Option<f64>,
     /// How far each velocity at the start may be from that of the scenario along each axis \[m/s\].

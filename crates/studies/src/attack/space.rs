@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::Options;
-use crate::base::BaseScenario;
+use crate::base::{BaseScenario, overlap};
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::as_toml;
 use tautline_report::request::Failure;
@@ -20,38 +20,27 @@ const STEPS: f64 = 1e6;
 /// Most decimals of a value.
 const MOST_DECIMALS: u8 = 15;
 
-/// A key of a scenario and the values between which it may be: an argument of `--vary`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Variation {
-    /// The key, as for an override.
-    pub key: String,
-    /// Its smallest value.
-    pub low: f64,
-    /// Its largest value.
-    pub high: f64,
-}
-
-/// A number that a search chooses within bounds.
+/// A number that a search chooses within bounds: an argument of `--vary`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// Its key.
+    /// Its key, as for an override.
     pub key: String,
     /// Its smallest value.
     pub low: f64,
     /// Its largest value.
     pub high: f64,
-    /// Whether the number is an integer.
+    /// Whether the number is an integer. A search sets it from the key.
     pub whole: bool,
 }
 
-impl fmt::Display for Variation {
-    /// As [`Variation::parse`] reads it.
+impl fmt::Display for Bound {
+    /// Writes the form that [`Bound::parse`] reads.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}..{}", self.key, self.low, self.high)
     }
 }
 
-impl Variation {
+impl Bound {
     /// Parses `KEY=LOW..HIGH`.
     ///
     /// # Errors
@@ -64,33 +53,26 @@ impl Variation {
         Self::new(key, number(low)?, number(high)?)
     }
 
-    /// A key between two values.
+    /// Returns a key between two values.
     ///
     /// # Errors
-    /// [`Failure`] `attack/variation` for bounds that are not finite, or of which the first is not the smaller one.
+    /// [`Failure`] `attack/variation` unless the values are finite and in increasing order.
     pub fn new(key: &str, low: f64, high: f64) -> Result<Self, Failure> {
         if !(low.is_finite() && high.is_finite() && (high - low).is_finite()) {
-            return Err(wrong(&format!("{key} is to be between {low} and {high}")));
+            return Err(wrong(&format!("the range of {key} must be finite, got {low} to {high}")));
         }
         if low >= high {
-            let why = format!("{key} is to be between {low} and {high}, of which the first is not the smaller one");
-            return Err(wrong(&why));
+            return Err(wrong(&format!("the range of {key} must be in increasing order, got {low} to {high}")));
         }
-        Ok(Self { key: key.to_owned(), low, high })
+        Ok(Self { key: key.to_owned(), low, high, whole: false })
     }
 
-    fn bound(&self, whole: bool) -> Bound {
-        Bound { key: self.key.clone(), low: self.low, high: self.high, whole }
-    }
-}
-
-impl Bound {
-    /// The value at a place from 0 to 1 between the bounds, rounded to a millionth of their distance, or to a whole number.
+    /// Returns the value at a place from 0 to 1 between the bounds, rounded to a millionth of their distance, or to an integer.
     #[must_use]
     pub fn at(&self, place: f64) -> f64 {
         let Self { low, high, whole, .. } = *self;
         if whole {
-            // Each whole number has the same share of the places.
+            // Each integer has the same share of the places.
             return (low + ((high - low + 1.0) * place).floor()).clamp(low, high);
         }
         let value = low + (high - low) * place;
@@ -135,9 +117,9 @@ impl SearchSpace {
         }
         let mut space = Self { base: base.clone(), options: options.clone(), bounds: Vec::new() };
         let mut is_random = base.own().is_random_in_flight();
-        for variation in &options.vary {
-            space.check_key(&variation.key)?;
-            let (bound, varied) = space.bound(variation)?;
+        for bound in &options.vary {
+            space.check_key(&bound.key)?;
+            let (bound, varied) = space.bound(bound)?;
             is_random |= varied.is_random_in_flight();
             space.bounds.push(bound);
         }
@@ -231,9 +213,8 @@ impl SearchSpace {
 
     fn check_key(&self, key: &str) -> Result<(), Failure> {
         let Options { start_m, velocity_m_s, .. } = self.options;
-        let same = |a: &str, b: &str| a == b || a.starts_with(&format!("{b}.")) || b.starts_with(&format!("{a}."));
-        let twice = self.bounds.iter().any(|bound| same(&numbered(&bound.key), &numbered(key)));
-        let of_start = (start_m.is_some() || velocity_m_s.is_some()) && same(key, "start");
+        let twice = self.bounds.iter().any(|bound| overlap(&bound.key, key));
+        let of_start = (start_m.is_some() || velocity_m_s.is_some()) && overlap(key, "start");
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
@@ -268,20 +249,19 @@ impl SearchSpace {
         ))
     }
 
-    /// The bound of a key, and a scenario with a value within it.
+    /// Returns a bound, with whether its key takes integers only, and a scenario with a value within it.
     ///
     /// # Errors
-    /// [`Failure`] where neither a value between the bounds nor a bound can be read, and for a bound with a fraction of a key that
-    /// takes integers only.
-    fn bound(&self, variation: &Variation) -> Result<(Bound, Scenario), Failure> {
-        let Variation { ref key, low, high } = *variation;
+    /// [`Failure`] if no tried value can be read, and for a bound with a fraction of a key that takes integers only.
+    fn bound(&self, bound: &Bound) -> Result<(Bound, Scenario), Failure> {
+        let Bound { ref key, low, high, .. } = *bound;
         let read = |value: f64| self.base.with(&[format!("{key}={}", as_toml(value))]);
         let refused = |value: f64, error: ScenarioError| Failure::from(error).under(&format!("with {key} = {value}"));
         let whole = self.base.takes_integers_only(key);
         if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
             read(end).map_err(|error| refused(end, error))?;
         }
-        let bound = variation.bound(whole);
+        let bound = Bound { whole, ..bound.clone() };
         if let Ok(scenario) = read(bound.at(BETWEEN)) {
             return Ok((bound, scenario));
         }
@@ -338,12 +318,6 @@ impl SearchSpace {
     }
 }
 
-/// A key with the numbers of axes for their names.
-fn numbered(key: &str) -> String {
-    let number = |part: &str| AXES.iter().position(|axis| *axis == part).map(|axis| (axis + 1).to_string());
-    key.split('.').map(|part| number(part).unwrap_or_else(|| part.to_owned())).collect::<Vec<_>>().join(".")
-}
-
 /// Smallest distance of two starts in the lengths that delta is one of \[m\].
 fn closest_start_m(scenario: &Scenario) -> f64 {
     let places = scenario.metric().scaled_rows(&scenario.start.positions_m);
@@ -357,36 +331,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_variation_is_a_key_and_two_numbers() {
-        let read = Variation::parse("start.positions_m.2.x = -1.5..0.25");
-        let expected = Variation::new("start.positions_m.2.x", -1.5, 0.25);
-        assert_eq!(read.expect("a variation"), expected.expect("a variation"));
+    fn a_bound_is_a_key_and_two_numbers() {
+        let read = Bound::parse("start.positions_m.2.x = -1.5..0.25");
+        let expected = Bound::new("start.positions_m.2.x", -1.5, 0.25);
+        assert_eq!(read.expect("a bound"), expected.expect("a bound"));
         for (text, said) in [
             ("law.alpha", "is not KEY=LOW..HIGH"),
             ("law.alpha=1", "is not KEY=LOW..HIGH"),
             ("law.alpha=1..", "`` is not a number"),
             ("law.alpha=a..2", "`a` is not a number"),
-            ("law.alpha=2..2", "not the smaller"),
-            ("law.alpha=3..2", "not the smaller"),
-            ("law.alpha=0..inf", "between 0 and inf"),
-            ("law.alpha=nan..1", "between NaN and 1"),
-            ("law.alpha=-1e308..1e308", "between"),
+            ("law.alpha=2..2", "must be in increasing order"),
+            ("law.alpha=3..2", "must be in increasing order"),
+            ("law.alpha=0..inf", "must be finite, got 0 to inf"),
+            ("law.alpha=nan..1", "must be finite, got NaN to 1"),
+            ("law.alpha=-1e308..1e308", "must be finite"),
         ] {
-            let refused = Variation::parse(text).expect_err(text);
+            let refused = Bound::parse(text).expect_err(text);
             assert!(refused.message().contains(said), "{text}: {refused}");
         }
     }
 
     #[test]
     fn values_have_few_digits_and_never_leave_their_bounds() {
-        let bound = Variation::new("key", -0.1, 2.0 / 3.0).expect("a variation").bound(false);
+        let bound = Bound::new("key", -0.1, 2.0 / 3.0).expect("a bound");
         assert_eq!([bound.at(0.0), bound.at(1.0)], [bound.low, bound.high]);
         for k in 0..=1000 {
             let value = bound.at(f64::from(k) / 1000.0);
             assert!((bound.low..=bound.high).contains(&value), "{value}");
             assert!(k == 1000 || value.to_string().len() <= "-0.1234567".len(), "{value}");
         }
-        let whole = Variation::new("key", 1.0, 3.0).expect("a variation").bound(true);
+        let whole = Bound { whole: true, ..Bound::new("key", 1.0, 3.0).expect("a bound") };
         assert_eq!([0.0, 0.3, 0.34, 0.66, 0.67, 1.0].map(|place| whole.at(place)), [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
     }
 }

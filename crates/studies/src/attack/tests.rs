@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use super::{Attack, Options, SearchSpace, Variation};
+use super::{Attack, Bound, Options, SearchSpace};
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::flight::{Outcome, fly};
@@ -32,7 +32,7 @@ fn asked(flights: u64) -> Options {
 }
 
 fn varied(vary: &[&str], flights: u64) -> Options {
-    let vary = vary.iter().map(|text| Variation::parse(text).expect("a variation")).collect();
+    let vary = vary.iter().map(|text| Bound::parse(text).expect("a variation")).collect();
     Options { vary, flights, ..Options::default() }
 }
 

@@ -1,7 +1,7 @@
 //! The answer of a campaign for people: a sentence, notes, tables and figures.
 
-use super::bins::{Bin, BinShares, Varied};
 use super::summary::{LawSummary, Pair, Quantiles, Summary};
+use super::tally::{Bin, BinShares, Varied};
 use super::tally::{BoundKind, Intervals};
 use crate::splitting::Repetitions;
 use crate::statistics::Proportion;

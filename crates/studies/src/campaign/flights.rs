@@ -5,16 +5,16 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::CampaignError;
-use super::manifest::{Manifest, Program};
-use super::row::Row;
-use super::spec::{Method, Spec, Stop, refuse_overlaps};
+use super::folder::{Manifest, Program, other_campaign};
+use super::shard::Row;
+use super::spec::{Method, Spec, Stop, refused};
 use super::summary::{Gathered, Summary};
 use super::vary::Variation;
 use crate::SCHEMA_VERSION;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::splitting::{self, Settings};
+use tautline_report::request::Failure;
 use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
 
 /// Most runs of a campaign.
@@ -61,15 +61,15 @@ impl Campaign {
     /// `folder`.
     ///
     /// # Errors
-    /// [`CampaignError`] for numbers that make no campaign, and for the first value, law or run that cannot be flown.
+    /// [`Failure`] for a specification that makes no campaign, and for the first value, law or run that cannot be flown.
     pub fn plan(
         spec: &Spec,
         name: &str,
         folder: &Path,
         shards: Option<u64>,
         program: Program,
-    ) -> Result<Self, CampaignError> {
-        let plain = |error| CampaignError::scenario("", "scenario", error);
+    ) -> Result<Self, Failure> {
+        let plain = |error| spec.scenario("scenario", "", error);
         let file = folder.join(&spec.scenario);
         let source =
             if file.is_file() { Source::File(file) } else { Source::resolve(&spec.scenario).map_err(plain)? };
@@ -91,13 +91,11 @@ impl Campaign {
         };
         manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
         if manifest.shards == 0 || manifest.shards > manifest.runs {
-            return Err(CampaignError::plan(
-                format!("{} runs cannot be split into {} shards", manifest.runs, manifest.shards),
-                "give at least 1 shard and at most one a run",
-            ));
+            let problem = format!("--shards: must be from 1 to the {} runs, got {}", manifest.runs, manifest.shards);
+            return Err(refused(problem, "give fewer shards, or leave --shards out"));
         }
         let mut campaign = Self::read(manifest, spec)?;
-        campaign.check()?;
+        campaign.check(spec)?;
         campaign.manifest.first = campaign.first();
         campaign.manifest = campaign.manifest.sealed();
         Ok(campaign)
@@ -106,60 +104,51 @@ impl Campaign {
     /// The campaign of a manifest.
     ///
     /// # Errors
-    /// [`CampaignError`] where it cannot be flown here, such as for a file that its scenario names and that is not there, or is
+    /// [`Failure`] where it cannot be flown here, such as for a file that its scenario names and that is not there, or is
     /// another one.
-    pub fn of(manifest: Manifest) -> Result<Self, CampaignError> {
+    pub fn of(manifest: Manifest) -> Result<Self, Failure> {
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec)?;
         let first = campaign.first();
         if first != campaign.manifest.first {
-            return Err(CampaignError::Foreign {
-                path: campaign.manifest.folder.clone(),
-                why: format!(
-                    "run 0 is another flight here than where it was planned (SHA-256 {} here, {} there)",
-                    first.join(", "),
-                    campaign.manifest.first.join(", ")
-                ),
-                help: "the files that the scenario names must be the same everywhere".to_owned(),
-            });
+            let problem = format!(
+                "run 0 is another flight here than where the campaign was planned (SHA-256 {} here, {} there)",
+                first.join(", "),
+                campaign.manifest.first.join(", ")
+            );
+            let remedy = "provide the same files of the scenario everywhere";
+            return Err(other_campaign(&campaign.manifest.folder, problem, remedy));
         }
         Ok(campaign)
     }
 
-    fn read(manifest: Manifest, spec: &Spec) -> Result<Self, CampaignError> {
+    fn read(manifest: Manifest, spec: &Spec) -> Result<Self, Failure> {
         let source = Source::Embedded {
             name: manifest.scenario_name.clone(),
             text: manifest.scenario.clone(),
             folder: manifest.folder.clone(),
         };
-        if let Some(stop) = spec.stop {
-            stop.check()?;
-        }
+        spec.check_stop()?;
         let sets = spec.sets();
         let mut variations = spec.variations()?;
-        refuse_overlaps(&sets, &variations, !spec.laws.is_empty())?;
+        spec.check_overlaps(&sets, &variations)?;
         if spec.splitting.is_some() && spec.method != Method::Splitting {
-            return Err(CampaignError::plan(
-                "[splitting] without method = \"splitting\"",
-                "add it, or leave the table out",
-            )
-            .at("splitting"));
+            let problem = "splitting: needs method = \"splitting\"";
+            return Err(spec.refuse("splitting", problem, "add the method, or leave the table out"));
         }
         let written = |(key, value): (&String, &toml::Value)| Override::parse(&format!("{key}={value}"));
         let written = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
-        let written = written.map_err(|error| CampaignError::scenario("[set] ", "set", error))?;
-        let base = BaseScenario::read(source, written);
-        let base = base.map_err(|error| CampaignError::scenario("", "scenario", error))?;
+        let written = written.map_err(|error| spec.scenario("set", "", error))?;
+        let base = BaseScenario::read(source, written).map_err(|error| spec.scenario("scenario", "", error))?;
         let template = base.template();
         let laws = spec.laws.iter().map(|name| {
-            let law = template.law(name).map_err(|error| CampaignError::scenario("", "laws", error))?;
+            let law = template.law(name).map_err(|error| spec.scenario("laws", "", error))?;
             Ok(Law { name: law.name.clone(), overrides: law.overrides() })
         });
-        let mut laws = laws.collect::<Result<Vec<_>, CampaignError>>()?;
+        let mut laws = laws.collect::<Result<Vec<_>, Failure>>()?;
         if let Some((_, twice)) = laws.iter().enumerate().find(|&(k, law)| laws[..k].contains(law)) {
-            return Err(
-                CampaignError::plan(format!("the law {} is named twice", twice.name), "name each law once").at("laws")
-            );
+            let problem = format!("laws: the law `{}` is given twice", twice.name);
+            return Err(spec.refuse("laws", problem, "give each law once"));
         }
         if laws.is_empty() {
             laws.push(Law { name: template.own_law().name, overrides: Vec::new() });
@@ -171,7 +160,7 @@ impl Campaign {
         ];
         let drawn: Vec<_> = open.into_iter().filter(|&(key, is_random)| is_random && is_open(key)).collect();
         variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
-        let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default().into());
+        let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default());
         let file = manifest.folder.join(&manifest.scenario_name);
         let builtin = tautline_sim::scenario::builtin::find(&manifest.scenario_name);
         let is_builtin = builtin.is_some_and(|builtin| builtin.toml == manifest.scenario);
@@ -179,82 +168,71 @@ impl Campaign {
         Ok(Self { manifest, base, laws, variations, seed: spec.seed, stop: spec.stop, splitting, argument })
     }
 
-    /// Refuses keys that do not take what may be drawn, and runs that are all the same.
-    fn check(&self) -> Result<(), CampaignError> {
+    /// Refuses values that their keys do not take, and runs that are all the same.
+    fn check(&self, spec: &Spec) -> Result<(), Failure> {
         let grids = self.variations.values().any(|variation| variation.grid_len().is_some());
         if grids && self.stop.is_some() {
-            return Err(CampaignError::plan(
-                "[stop] with a grid: the first runs are those of its first points",
-                "draw the values instead (list, uniform), or leave [stop] out",
-            )
-            .at("stop"));
+            let problem = "stop: must not be given with a grid, whose first runs are its first points";
+            let remedy = "draw the values instead (list, uniform), or leave [stop] out";
+            return Err(spec.refuse("stop", problem, remedy));
         }
         if self.splitting.is_some() && self.stop.is_some() {
-            return Err(CampaignError::plan(
-                "[stop] is about shares of flights, and splitting estimates a probability",
-                "leave [stop] out and fix the number of runs, or leave method out",
-            )
-            .at("stop"));
+            let problem = "stop: must not be given with splitting, which estimates no share of flights";
+            return Err(spec.refuse("stop", problem, "leave [stop] or `method` out"));
         }
-        if self.variations.is_empty() && self.manifest.runs > 1 && self.splitting.is_none() {
-            return Err(CampaignError::plan(
-                format!("all {} runs are the same flight", self.manifest.runs),
-                "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
-            ));
-        }
-        if self.variations.values().all(|variation| *variation == Variation::Seed {}) && self.splitting.is_none() {
-            let law = &self.laws[0];
-            let hash =
-                |run: u64| self.scenario(run, law).map_or_else(|error| error.to_string(), |run| run.sha256_hex());
-            let runs = self.manifest.runs.min(3);
-            if runs > 1 && (1..runs).all(|run| hash(run) == hash(0)) {
-                return Err(CampaignError::plan(
-                    format!(
-                        "all {} runs are the same flight: nothing depends on the seeds that are drawn",
-                        self.manifest.runs
-                    ),
-                    "let something differ: \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], a random start, or wind",
-                ));
-            }
+        let runs = self.manifest.runs;
+        if runs > 1 && self.splitting.is_none() && self.runs_are_equal() {
+            let problem = format!("runs: all {runs} runs are the same flight");
+            let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], or \
+                          give the scenario a random start or wind";
+            return Err(spec.refuse("runs", problem, remedy));
         }
         for law in &self.laws {
-            let run = self.first_flyable(law)?;
-            for (key, variation) in &self.variations {
-                let under = |value: &toml::Value| format!("under the law {}, {key} = {value}: ", law.name);
-                let tried = variation.samples().into_iter().take(MOST_TRIED).map(|value| {
-                    let mut drawn = self.drawn(run);
-                    drawn.insert(key, value.clone());
-                    let read = self.read_with(law, &drawn);
-                    read.map_err(|error| CampaignError::scenario(&under(&value), &format!("vary.{key}"), error))
-                });
-                let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
-                // What is listed is meant; of a range some may be impossible, which is counted as it is flown.
-                if (variation.is_listed() || flown.is_empty())
-                    && let Some(Err(error)) = refused.into_iter().next()
-                {
-                    return Err(error);
-                }
-            }
-            let flight = |error| CampaignError::Flight { run, law: law.name.clone(), error: Box::new(error) };
-            let built = self.scenario(run, law).map_err(plain_of(law))?.law();
-            built.map_err(|error| flight(error.into()))?;
-            if let Some(settings) = &self.splitting {
-                let ready = splitting::check(&self.scenario(run, law).map_err(plain_of(law))?, settings);
-                ready.map_err(|error| CampaignError::Splitting {
-                    run: 0,
-                    law: law.name.clone(),
-                    error: Box::new(error),
-                })?;
-            }
+            self.check_law(spec, law)?;
         }
         Ok(())
     }
 
-    /// The first run that can be flown under a law.
-    fn first_flyable(&self, law: &Law) -> Result<u64, CampaignError> {
-        let runs = 0..self.manifest.runs.min(FIRST_TRIED);
-        let flyable = runs.clone().find(|&run| self.scenario(run, law).is_ok());
-        flyable.map_or_else(|| self.scenario(0, law).map_err(plain_of(law)).map(|_| 0), Ok)
+    /// Returns whether nothing is varied, or only seeds that change none of the first flights.
+    fn runs_are_equal(&self) -> bool {
+        let hash = |run: u64| {
+            let scenario = self.scenario(run, &self.laws[0]);
+            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.sha256_hex())
+        };
+        let only_seeds = self.variations.values().all(|variation| *variation == Variation::Seed {});
+        only_seeds && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
+    }
+
+    /// Refuses values that their keys do not take under a law, and a law that cannot fly.
+    fn check_law(&self, spec: &Spec, law: &Law) -> Result<(), Failure> {
+        let (run, scenario) = self.first_flyable(spec, law)?;
+        for (key, variation) in &self.variations {
+            let tried = variation.samples().into_iter().take(MOST_TRIED).map(|value| {
+                let mut drawn = self.drawn(run);
+                drawn.insert(key, value.clone());
+                let situation = || format!("under the law {}, {key} = {value}", law.name);
+                self.read_with(law, &drawn).map_err(|error| spec.scenario(&format!("vary.{key}"), &situation(), error))
+            });
+            let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
+            // A range may contain values that cannot be flown, which are counted; a listed value must be valid.
+            if (variation.is_listed() || flown.is_empty())
+                && let Some(Err(failure)) = refused.into_iter().next()
+            {
+                return Err(failure);
+            }
+        }
+        let under = |failure: Failure| failure.under(&format!("run {run} under the law {}", law.name));
+        scenario.law().map_err(|error| under(error.into()))?;
+        self.splitting.iter().try_for_each(|settings| splitting::check(&scenario, settings)).map_err(under)
+    }
+
+    /// Returns the first run that can be flown under a law, with its scenario.
+    fn first_flyable(&self, spec: &Spec, law: &Law) -> Result<(u64, Scenario), Failure> {
+        let mut runs = 0..self.manifest.runs.min(FIRST_TRIED);
+        let flyable = runs.find_map(|run| Some((run, self.scenario(run, law).ok()?)));
+        let first = || self.scenario(0, law).map(|scenario| (0, scenario));
+        let under = |error| spec.scenario("vary", &format!("under the law {}", law.name), error);
+        flyable.map_or_else(|| first().map_err(under), Ok)
     }
 
     /// What run 0 is under each law: the hash of its scenario, or why there is none.
@@ -338,14 +316,15 @@ impl Campaign {
         self.read_with(law, &self.drawn(run))
     }
 
-    /// Flies a run under one of its laws, counted from 0; none where flying was interrupted before it. A flight that has begun
-    /// comes to its end, an estimate does not.
+    /// Flies a run under one of the laws, counted from 0. Returns `None` after an interruption. A flight that has begun comes to
+    /// its end; an estimate does not.
     ///
     /// # Errors
-    /// [`CampaignError::Flight`] for a law or a judge that cannot be built, and a law that is not one of the campaign's.
-    pub fn row(&self, run: u64, law: usize, batch: &Batch<'_>) -> Result<Option<Row>, CampaignError> {
+    /// [`Failure`] if a law or a judge cannot be built, or the campaign has no such law.
+    pub fn row(&self, run: u64, law: usize, batch: &Batch<'_>) -> Result<Option<Row>, Failure> {
         let Some(named) = self.laws().get(law) else {
-            return Err(CampaignError::plan(format!("law {law} of {}", self.laws().len()), "laws are counted from 0"));
+            let problem = format!("law: must be from 0 to {}, got {law}", self.laws().len() - 1);
+            return Err(refused(problem, "give the number of a law of the campaign"));
         };
         let mut row = Row { run, law, drawn: self.values(run), not_flown: None, flight: None, splitting: None };
         let scenario = match self.scenario(run, named) {
@@ -356,15 +335,14 @@ impl Campaign {
                 return Ok(Some(row));
             }
         };
-        let name = || named.name.clone();
+        let under = |failure: Failure| failure.under(&format!("run {run} under the law {}", named.name));
         if let Some(settings) = self.splitting() {
             let (seeds, mut reported) = ([self.seed(), run], 0);
             let split = splitting::estimate(&scenario, settings, seeds, &mut batch.carry_on(&mut reported, false));
-            row.splitting =
-                split.map_err(|error| CampaignError::Splitting { run, law: name(), error: Box::new(error) })?;
+            row.splitting = split.map_err(under)?;
         } else {
             let flown = batch.finishing_flights().fly(&scenario, run);
-            row.flight = flown.map_err(|error| CampaignError::Flight { run, law: name(), error: Box::new(error) })?;
+            row.flight = flown.map_err(|error| under(error.into()))?;
         }
         Ok((row.flight.is_some() || row.splitting.is_some()).then_some(row))
     }
@@ -373,7 +351,7 @@ impl Campaign {
     ///
     /// # Errors
     /// As [`Campaign::row`].
-    pub fn fly(&self, batch: &Batch<'_>) -> Result<Option<Summary>, CampaignError> {
+    pub fn fly(&self, batch: &Batch<'_>) -> Result<Option<Summary>, Failure> {
         let (laws, runs) = (self.laws().len(), self.manifest().runs);
         let mut gathered = Gathered::new(self);
         let mut from = 0;
@@ -408,11 +386,6 @@ impl Campaign {
     }
 }
 
-fn plain_of(law: &Law) -> impl Fn(ScenarioError) -> CampaignError {
-    let under = format!("under the law {}: ", law.name);
-    move |error| CampaignError::scenario(&under, "vary", error)
-}
-
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
 }
@@ -422,29 +395,25 @@ fn varies(variations: &BTreeMap<String, Variation>, tables: &[&str]) -> bool {
     variations.keys().any(|key| tables.iter().any(|table| key.starts_with(table)))
 }
 
-/// The number of runs: what is asked for, or one for each point of the grids.
-fn runs(spec: &Spec) -> Result<u64, CampaignError> {
-    let points = spec.variations()?.values().filter_map(Variation::grid_len).try_fold(1_u64, u64::checked_mul);
-    let has_grid = spec.variations()?.values().any(|variation| variation.grid_len().is_some());
-    let points = points.filter(|&points| points <= MOST_RUNS).ok_or_else(|| {
-        CampaignError::plan(
-            format!("the grids have more than {MOST_RUNS} points together"),
-            "take fewer values, or draw them: { uniform = [low, high] } with as many runs as can be flown",
-        )
-        .at("vary")
+/// Returns the number of runs: that of the specification, by default one for each point of the grids.
+fn runs(spec: &Spec) -> Result<u64, Failure> {
+    let grids: Vec<_> = spec.variations()?.values().filter_map(Variation::grid_len).collect();
+    let points = grids.iter().copied().try_fold(1_u64, u64::checked_mul).filter(|&points| points <= MOST_RUNS);
+    let points = points.ok_or_else(|| {
+        let remedy = "give fewer values, or draw them: { uniform = [low, high] } with `runs`";
+        spec.refuse("vary", format!("vary: the grids have more than {MOST_RUNS} points together"), remedy)
     })?;
     match spec.runs {
-        None if has_grid => Ok(points),
-        None => Err(CampaignError::plan("the number of runs is not given", "add runs = 1000")),
+        None if grids.is_empty() => Err(spec.refuse("runs", "missing key `runs`", "add runs = 1000")),
+        None => Ok(points),
         Some(runs) if runs == 0 || runs > MOST_RUNS => {
-            let help = format!("fly at least 1 run and at most {MOST_RUNS}");
-            Err(CampaignError::plan(format!("runs = {runs}"), help).at("runs"))
+            let problem = format!("runs: must be from 1 to {MOST_RUNS}, got {runs}");
+            Err(spec.refuse("runs", problem, "give a number in this range"))
         }
-        Some(runs) if runs % points != 0 => Err(CampaignError::plan(
-            format!("{runs} runs do not fly each of the {points} points of the grids equally often"),
-            format!("give a multiple of {points}, or leave runs out to fly each once"),
-        )
-        .at("runs")),
+        Some(runs) if runs % points != 0 => {
+            let problem = format!("runs: must be a multiple of the {points} points of the grids, got {runs}");
+            Err(spec.refuse("runs", problem, "give a multiple, or leave `runs` out to fly each point once"))
+        }
         Some(runs) => Ok(runs),
     }
 }

@@ -1,22 +1,23 @@
-//! The folder of a campaign: its manifest, its parts, which of them are missing, and all of them as one table and one answer.
+//! Folder of a campaign: its manifest, its parts, the missing shards, and the merge of all parts into a table and an answer.
 
 use std::collections::hash_map::RandomState;
-use std::fs;
 use std::hash::BuildHasher as _;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::{fs, io};
 
+use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::error::{CampaignError, DamagedPart};
 use super::flights::Campaign;
-use super::manifest::{Manifest, Program, base16};
-use super::row::{Row, fields};
-use super::shard::{self, Found};
+use super::shard::{self, Found, Row, fields};
+use super::spec::refused;
 use super::summary::{Gathered, Summary};
+use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
 use tautline_report::report::{write_atomically, write_atomically_with};
+use tautline_report::request::Failure;
 
 /// The table's name in the folder of a campaign.
 pub const RESULTS: &str = "results.parquet";
@@ -45,43 +46,35 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Puts the manifest of a campaign into a folder; one that holds the same campaign is left as it is, with its own number
-    /// of shards unless another is asked for.
+    /// Writes the manifest of a campaign into a folder. A folder that holds the same campaign stays as it is; its number of shards
+    /// must be equal if `shards_asked`.
     ///
     /// # Errors
-    /// [`CampaignError::Foreign`] where the folder holds another campaign, or this one in another number of shards.
-    pub fn plan(path: &Path, campaign: Campaign, shards_asked: bool) -> Result<Self, CampaignError> {
+    /// [`Failure`] if the folder holds another campaign, or this campaign in another number of shards.
+    pub fn plan(path: &Path, campaign: Campaign, shards_asked: bool) -> Result<Self, Failure> {
         let file = path.join("manifest.json");
         if file.exists() {
             let there = Manifest::read(&file, &campaign.manifest().tool)?;
-            let (here, other) = (campaign.manifest(), &there);
-            if here.campaign != other.campaign {
-                return Err(CampaignError::Foreign {
-                    path: path.to_owned(),
-                    why: format!("the folder holds the campaign {}, and this one is {}", other.campaign, here.campaign),
-                    help: "give another folder with --out".to_owned(),
-                });
+            let here = campaign.manifest();
+            if here.campaign != there.campaign {
+                let problem = format!("the folder holds campaign {}, and this is {}", there.campaign, here.campaign);
+                return Err(other_campaign(path, problem, "give another folder with --out"));
             }
-            if shards_asked && here.shards != other.shards {
-                return Err(CampaignError::Foreign {
-                    path: path.to_owned(),
-                    why: format!("the folder holds this campaign in {} shards, not {}", other.shards, here.shards),
-                    help: "leave --shards out to go on, or give another folder with --out".to_owned(),
-                });
+            if shards_asked && here.shards != there.shards {
+                let problem = format!("the folder holds this campaign in {} shards, not {}", there.shards, here.shards);
+                let remedy = "leave --shards out to continue, or give another folder with --out";
+                return Err(other_campaign(path, problem, remedy));
             }
             return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there)? });
         }
         if let Some(there) = LEFT.iter().map(|name| path.join(name)).find(|there| there.exists()) {
-            return Err(CampaignError::Foreign {
-                path: there,
-                why: "it is there already, and no campaign's manifest beside it".to_owned(),
-                help: "give another folder with --out, or move it away".to_owned(),
-            });
+            let problem = "the file exists, and the folder has no manifest of a campaign";
+            return Err(other_campaign(&there, problem, "give another folder with --out, or move the file"));
         }
         let folder = Self { path: path.to_owned(), campaign };
         folder.make()?;
         folder.campaign.manifest().write(&file)?;
-        // Of two that plan at once the later one wins, and the other is told.
+        // If two processes plan at once, the later manifest stays, and the other process sees it here.
         let there = Manifest::read(&file, &folder.campaign.manifest().tool)?;
         if there == *folder.campaign.manifest() { Ok(folder) } else { Self::plan(path, folder.campaign, shards_asked) }
     }
@@ -90,7 +83,7 @@ impl Folder {
     ///
     /// # Errors
     /// As [`Manifest::read`] and [`Campaign::of`].
-    pub fn open(path: &Path, program: &Program) -> Result<Self, CampaignError> {
+    pub fn open(path: &Path, program: &Program) -> Result<Self, Failure> {
         let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
         let campaign = Campaign::of(Manifest::read(&file, program)?)?;
         let folder = if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path };
@@ -98,9 +91,9 @@ impl Folder {
     }
 
     /// Makes room for parts.
-    pub(super) fn make(&self) -> Result<(), CampaignError> {
+    pub(super) fn make(&self) -> Result<(), Failure> {
         let parts = self.path.join("parts");
-        fs::create_dir_all(&parts).map_err(|error| CampaignError::writing(&parts, error))
+        fs::create_dir_all(&parts).map_err(cannot("write", &parts))
     }
 
     /// What is flown.
@@ -143,16 +136,16 @@ impl Folder {
     }
 
     /// Files of a shard of this kind that some process left.
-    pub(super) fn left(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, CampaignError> {
+    pub(super) fn left(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, Failure> {
         let folder = self.path.join("parts");
         let (begin, end) = (format!("{}.", stem(shard)), format!(".{kind}"));
         let is_one = |path: &PathBuf| {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             name.starts_with(&begin) && name.ends_with(&end)
         };
-        let entries = fs::read_dir(&folder).map_err(|error| CampaignError::reading(&folder, error))?;
+        let entries = fs::read_dir(&folder).map_err(cannot("read", &folder))?;
         let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>();
-        let mut paths = paths.map_err(|error| CampaignError::reading(&folder, error))?;
+        let mut paths = paths.map_err(cannot("read", &folder))?;
         paths.retain(is_one);
         paths.sort();
         Ok(paths)
@@ -161,22 +154,21 @@ impl Folder {
     /// Reads the part of a shard.
     ///
     /// # Errors
-    /// [`CampaignError::Nondeterministic`] where it was flown twice with different results, [`CampaignError::Foreign`] for a part of
-    /// another campaign, [`CampaignError::Machine`] where the file cannot be read.
-    pub fn read(&self, shard: u64) -> Result<Found, CampaignError> {
-        let kept = self.part(shard);
-        let other = self.differs(shard);
+    /// [`Failure`] if the shard was flown twice with different results, the part is of another campaign, or the file cannot be
+    /// read.
+    pub fn read(&self, shard: u64) -> Result<Found, Failure> {
+        let (kept, other) = (self.part(shard), self.differs(shard));
         if other.exists() {
-            return Err(CampaignError::Nondeterministic { shard, kept, other });
+            return Err(different_results(shard, &kept, &other));
         }
         shard::read(&kept, self.campaign.manifest(), shard, self.campaign.laws().len())
     }
 
-    /// The row of a run under a law, counted from 0; none where it has not been flown.
+    /// Returns the row of a run under a law, counted from 0; `None` if the run has not been flown.
     ///
     /// # Errors
-    /// As [`Folder::read`], and [`CampaignError::MissingShards`] where its part is damaged.
-    pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, CampaignError> {
+    /// As [`Folder::read`], and [`Failure`] if the part is damaged.
+    pub fn row(&self, run: u64, law: usize) -> Result<Option<Row>, Failure> {
         let manifest = self.campaign.manifest();
         let Some(shard) = (0..manifest.shards).find(|&shard| manifest.range(shard).contains(&run)) else {
             return Ok(None);
@@ -184,33 +176,49 @@ impl Folder {
         match self.read(shard)? {
             Found::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
             Found::Nothing => Ok(None),
-            Found::Damaged(why) => Err(CampaignError::MissingShards {
-                list: shard.to_string(),
-                shards: manifest.shards,
-                damaged: vec![DamagedPart { shard, path: self.part(shard), why }],
-            }),
+            Found::Damaged(why) => Err(self.missing_shards(&[shard], &[self.damage(shard, why)])),
         }
     }
 
-    /// Shards that are not flown, in their order.
+    /// Returns the shards that are not flown, in order, each with a sentence on the damage of its part if it has one.
     ///
     /// # Errors
     /// As [`Folder::read`].
-    pub fn missing(&self) -> Result<Vec<u64>, CampaignError> {
-        let is_missing = |shard: u64| self.read(shard).map(|found| !matches!(found, Found::Whole(_)));
-        let shards = 0..self.campaign.manifest().shards;
-        shards.filter_map(|shard| is_missing(shard).map(|missing| missing.then_some(shard)).transpose()).collect()
+    pub fn missing(&self) -> Result<Vec<(u64, Option<String>)>, Failure> {
+        let of_shard = |shard| {
+            Ok(match self.read(shard)? {
+                Found::Whole(_) => None,
+                Found::Nothing => Some((shard, None)),
+                Found::Damaged(why) => Some((shard, Some(self.damage(shard, why)))),
+            })
+        };
+        (0..self.campaign.manifest().shards).filter_map(|shard| of_shard(shard).transpose()).collect()
     }
 
-    /// The part of a shard, where it is there and damaged.
+    /// Returns a sentence on the damage of the part of a shard; `None` if the part is whole or missing.
     ///
     /// # Errors
     /// As [`Folder::read`].
-    pub fn damaged(&self, shard: u64) -> Result<Option<DamagedPart>, CampaignError> {
-        Ok(match self.read(shard)? {
-            Found::Damaged(why) => Some(DamagedPart { shard, path: self.part(shard), why }),
-            Found::Whole(_) | Found::Nothing => None,
-        })
+    pub fn damaged(&self, shard: u64) -> Result<Option<String>, Failure> {
+        let found = self.read(shard)?;
+        Ok(if let Found::Damaged(why) = found { Some(self.damage(shard, why)) } else { None })
+    }
+
+    fn damage(&self, shard: u64, why: &str) -> String {
+        format!("{} is damaged: {why}", self.part(shard).display())
+    }
+
+    /// Returns the failure of shards that are missing or damaged.
+    fn missing_shards(&self, missing: &[u64], damaged: &[String]) -> Failure {
+        let (list, shards) = (listed(missing), self.campaign.manifest().shards);
+        let damages = damaged.iter().fold(String::new(), |text, damage| text + "; " + damage);
+        let replaced = if damaged.is_empty() { "" } else { ", which replaces damaged parts" };
+        let command = format!("tautline campaign shard {} --shard {list}", self.path.display());
+        Failure::input(
+            "campaign/missing-shards",
+            format!("shards {list} of {shards} are missing{damages}"),
+            format!("fly them with: {command}{replaced}"),
+        )
     }
 }
 
@@ -219,14 +227,12 @@ impl Folder {
     /// however often interrupted they were flown. Runs after which enough was known are left out, whether they were flown or not.
     ///
     /// # Errors
-    /// [`CampaignError::MissingShards`] where shards are missing or damaged, [`CampaignError::Foreign`] where one is of another campaign,
-    /// [`CampaignError::Nondeterministic`] where one was flown twice with different results, [`CampaignError::Machine`].
-    pub fn merge(&self) -> Result<Merged, CampaignError> {
+    /// As [`Folder::read`], and [`Failure`] if shards are missing or a file cannot be written.
+    pub fn merge(&self) -> Result<Merged, Failure> {
         let path = self.file(RESULTS);
         let summary = write_atomically_with(&path, |file| {
-            let failed =
-                |error: parquet::errors::ParquetError| CampaignError::writing(&path, std::io::Error::other(error));
-            let copy = file.try_clone().map_err(|error| CampaignError::writing(&path, error))?;
+            let failed = |error: parquet::errors::ParquetError| cannot("write", &path)(std::io::Error::other(error));
+            let copy = file.try_clone().map_err(cannot("write", &path))?;
             let (columns, cells): (Vec<_>, Vec<_>) = fields(self.campaign()).into_iter().unzip();
             let about = ["tautline.campaign", &self.campaign().manifest().campaign];
             let mut table = ParquetTable::create(columns, about, copy).map_err(failed)?;
@@ -242,12 +248,12 @@ impl Folder {
                 table.write(&rows).map_err(failed)?;
             }
             table.close().map_err(failed)?;
-            Ok::<_, CampaignError>(summary)
+            Ok::<_, Failure>(summary)
         })?;
         let answer = self.file(ANSWER);
-        let json = summary.to_json().map_err(|error| CampaignError::writing(&answer, error.into()))?;
+        let json = summary.to_json().map_err(|error| cannot("write", &answer)(error.into()))?;
         write_atomically(&answer, json.as_bytes())?;
-        let bytes = fs::read(&path).map_err(|error| CampaignError::reading(&path, error))?;
+        let bytes = fs::read(&path).map_err(cannot("read", &path))?;
         Ok(Merged { summary, sha256: base16(&Sha256::digest(&bytes)) })
     }
 
@@ -255,18 +261,22 @@ impl Folder {
     ///
     /// # Errors
     /// As [`Folder::merge`].
-    pub fn summary(&self) -> Result<Summary, CampaignError> {
+    pub fn summary(&self) -> Result<Summary, Failure> {
         self.gather(&mut |_| Ok(()))
     }
 
     /// The answer of all rows that count, each of which `take` receives in order.
-    fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), CampaignError>) -> Result<Summary, CampaignError> {
+    fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), Failure>) -> Result<Summary, Failure> {
         let mut gathered = Gathered::new(self.campaign());
         for shard in 0..self.campaign().manifest().shards {
             if gathered.is_enough() {
                 break;
             }
-            let Found::Whole(rows) = self.read(shard)? else { return Err(self.missing_from(shard)?) };
+            let Found::Whole(rows) = self.read(shard)? else {
+                let missing = self.missing()?.into_iter().filter(|&(missing, _)| missing >= shard);
+                let (missing, damaged): (Vec<_>, Vec<_>) = missing.unzip();
+                return Err(self.missing_shards(&missing, &damaged.into_iter().flatten().collect::<Vec<_>>()));
+            };
             for row in &rows {
                 if gathered.take(row) {
                     take(row)?;
@@ -275,13 +285,18 @@ impl Folder {
         }
         Ok(gathered.finish(self.campaign()))
     }
-
-    fn missing_from(&self, from: u64) -> Result<CampaignError, CampaignError> {
-        let missing: Vec<_> = self.missing()?.into_iter().filter(|&shard| shard >= from).collect();
-        let damaged = missing.iter().filter_map(|&shard| self.damaged(shard).transpose()).collect::<Result<_, _>>()?;
-        Ok(CampaignError::MissingShards { list: listed(&missing), shards: self.campaign().manifest().shards, damaged })
-    }
 }
+
+/// Returns the failure of two machines that flew a shard with different results.
+pub(super) fn different_results(shard: u64, kept: &Path, other: &Path) -> Failure {
+    let [kept, other] = [kept, other].map(Path::display);
+    let problem = format!("two machines flew shard {shard} with different results: {kept} and {other}");
+    Failure::machine("campaign/other-bits", problem).with_help(FAULTY)
+}
+
+/// Remedy for a flight that is not the same everywhere.
+pub(super) const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine, or a machine with another \
+                                 program; remove the wrong part to continue";
 
 /// Rows of a process that is under way, or was killed.
 pub(super) const JOURNAL: &str = "journal";
@@ -304,31 +319,203 @@ pub fn listed(shards: &[u64]) -> String {
     spans.iter().map(said).collect::<Vec<_>>().join(",")
 }
 
-/// The shards of a list such as `7`, `3-5`, `13,500-502`, or `env:NAME` with such a list in that variable.
+/// Reads a list of shards such as `7`, `3-5`, `13,500-502`, or `env:NAME` for the list in an environment variable.
 ///
 /// # Errors
-/// [`CampaignError::Input`] for what is no list, and for a shard beyond the last one.
-pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, CampaignError> {
-    let help = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
-    let wrong = |why: String| CampaignError::plan(why, help);
+/// [`Failure`] for a text that is not a list, and for a shard beyond the last.
+pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, Failure> {
+    let wrong = |problem: String| {
+        let remedy = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
+        refused(format!("--shard: {problem}"), remedy)
+    };
     if let Some(name) = list.strip_prefix("env:") {
-        let value = std::env::var(name).map_err(|_| wrong(format!("the environment has no variable {name}")))?;
+        let value = std::env::var(name).map_err(|_| wrong(format!("no environment variable `{name}`")))?;
         return if value.starts_with("env:") { Err(wrong(format!("{name} = {value}"))) } else { parse(&value, shards) };
     }
     let mut parsed = Vec::new();
     for span in list.split(',').map(str::trim) {
         let (first, last) = span.split_once('-').unwrap_or((span, span));
-        let number =
-            |text: &str| text.trim().parse::<u64>().map_err(|_| wrong(format!("`{span}` is no number of a shard")));
+        let number = |text: &str| text.trim().parse::<u64>().map_err(|_| wrong(format!("`{span}` is not a shard")));
         let (first, last) = (number(first)?, number(last)?);
         if first > last || last >= shards {
-            return Err(wrong(format!("`{span}`, but the shards are 0 to {}", shards - 1)));
+            return Err(wrong(format!("must be from 0 to {}, got {span}", shards - 1)));
         }
         parsed.extend(first..=last);
     }
     parsed.sort_unstable();
     parsed.dedup();
     Ok(parsed)
+}
+
+/// Everything that a shard needs to be flown anywhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of these keys and of the parts.
+    pub schema_version: u32,
+    /// SHA-256 over everything below but `shards` and `folder`: two campaigns with the same one fly the same flights.
+    pub campaign: String,
+    /// Name of the campaign: that of its specification's file.
+    pub name: String,
+    /// What flies it.
+    pub tool: Program,
+    /// What the scenario is called.
+    pub scenario_name: String,
+    /// Its TOML.
+    pub scenario: String,
+    /// The specification, with everything that the command line added.
+    pub spec: String,
+    /// Number of runs.
+    pub runs: u64,
+    /// SHA-256 of the resolved scenario of run 0 under each law: other files that a scenario names make another campaign.
+    pub first: Vec<String>,
+    /// Into how many parts the runs are split.
+    pub shards: u64,
+    /// The folder that paths in the scenario count from, as it was planned.
+    pub folder: PathBuf,
+}
+
+/// A program, to its last bit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Program {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of its file.
+    pub sha256: String,
+}
+
+/// The file that holds this crate, where it is not that of the process.
+static HOLDER: OnceLock<PathBuf> = OnceLock::new();
+
+impl Program {
+    /// Says which file holds this crate where it is a library that a program of others loads. Said once, before any campaign:
+    /// what flies is known by that file then.
+    pub fn is_in(file: PathBuf) {
+        // Whoever says it again says the same.
+        let _ = HOLDER.set(file);
+    }
+
+    /// The one that is running.
+    ///
+    /// # Errors
+    /// [`Failure`] where its file cannot be read.
+    pub fn running() -> Result<Self, Failure> {
+        let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
+        let path = path.map_err(cannot("read", Path::new("the program")))?;
+        let program = fs::read(&path).map_err(cannot("read", &path))?;
+        Ok(Self {
+            name: tautline_core::PROGRAM.to_owned(),
+            version: tautline_core::VERSION.to_owned(),
+            sha256: base16(&Sha256::digest(program)),
+        })
+    }
+}
+
+impl Manifest {
+    /// The same manifest with its own hash.
+    #[must_use]
+    pub(super) fn sealed(mut self) -> Self {
+        self.campaign = self.hash();
+        self
+    }
+
+    fn hash(&self) -> String {
+        let Self { schema_version, name, tool, scenario_name, scenario, spec, runs, first, .. } = self;
+        let (version, runs) = (schema_version.to_string(), runs.to_string());
+        let texts = [&version, name, &tool.sha256, scenario_name, scenario, spec, &runs];
+        let mut hash = Sha256::new();
+        for text in texts.into_iter().chain(first) {
+            // Lengths keep what ends one text from beginning the next.
+            hash.update((text.len() as u64).to_le_bytes());
+            hash.update(text);
+        }
+        base16(&hash.finalize())
+    }
+
+    /// Runs of a shard, from 0: as many as its neighbours', give or take one.
+    #[must_use]
+    pub fn range(&self, shard: u64) -> std::ops::Range<u64> {
+        let shards = self.shards.max(1);
+        // The same as shard times runs over shards, which may be larger than any number.
+        let at = |shard: u64| self.runs / shards * shard + self.runs % shards * shard / shards;
+        at(shard)..at(shard + 1)
+    }
+
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// [`Failure`] `campaign/other-campaign` if the file is missing, is not a manifest, was changed by hand, or was planned by
+    /// another program.
+    pub fn read(path: &Path, program: &Program) -> Result<Self, Failure> {
+        let foreign = |problem: &str, remedy: &str| Err(other_campaign(path, problem, remedy));
+        let text = match fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return foreign("no such campaign", "plan one with: tautline campaign plan SPEC.toml --out FOLDER");
+            }
+            Err(error) => return Err(cannot("read", path)(error)),
+        };
+        let read = match serde_json::from_str::<Self>(&text) {
+            Ok(read) => read,
+            Err(error) => return foreign(&format!("not a manifest: {error}"), "plan the campaign again"),
+        };
+        if read.schema_version != SCHEMA_VERSION || read.shards == 0 || read.shards > read.runs {
+            let problem = format!("a manifest of version {} with {} shards", read.schema_version, read.shards);
+            return foreign(&problem, "plan the campaign again with this program");
+        }
+        let hash = read.hash();
+        if hash != read.campaign {
+            let problem =
+                format!("the manifest was edited: it names campaign {}, and its contents are {hash}", read.campaign);
+            return foreign(&problem, "plan the campaign again, into another folder");
+        }
+        if read.tool.sha256 != program.sha256 {
+            let problem = format!(
+                "planned by {} {} with the SHA-256 {}, and this is {} with the SHA-256 {}",
+                read.tool.name, read.tool.version, read.tool.sha256, program.version, program.sha256
+            );
+            return foreign(
+                &problem,
+                "use the same program everywhere, or plan the campaign again into another folder",
+            );
+        }
+        Ok(read)
+    }
+
+    /// Writes the manifest.
+    ///
+    /// # Errors
+    /// [`Failure`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
+        let json = serde_json::to_string_pretty(self).map_err(|error| cannot("write", path)(error.into()))?;
+        Ok(write_atomically(path, (json + "\n").as_bytes())?)
+    }
+}
+
+/// Returns the failure of a file or folder that belongs to another campaign or program.
+pub(super) fn other_campaign(path: &Path, problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Failure {
+    Failure::input("campaign/other-campaign", problem, remedy).of(path)
+}
+
+/// Returns a function that makes the failure of a file that cannot be read or written.
+pub(super) fn cannot(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Failure {
+    let path = path.display();
+    move |error| {
+        Failure::machine("files/cannot-access", format!("{path}: cannot {what} the file: {error}"))
+            .with_help("free some space or mend access, and start again: finished flights are kept")
+    }
+}
+
+/// Bytes in hexadecimal digits.
+pub(super) fn base16(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
-//! Flights of a campaign flown again: the worst of them for its page, and any of them by its number.
+//! Flights of a campaign flown again: the worst flights for its page, and any flight by its number.
 
 use std::path::{Path, PathBuf};
 
-use super::{Campaign, Folder, Law, Summary, Worst};
+use super::folder::FAULTY;
+use super::folder::cannot;
+use super::{BadRun, Campaign, Folder, Law, Row, Summary, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateAt};
 use crate::study::{Block, Section};
@@ -13,36 +15,37 @@ use tautline_report::report::page::{self, Picture, Start};
 use tautline_report::request::{
     Failure, Monitor, Pictures, Quiet, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into,
 };
+use tautline_sim::scenario::Scenario;
 
-/// Which flight of a campaign is flown again, and where its files go.
+/// Flight of a campaign that is flown again, and the folder of its files.
 #[derive(Clone, Debug)]
 pub struct ReplayRequest {
     /// Number of the run, from 0.
     pub run: u64,
     /// The law; the first by default.
     pub law: Option<String>,
-    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    /// The flight among the violated flights of this run, from 0, if runs are estimates of rare violations.
     pub bad: Option<usize>,
     /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
     pub out: Option<PathBuf>,
 }
 
-/// A flight to look at.
+/// One of the worst flights, for the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorstFlight {
     /// Number of the run.
     pub run: u64,
     /// The law.
     pub law: String,
-    /// What is to be seen, in a sentence.
+    /// Description in a sentence.
     pub said: String,
-    /// The command that flies it again.
+    /// The command that repeats the flight.
     pub command: String,
-    /// Where its recording is, from the page.
+    /// Path of its recording, relative to the page.
     pub recording: Option<String>,
-    /// It at its worst moment.
+    /// Picture of its closest approach.
     pub picture: Option<Picture>,
-    /// The flight itself, or why it cannot be replayed.
+    /// Replay of the flight, or the reason why it has none.
     pub replay: Option<Result<Replay, NoReplay>>,
 }
 
@@ -66,11 +69,70 @@ impl WorstFlight {
     }
 }
 
+/// A flight of a campaign.
+#[derive(Clone, Copy, Debug)]
+struct FlightId<'a> {
+    law: &'a Law,
+    run: u64,
+    /// Number among the violated flights of an estimate.
+    bad: Option<usize>,
+}
+
+impl FlightId<'_> {
+    /// Returns the name of its folder.
+    fn name(self) -> String {
+        let bad = self.bad.map_or_else(String::new, |bad| format!("-bad-{bad}"));
+        format!("{}-run-{}{bad}", self.law.name, self.run)
+    }
+
+    /// Returns the default folder of its files.
+    fn folder(self, folder: &Folder) -> PathBuf {
+        folder.file("worst").join(self.name())
+    }
+
+    /// Returns the flight in words.
+    fn words(self) -> String {
+        let bad = self.bad.map_or_else(String::new, |bad| format!("bad flight {bad} of "));
+        format!("{bad}run {} under {}", self.run, self.law.name)
+    }
+
+    /// Returns its row; `None` if the run has not been flown.
+    fn row(self, folder: &Folder) -> Result<Option<Row>, Failure> {
+        let law = folder.campaign().laws().iter().position(|law| law == self.law).unwrap_or_default();
+        folder.row(self.run, law)
+    }
+
+    fn scenario(self, campaign: &Campaign) -> Result<Scenario, Failure> {
+        let scenario = campaign.scenario(self.run, self.law);
+        scenario.map_err(|error| Failure::from(error).under(&format!("run {}", self.run)))
+    }
+
+    /// Refuses a state hash other than that of the campaign.
+    fn compare(self, found: &str, expected: &str) -> Result<(), Failure> {
+        if found == expected {
+            return Ok(());
+        }
+        let problem = format!(
+            "{}: flown again it has the state hash {found}, and in the campaign it had {expected}",
+            self.words()
+        );
+        Err(Failure::machine("campaign/other-bits", problem).with_help(FAULTY))
+    }
+
+    /// Returns the command that flies a run again without its campaign.
+    fn command(self, campaign: &Campaign) -> String {
+        let sets = campaign.sets(self.run, self.law);
+        let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
+        let words: Vec<_> = ["run", campaign.scenario_argument()].into_iter().chain(sets).collect();
+        command_line(words.into_iter())
+    }
+}
+
 /// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
 /// Returns whether it passes.
 ///
 /// # Errors
-/// [`Failure`] where there is no such flight, it has another state hash, or the system refuses.
+/// [`Failure`] if the flight does not exist, has another state hash, or a file cannot be written.
 pub fn replay(
     folder: &Folder,
     request: &ReplayRequest,
@@ -78,79 +140,46 @@ pub fn replay(
     monitor: &dyn Monitor,
 ) -> Result<bool, Failure> {
     let campaign = folder.campaign();
-    let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
     let law = match &request.law {
         None => campaign.laws().first(),
         Some(name) => campaign.laws().iter().find(|law| law.name == *name),
     };
     let Some(law) = law else {
-        let said = request.law.as_deref().unwrap_or_default();
-        return Err(Failure::input(
-            "campaign/unknown-law",
-            format!("no law of this campaign is named {said}"),
-            format!("its laws are {}", names.join(", ")),
-        ));
+        let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
+        let name = request.law.as_deref().unwrap_or_default();
+        let problem = format!("--law: the campaign has no law `{name}`");
+        return Err(Failure::input("campaign/unknown-law", problem, format!("its laws are {}", names.join(", "))));
     };
-    let runs = campaign.manifest().runs;
-    if request.run >= runs {
-        let help = format!("its runs are 0 to {}", runs - 1);
-        return Err(Failure::input("campaign/no-run", format!("the campaign has no run {}", request.run), help));
+    let (run, last) = (request.run, campaign.manifest().runs - 1);
+    if run > last {
+        let problem = format!("--run: must be from 0 to {last}, got {run}");
+        return Err(Failure::input("campaign/no-run", problem, "give the number of a run of the campaign"));
     }
-    if campaign.splitting().is_some() {
-        let bad = request.bad.unwrap_or_default();
-        let default = || place_of_bad(folder, &law.name, request.run, bad);
-        let place = request.out.clone().unwrap_or_else(default);
-        let hash = fly_bad(folder, law, [request.run, bad as u64], &place)?;
-        let recording = place.join(RECORDING);
-        monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", recording.display()));
+    let bad = campaign.splitting().map(|_| request.bad.unwrap_or_default());
+    let flight = FlightId { law, run, bad };
+    let out = request.out.clone().unwrap_or_else(|| flight.folder(folder));
+    if let Some(bad) = bad {
+        let hash = fly_bad(folder, flight, bad, &out)?;
+        monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", out.join(RECORDING).display()));
         return Ok(false);
     }
-    if let Some(out) = request.out.as_ref().filter(|out| out.join("report.json").exists()) {
+    if request.out.is_some() && out.join("report.json").exists() {
         let message = format!("{} holds a finished run", out.display());
         return Err(Failure::input("files/finished", message, "give another folder with --out"));
     }
-    let out = request.out.clone().unwrap_or_else(|| place(folder, &law.name, request.run));
-    replay_run(folder, request.run, law, out, pictures, monitor)
-}
-
-/// Flies a run again and compares it with its row, where there is one. Returns whether it passes.
-fn replay_run(
-    folder: &Folder,
-    run: u64,
-    law: &Law,
-    out: PathBuf,
-    pictures: &dyn Pictures,
-    monitor: &dyn Monitor,
-) -> Result<bool, Failure> {
-    let campaign = folder.campaign();
-    let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
-    let request = RunRequest::reproducible(&scenario, command(campaign, run, law), out);
-    let left = run_into(&request, pictures, monitor)?;
-    let row = folder.row(run, number_of(campaign, law))?;
-    match row.and_then(|row| row.flight) {
-        Some(flight) => {
-            check(&left, run, law, &flight.state_hash)?;
-            monitor.say(&format!("state hash {}, as in the campaign", flight.state_hash));
+    let scenario = flight.scenario(campaign)?;
+    let left = run_into(&RunRequest::reproducible(&scenario, flight.command(campaign), out), pictures, monitor)?;
+    match flight.row(folder)?.and_then(|row| row.flight) {
+        Some(row) => {
+            check(flight, &left, &row.state_hash)?;
+            monitor.say(&format!("state hash {}, as in the campaign", row.state_hash));
         }
         None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
     }
     Ok(left.report.verdict.pass)
 }
 
-/// What helps where a flight that is flown again is another one.
-const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine";
-
-/// The number of a law of a campaign, from 0.
-fn number_of(campaign: &Campaign, law: &Law) -> usize {
-    campaign.laws().iter().position(|other| other == law).unwrap_or_default()
-}
-
-/// Where a flight that is flown again leaves its files.
-pub(super) fn place(folder: &Folder, law: &str, run: u64) -> PathBuf {
-    folder.file("worst").join(format!("{law}-run-{run}"))
-}
-
-/// Flies the worst flights again, the worst of all laws first.
+/// Flies the worst flights of all laws again, the worst first.
 pub(super) fn fly_worst_again(
     folder: &Folder,
     summary: &Summary,
@@ -159,163 +188,114 @@ pub(super) fn fly_worst_again(
     monitor: &dyn Monitor,
 ) -> Result<Vec<WorstFlight>, Failure> {
     let campaign = folder.campaign();
-    if campaign.splitting().is_some() {
-        return bad_again(folder, summary, most, monitor);
+    let laws = || std::iter::zip(campaign.laws(), &summary.laws);
+    let mut flights = Vec::new();
+    // A campaign has worst flights or violated flights of estimates, never both.
+    let mut bad: Vec<_> = laws().flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
+    bad.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
+    for (law, bad) in bad.into_iter().take(most) {
+        if monitor.is_interrupted() {
+            break;
+        }
+        flights.push(bad_again(folder, law, bad)?);
     }
-    let laws = std::iter::zip(campaign.laws(), &summary.laws);
-    let mut worst: Vec<(&Law, &Worst)> =
-        laws.flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
+    let mut worst: Vec<_> = laws().flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
-    worst.truncate(most);
-    let mut flights = Vec::new();
-    for (law, worst) in worst {
+    for (law, worst) in worst.into_iter().take(most) {
         if monitor.is_interrupted() {
             monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
             break;
         }
-        let path = place(folder, &law.name, worst.run);
-        let scenario = campaign.scenario(worst.run, law)?;
-        let run = RunRequest::reproducible(&scenario, command(campaign, worst.run, law), path);
+        let flight = FlightId { law, run: worst.run, bad: None };
+        let scenario = flight.scenario(campaign)?;
+        let run = RunRequest::reproducible(&scenario, flight.command(campaign), flight.folder(folder));
         let left = run_into(&run, pictures, &Quiet::new(monitor))?;
-        check(&left, worst.run, law, &worst.state_hash)?;
+        check(flight, &left, &worst.state_hash)?;
         let replay = replay_of_run(&scenario, &left.log, &left.report, PAGE_BYTES / most.max(1));
-        flights.push(WorstFlight { replay: Some(replay), ..looked_at(campaign, law, worst, &left) });
+        flights.push(WorstFlight { replay: Some(replay), ..shown(flight, campaign, worst, &left) });
     }
     Ok(flights)
 }
 
-/// Flies flights again that were violated in estimates, those furthest into a violation first.
-fn bad_again(
-    folder: &Folder,
-    summary: &Summary,
-    most: usize,
-    monitor: &dyn Monitor,
-) -> Result<Vec<WorstFlight>, Failure> {
-    let laws = std::iter::zip(folder.campaign().laws(), &summary.laws);
-    let mut worst: Vec<_> = laws.flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
-    worst.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
-    worst.truncate(most);
-    let mut flights = Vec::new();
-    for (law, bad) in worst {
-        if monitor.is_interrupted() {
-            break;
-        }
-        let place = place_of_bad(folder, &law.name, bad.run, bad.bad);
-        fly_bad(folder, law, [bad.run, bad.bad as u64], &place)?;
-        let (run, number) = (bad.run.to_string(), bad.bad.to_string());
-        // From the folder of the page, so that the page has the same bytes wherever the campaign is.
-        let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
-        flights.push(WorstFlight {
-            run: bad.run,
-            law: law.name.clone(),
-            said: format!(
-                "Bad flight {} of run {} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
-                bad.bad,
-                bad.run,
-                law.name,
-                metres(-bad.clearance_m),
-                bad.violated_at_step
-            ),
-            command: command_line(command.into_iter()),
-            recording: Some(format!("worst/{}-run-{}-bad-{}/{RECORDING}", law.name, bad.run, bad.bad)),
-            picture: None,
-            replay: None,
-        });
-    }
-    Ok(flights)
+/// Flies a violated flight of an estimate again.
+fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
+    let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
+    fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;
+    let (run, number) = (bad.run.to_string(), bad.bad.to_string());
+    // Relative to the folder of the page, so that the page has the same bytes wherever the campaign is.
+    let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
+    let said = format!(
+        "Bad flight {number} of run {run} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
+        law.name,
+        metres(-bad.clearance_m),
+        bad.violated_at_step
+    );
+    Ok(WorstFlight {
+        run: bad.run,
+        law: law.name.clone(),
+        said,
+        command: command_line(command.into_iter()),
+        recording: Some(format!("worst/{}/{RECORDING}", flight.name())),
+        picture: None,
+        replay: None,
+    })
 }
 
-/// Where a bad flight of an estimate leaves its recording.
-pub(super) fn place_of_bad(folder: &Folder, law: &str, run: u64, bad: usize) -> PathBuf {
-    folder.file("worst").join(format!("{law}-run-{run}-bad-{bad}"))
-}
-
-/// Flies a bad flight of an estimate again, with its recording, and compares the state in which it was violated.
-pub(super) fn fly_bad(folder: &Folder, law: &Law, [run, bad]: [u64; 2], place: &Path) -> Result<String, Failure> {
-    let campaign = folder.campaign();
-    let row = folder.row(run, number_of(campaign, law))?;
-    let flights = row.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
-    let Some(flight) = usize::try_from(bad).ok().and_then(|bad| flights.get(bad)) else {
-        let help = format!("{} are kept of it, counted from 0", flights.len());
-        return Err(Failure::input(
-            "campaign/no-flight",
-            format!("run {run} under {} has no bad flight {bad}", law.name),
-            help,
-        ));
+/// Flies a violated flight of an estimate again, records it, and compares the state after the step of the violation. Returns the
+/// state hash.
+fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
+    let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
+    let Some(violated) = kept.get(bad) else {
+        let problem = format!("--bad: the campaign has no {}", flight.words());
+        let remedy = format!("{} are kept of this run, counted from 0", kept.len());
+        return Err(Failure::input("campaign/no-flight", problem, remedy));
     };
-    let scenario = campaign.scenario(run, law).map_err(|error| Failure::from(error).under(&format!("run {run}")))?;
-    std::fs::create_dir_all(place).map_err(|error| {
-        Failure::machine("files/cannot-write", format!("cannot write {}: {error}", place.display()))
-    })?;
+    let scenario = flight.scenario(folder.campaign())?;
+    std::fs::create_dir_all(out).map_err(cannot("write", out))?;
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
-    let mut recording = McapRecorder::create(&place.join(RECORDING), &header)?;
-    let mut state = StateAt::violation_of(flight);
-    let flown = splitting::replay(&scenario, &flight.genealogy, &mut (&mut recording, &mut state));
+    let mut recording = McapRecorder::create(&out.join(RECORDING), &header)?;
+    let mut state = StateAt::violation_of(violated);
+    let flown = splitting::replay(&scenario, &violated.genealogy, &mut (&mut recording, &mut state));
     let closed = recording.finish();
     flown?;
     closed?;
     let found = state.hash().unwrap_or("none").to_owned();
-    if found == flight.state_hash {
-        return Ok(found);
-    }
-    let message = format!(
-        "bad flight {bad} of run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {}",
-        law.name, flight.state_hash
-    );
-    Err(Failure::machine("campaign/other-bits", message).with_help(FAULTY))
+    flight.compare(&found, &violated.state_hash)?;
+    Ok(found)
 }
 
-/// Refuses a flight that did not end as it did in the campaign.
-fn check(left: &RunFiles, run: u64, law: &Law, state_hash: &str) -> Result<(), Failure> {
-    if left.report.run.ended_early.as_deref() == Some(tautline_report::report::INTERRUPTED) {
-        return Ok(());
-    }
-    let found = &left.report.run.state_hash;
-    if found == state_hash {
-        return Ok(());
-    }
-    let message = format!(
-        "run {run} under {}: flown again it has the state hash {found}, and in the campaign it had {state_hash}",
-        law.name
-    );
-    Err(Failure::machine("campaign/other-bits", message).with_help(FAULTY))
+/// Refuses a flight whose state hash is not that of the campaign, unless it was interrupted.
+fn check(flight: FlightId<'_>, left: &RunFiles, state_hash: &str) -> Result<(), Failure> {
+    let run = &left.report.run;
+    let is_interrupted = run.ended_early.as_deref() == Some(tautline_report::report::INTERRUPTED);
+    if is_interrupted { Ok(()) } else { flight.compare(&run.state_hash, state_hash) }
 }
 
-fn looked_at(campaign: &Campaign, law: &Law, worst: &Worst, left: &RunFiles) -> WorstFlight {
+/// Returns one of the worst flights with its description and picture.
+fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFiles) -> WorstFlight {
     let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!("vehicles {a} and {b} came to "));
     let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
     let by_obstacle = worst.outcome == Outcome::Violated && worst.clearance_m >= 0.0;
     let said = format!(
         "Run {} under {}: {}{pair}{} m{at}, {} m {} delta; it {reached}.",
-        worst.run,
-        law.name,
+        flight.run,
+        flight.law.name,
         if by_obstacle { "a vehicle came nearer to an obstacle than its clearance; " } else { "" },
         metres(worst.min_m),
         metres(worst.clearance_m.abs()),
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );
+    let closest = left.pictures.iter().find(|(name, _)| name == "closest");
+    let picture = closest.map(|(_, picture)| Picture { description: said.clone(), data_uri: picture.data_uri.clone() });
     WorstFlight {
-        run: worst.run,
-        law: law.name.clone(),
-        recording: Some(format!("worst/{}-run-{}/{RECORDING}", law.name, worst.run)),
-        command: command(campaign, worst.run, law),
-        picture: closest(left, &said),
+        run: flight.run,
+        law: flight.law.name.clone(),
+        recording: Some(format!("worst/{}/{RECORDING}", flight.name())),
+        command: flight.command(campaign),
+        picture,
         replay: None,
         said,
     }
-}
-
-/// The picture of the worst moment.
-fn closest(left: &RunFiles, said: &str) -> Option<Picture> {
-    let (_, picture) = left.pictures.iter().find(|(name, _)| name == "closest")?;
-    Some(Picture { description: said.to_owned(), data_uri: picture.data_uri.clone() })
-}
-
-/// The command that flies a run again without its campaign.
-fn command(campaign: &Campaign, run: u64, law: &Law) -> String {
-    let sets = campaign.sets(run, law);
-    let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
-    command_line(["run", campaign.scenario_argument()].into_iter().chain(sets).collect::<Vec<_>>().into_iter())
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::replay::{WorstFlight, fly_worst_again};
-use super::{ANSWER, Campaign, CampaignError, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally};
+use super::{ANSWER, Campaign, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally};
 use crate::Question;
 use crate::batch::Batch;
 use crate::study::{Study as _, StudyPage};
@@ -58,8 +58,8 @@ impl CampaignRequest {
         self.spec.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
     }
 
-    /// Text and keys of the specification.
-    fn read(&self) -> Result<(String, Spec), Failure> {
+    /// Reads the specification and adds the keys of the request.
+    fn read(&self) -> Result<Spec, Failure> {
         let shown = self.spec.display().to_string();
         let text = fs::read_to_string(&self.spec).map_err(|error| {
             Failure::input(
@@ -77,7 +77,7 @@ impl CampaignRequest {
                 ..stop
             });
         }
-        Ok((text, spec))
+        Ok(spec)
     }
 
     /// Plans the campaign into its folder, or opens it where it was planned before.
@@ -86,14 +86,9 @@ impl CampaignRequest {
     /// [`Failure`] where the specification is wrong, or the folder is of another campaign.
     pub fn plan(&self) -> Result<Folder, Failure> {
         let folder = self.spec.parent().unwrap_or(Path::new(""));
-        let (text, spec) = self.read()?;
-        let campaign =
-            Campaign::plan(&spec, &self.name(), folder, self.shards, Program::running()?).map_err(|error| {
-                let place = error.place(&self.spec.display().to_string(), &text);
-                place.into_iter().fold(Failure::from(error), |failure, place| failure.at(&place))
-            })?;
+        let campaign = Campaign::plan(&self.read()?, &self.name(), folder, self.shards, Program::running()?)?;
         let out = self.out.clone().unwrap_or_else(|| Path::new("out").join(self.name()));
-        Ok(Folder::plan(&out, campaign, self.shards.is_some())?)
+        Folder::plan(&out, campaign, self.shards.is_some())
     }
 }
 
@@ -120,22 +115,11 @@ pub fn campaign(
         if tally.is_enough() {
             break;
         }
-        warn_of_damage(&folder, shard, monitor)?;
-        let rows = match folder.fly(shard, &batch)? {
-            Shard::Kept(rows) => {
-                monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
-                rows
-            }
-            Shard::Flown { rows, flown } => {
-                flights += flown;
-                rows
-            }
-            Shard::Interrupted => {
-                monitor.finish();
-                monitor.warn("interrupted: what was flown is kept, and the same command goes on from there");
-                return Ok(None);
-            }
-        };
+        let Some(Shard { rows, flown }) = fly_shard(&folder, shard, &batch, monitor)? else { return Ok(None) };
+        if flown == 0 {
+            monitor.advance(campaign.steps(rows.len() as u64 / campaign.laws().len() as u64));
+        }
+        flights += flown;
         for row in &rows {
             tally.take(row);
         }
@@ -161,21 +145,27 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
     let runs = shards.iter().map(|&shard| manifest.range(shard)).map(|range| range.end - range.start).sum();
     monitor.begin(&manifest.name, Some(folder.campaign().steps(runs)));
     for &shard in shards {
-        warn_of_damage(folder, shard, monitor)?;
-        monitor.say(&match folder.fly(shard, &batch)? {
-            Shard::Kept(rows) => format!("shard {shard}: {} flights had been flown", rows.len()),
-            Shard::Flown { flown, .. } => format!("shard {shard}: {flown} flights flown"),
-            Shard::Interrupted => {
-                monitor.finish();
-                monitor.warn(&format!(
-                    "interrupted in shard {shard}: what was flown is kept, and the same command goes on"
-                ));
-                return Ok(false);
-            }
+        let Some(Shard { rows, flown }) = fly_shard(folder, shard, &batch, monitor)? else { return Ok(false) };
+        monitor.say(&match flown {
+            0 => format!("shard {shard}: {} flights had been flown", rows.len()),
+            flown => format!("shard {shard}: {flown} flights flown"),
         });
     }
     monitor.finish();
     Ok(true)
+}
+
+/// Flies a shard. Returns `None` after an interruption.
+fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monitor) -> Result<Option<Shard>, Failure> {
+    warn_of_damage(shard, folder.damaged(shard)?.as_deref(), monitor);
+    let flown = folder.fly(shard, batch)?;
+    if flown.is_none() {
+        monitor.finish();
+        monitor.warn(&format!(
+            "interrupted in shard {shard}: what was flown is kept, and the same command goes on from there"
+        ));
+    }
+    Ok(flown)
 }
 
 /// The shards of a campaign that are missing. Warns of damaged ones.
@@ -184,18 +174,17 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
 /// [`Failure`] where the system refuses.
 pub fn missing_shards(folder: &Folder, monitor: &dyn Monitor) -> Result<Vec<u64>, Failure> {
     let missing = folder.missing()?;
-    for &shard in &missing {
-        warn_of_damage(folder, shard, monitor)?;
+    for (shard, damage) in &missing {
+        warn_of_damage(*shard, damage.as_deref(), monitor);
     }
-    Ok(missing)
+    Ok(missing.into_iter().map(|(shard, _)| shard).collect())
 }
 
-/// Warns that the part of a shard is damaged: the shard is flown again.
-fn warn_of_damage(folder: &Folder, shard: u64, monitor: &dyn Monitor) -> Result<(), Failure> {
-    if let Some(part) = folder.damaged(shard)? {
-        monitor.warn(&format!("{part}; shard {shard} is to be flown again, which replaces it"));
+/// Warns of a damaged part, whose shard is flown again.
+fn warn_of_damage(shard: u64, damage: Option<&str>, monitor: &dyn Monitor) {
+    if let Some(damage) = damage {
+        monitor.warn(&format!("{damage}; shard {shard} is to be flown again, which replaces it"));
     }
-    Ok(())
 }
 
 /// Merges all parts of a campaign, and writes its answer and its page. `None` where the monitor interrupted.
@@ -208,7 +197,7 @@ pub fn merge(
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
-    let merged = folder.merge().map_err(|error| in_folder(error, folder))?;
+    let merged = folder.merge()?;
     answer(folder, merged.summary, worst, Some(&merged.sha256), pictures, monitor)
 }
 
@@ -222,12 +211,7 @@ pub fn report(
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
-    let summary = folder.summary().map_err(|error| in_folder(error, folder))?;
-    answer(folder, summary, worst, None, pictures, monitor)
-}
-
-fn in_folder(error: CampaignError, folder: &Folder) -> Failure {
-    Failure::from(error).naming(&folder.path().display().to_string())
+    answer(folder, folder.summary()?, worst, None, pictures, monitor)
 }
 
 /// Says the answer and writes its page.

@@ -1,7 +1,7 @@
-//! A shard: its part, which is whole and sealed, the journal of a process under way, and its flights.
+//! Shards of a campaign: their flights as rows, the part of a finished shard, and the journal of a running process.
 //!
-//! A part is lines of JSON: a heading, a row a line in the order of runs and laws, and a seal with the SHA-256 of all before
-//! it. A part whose seal does not fit is damaged (truncated or altered), and its shard is flown again.
+//! A part has lines of JSON: a heading, a row for each flight in the order of runs and laws, and a seal with the SHA-256 of the
+//! lines before. A part whose seal does not fit is damaged (truncated or altered), and its shard is flown again.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,41 +12,37 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
-use super::error::CampaignError;
-use super::folder::{Folder, JOURNAL};
-use super::manifest::{Manifest, base16};
-use super::row::Row;
+use super::flights::Campaign;
+use super::folder::{Folder, JOURNAL, Manifest, base16, cannot, different_results, other_campaign};
 use crate::SCHEMA_VERSION;
 use crate::batch::Batch;
+use crate::flight::{FlightSummary, Outcome};
+use crate::splitting::Splitting;
+use crate::table::{Cell, Column, Kind};
+use tautline_report::request::Failure;
 
-/// What became of a shard.
+/// A shard whose flights are finished.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shard {
-    /// It had been flown.
-    Kept(Vec<Row>),
-    /// It was flown.
-    Flown {
-        /// All of it.
-        rows: Vec<Row>,
-        /// How many of them now.
-        flown: u64,
-    },
-    /// It was interrupted; what was flown of it is kept for the next time.
-    Interrupted,
+pub struct Shard {
+    /// The flights, in the order of runs and laws.
+    pub rows: Vec<Row>,
+    /// Number of flights of this call; 0 if the shard had been flown.
+    pub flown: u64,
 }
 
 impl Folder {
-    /// Flies a shard, unless it has been flown; the result is the same for any number of threads, and for any number of
-    /// interruptions before.
+    /// Flies a shard, unless it has been flown. Returns `None` after an interruption; finished flights are kept. The rows are the
+    /// same for any number of threads and interruptions.
     ///
     /// # Errors
-    /// [`CampaignError::Nondeterministic`] where another process flew it meanwhile with different results, [`CampaignError::Flight`] for a
-    /// flight that does not exist, [`CampaignError::Machine`] where the disk is full; what was flown is kept.
-    pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Shard, CampaignError> {
+    /// [`Failure`] if another process flew the shard with different results, a law cannot be built, or the disk is full. Finished
+    /// flights are kept.
+    pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Option<Shard>, Failure> {
         if let Found::Whole(rows) = self.read(shard)? {
-            return Ok(Shard::Kept(rows));
+            return Ok(Some(Shard { rows, flown: 0 }));
         }
         self.make()?;
         let began = Instant::now();
@@ -63,9 +59,9 @@ impl Folder {
             if let Some(row) = &row {
                 journal.lock().unwrap_or_else(PoisonError::into_inner).add(row)?;
             }
-            Ok::<_, CampaignError>(row)
+            Ok::<_, Failure>(row)
         })?;
-        let Some(made) = made.into_iter().collect::<Option<Vec<_>>>() else { return Ok(Shard::Interrupted) };
+        let Some(made) = made.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
         rows.extend(made);
         rows.sort_by_key(Row::place);
         self.publish(shard, &rows)?;
@@ -73,11 +69,11 @@ impl Folder {
         let (seconds, threads) = (began.elapsed().as_secs_f64(), batch.threads());
         let times = format!("{{\"wall_s\": {seconds:.3}, \"threads\": {threads}, \"flights\": {flown}}}\n");
         tautline_report::report::write_atomically(&self.times(shard), times.as_bytes())?;
-        Ok(Shard::Flown { rows, flown: flown as u64 })
+        Ok(Some(Shard { rows, flown: flown as u64 }))
     }
 
     /// Rows that processes left which were killed, each once.
-    fn flown_before(&self, shard: u64) -> Result<Vec<Row>, CampaignError> {
+    fn flown_before(&self, shard: u64) -> Result<Vec<Row>, Failure> {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
         let manifest = self.campaign().manifest();
         let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
@@ -90,11 +86,7 @@ impl Folder {
                     Entry::Vacant(place) => drop(place.insert((row, path.clone()))),
                     Entry::Occupied(there) if there.get().0 == row => {}
                     Entry::Occupied(there) => {
-                        return Err(CampaignError::Nondeterministic {
-                            shard,
-                            kept: there.get().1.clone(),
-                            other: path,
-                        });
+                        return Err(different_results(shard, &there.get().1, &path));
                     }
                 }
             }
@@ -103,10 +95,10 @@ impl Folder {
     }
 
     /// Puts a part in its place, whole, unless there is one: then both must say the same.
-    fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), CampaignError> {
+    fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
         let (path, own) = (self.part(shard), self.own(shard, "partial"));
-        let failed = |error| CampaignError::writing(&own, error);
+        let failed = |error| cannot("write", &own)(error);
         let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
@@ -124,23 +116,23 @@ impl Folder {
     }
 
     /// Another process was faster: the same bytes are one part, others are an alarm.
-    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), CampaignError> {
+    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let kept = self.part(shard);
-        let there = fs::read(&kept).map_err(|error| CampaignError::reading(&kept, error))?;
+        let there = fs::read(&kept).map_err(cannot("read", &kept))?;
         if there == bytes {
-            return fs::remove_file(own).map_err(|error| CampaignError::writing(own, error));
+            return fs::remove_file(own).map_err(cannot("write", own));
         }
         let other = self.differs(shard);
-        fs::rename(own, &other).map_err(|error| CampaignError::writing(&other, error))?;
-        Err(CampaignError::Nondeterministic { shard, kept, other })
+        fs::rename(own, &other).map_err(cannot("write", &other))?;
+        Err(different_results(shard, &kept, &other))
     }
 
     /// Removes what is left of a shard that is whole.
-    fn sweep(&self, shard: u64) -> Result<(), CampaignError> {
+    fn sweep(&self, shard: u64) -> Result<(), Failure> {
         for path in self.left(shard, JOURNAL)? {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(CampaignError::writing(&path, error));
+                    return Err(cannot("write", &path)(error));
                 }
                 _ => {}
             }
@@ -181,8 +173,8 @@ pub enum Found {
 /// The part of a shard as bytes.
 ///
 /// # Errors
-/// [`CampaignError::Machine`] in no case that is known: every row has a JSON form.
-pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, CampaignError> {
+/// None in practice: every row has a JSON form.
+pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, Failure> {
     let heading =
         Heading { schema_version: SCHEMA_VERSION, campaign: manifest.campaign.clone(), shard, shards: manifest.shards };
     let mut bytes = line(&heading)?;
@@ -194,8 +186,8 @@ pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Ve
     Ok(bytes)
 }
 
-fn line(value: &impl Serialize) -> Result<Vec<u8>, CampaignError> {
-    let written = serde_json::to_vec(value).map_err(|error| CampaignError::writing(Path::new("a row"), error.into()));
+fn line(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
+    let written = serde_json::to_vec(value).map_err(|error| cannot("write", Path::new("a row"))(error.into()));
     written.map(|mut bytes| {
         bytes.push(b'\n');
         bytes
@@ -205,17 +197,17 @@ fn line(value: &impl Serialize) -> Result<Vec<u8>, CampaignError> {
 /// Reads the part of a shard.
 ///
 /// # Errors
-/// [`CampaignError::Foreign`] for a part of another campaign, [`CampaignError::Machine`] where the file cannot be read.
-pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, CampaignError> {
+/// [`Failure`] for a part of another campaign, and for a file that cannot be read.
+pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, Failure> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
-        Err(error) => return Err(CampaignError::reading(path, error)),
+        Err(error) => return Err(cannot("read", path)(error)),
     };
     decode(&bytes, manifest, shard, laws, path)
 }
 
-fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, CampaignError> {
+fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, Failure> {
     const TRUNCATED: &str = "it is truncated: the SHA-256 of its rows is missing";
     const ALTERED: &str = "it was altered: its rows do not have the SHA-256 at its end";
     let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Damaged(TRUNCATED)) };
@@ -231,14 +223,11 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
     if !is_ours {
-        return Err(CampaignError::Foreign {
-            path: path.to_owned(),
-            why: format!(
-                "this is shard {} of {} of campaign {}, not shard {shard} of {} of campaign {}",
-                heading.shard, heading.shards, heading.campaign, manifest.shards, manifest.campaign
-            ),
-            help: "remove it, or merge in the folder that it belongs to".to_owned(),
-        });
+        let problem = format!(
+            "shard {} of {} of campaign {}, not shard {shard} of {} of campaign {}",
+            heading.shard, heading.shards, heading.campaign, manifest.shards, manifest.campaign
+        );
+        return Err(other_campaign(path, problem, "remove the file, or move it to the folder of its campaign"));
     }
     let rows: Vec<Row> = lines.map_while(|line| serde_json::from_slice(line).ok()).collect();
     let places = manifest.range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
@@ -260,20 +249,20 @@ impl Journal {
     /// Begins a journal.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where the file cannot be made.
-    pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, CampaignError> {
-        let file = File::create(&path).map_err(|error| CampaignError::writing(&path, error))?;
+    /// [`Failure`] if the file cannot be made.
+    pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, Failure> {
+        let file = File::create(&path).map_err(cannot("write", &path))?;
         Ok(Self { path, file, campaign: manifest.campaign.clone() })
     }
 
     /// Adds a row.
     ///
     /// # Errors
-    /// [`CampaignError::Machine`] where the disk is full; what was written before stays.
-    pub(super) fn add(&mut self, row: &Row) -> Result<(), CampaignError> {
+    /// [`Failure`] if the disk is full. Earlier rows stay.
+    pub(super) fn add(&mut self, row: &Row) -> Result<(), Failure> {
         let row = line(row)?;
         let written = [seal_of(&self.campaign, &row).as_bytes(), b" ", &row].concat();
-        self.file.write_all(&written).map_err(|error| CampaignError::writing(&self.path, error))
+        self.file.write_all(&written).map_err(cannot("write", &self.path))
     }
 
     /// Rows of a campaign in a journal that was left behind.
@@ -293,4 +282,143 @@ impl Journal {
 /// Hash over a campaign and the line of a row.
 fn seal_of(campaign: &str, row: &[u8]) -> String {
     base16(&Sha256::new().chain_update(campaign).chain_update(row).finalize())
+}
+
+/// One flight: a run under a law.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// Number of the run, from 0.
+    pub run: u64,
+    /// Which of the campaign's laws, from 0.
+    pub law: usize,
+    /// What was drawn for it, in the order of the keys.
+    pub drawn: Vec<Value>,
+    /// Why it was not flown, where what was drawn cannot be, such as a start of two vehicles nearer than delta.
+    pub not_flown: Option<String>,
+    /// How it went.
+    pub flight: Option<FlightSummary>,
+    /// What was estimated, where a run is no flight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub splitting: Option<Splitting>,
+}
+
+/// What is known of a flight's separation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Known {
+    /// No two vehicles came closer than delta, to the end.
+    Clear,
+    /// Two did.
+    Violated,
+    /// It ended early or the judge cannot tell.
+    Unknown,
+    /// What was drawn cannot be flown.
+    NotFlown,
+    /// It is no flight but an estimate.
+    Estimated,
+}
+
+impl Row {
+    /// What is known of its separation.
+    #[must_use]
+    pub fn known(&self) -> Known {
+        match self.flight.as_ref().map(|flight| flight.outcome) {
+            None if self.splitting.is_some() => Known::Estimated,
+            None => Known::NotFlown,
+            Some(Outcome::Clear) => Known::Clear,
+            Some(Outcome::Violated) => Known::Violated,
+            Some(Outcome::EndedEarly | Outcome::Undecided) => Known::Unknown,
+        }
+    }
+
+    /// Smallest separation less delta \[m\].
+    #[must_use]
+    pub fn clearance_m(&self) -> Option<f64> {
+        self.flight.as_ref()?.clearance_m()
+    }
+
+    /// Its place in the order of all rows.
+    #[must_use]
+    pub fn place(&self) -> (u64, usize) {
+        (self.run, self.law)
+    }
+}
+
+/// A column of `results.parquet`, and its cell of a row.
+pub(super) type Field<'a> = (Column, Box<dyn Fn(&Row) -> Cell + 'a>);
+
+fn field<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&Row) -> C + 'a) -> Field<'a> {
+    (Column::new(name, "", kind), Box::new(move |row| cell(row).into()))
+}
+
+/// A column of flights, which is empty in a row that was not flown.
+fn of_flight<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&FlightSummary) -> C + 'a) -> Field<'a> {
+    field(name, kind, move |row| row.flight.as_ref().map(&cell))
+}
+
+/// A column of estimates.
+fn of_estimate<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&Splitting) -> C + 'a) -> Field<'a> {
+    field(name, kind, move |row| row.splitting.as_ref().map(&cell))
+}
+
+/// The column of a varied key: of numbers where all its values are numbers, else of texts.
+fn drawn<'a>(place: usize, key: &str, samples: &[toml::Value]) -> Field<'a> {
+    // Columns of our own have no dots.
+    let name = if key.contains('.') { key.to_owned() } else { format!("vary.{key}") };
+    let at = move |row: &Row| row.drawn.get(place).cloned();
+    if samples.iter().all(toml::Value::is_integer) {
+        field(&name, Kind::Integer, move |row| at(row).and_then(|value| value.as_i64()))
+    } else if samples.iter().all(|value| value.is_float() || value.is_integer()) {
+        field(&name, Kind::Exact, move |row| at(row).and_then(|value| value.as_f64()))
+    } else {
+        let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        field(&name, Kind::Text, move |row| at(row).map(text))
+    }
+}
+
+/// Columns of `results.parquet`.
+pub(super) fn fields(campaign: &Campaign) -> Vec<Field<'_>> {
+    let law = |row: &Row| campaign.laws().get(row.law).map(|law| law.name.clone());
+    let mut fields = vec![field("run", Kind::Count, |row| row.run), field("law", Kind::Text, law)];
+    let keys = campaign.variations().iter().enumerate();
+    fields.extend(keys.map(|(place, (key, variation))| drawn(place, key, &variation.samples())));
+    let not_flown = field("not_flown_because", Kind::Text, |row| row.not_flown.clone());
+    if campaign.splitting().is_some() {
+        fields.extend([
+            of_estimate("probability", Kind::Exact, |of| of.probability),
+            of_estimate("iterations", Kind::Count, |of| of.iterations),
+            of_estimate("extinct", Kind::Flag, |of| of.extinct),
+            of_estimate("steps", Kind::Count, |of| of.steps),
+            not_flown,
+        ]);
+        return fields;
+    }
+    let outcome = |row: &Row| row.flight.as_ref().map_or("not_flown", |flight| flight.outcome.name());
+    let refused = |of: &FlightSummary| Some(of.refused.join(" ")).filter(|codes| !codes.is_empty());
+    fields.extend([
+        field("outcome", Kind::Text, outcome),
+        of_flight("pass", Kind::Flag, |of| of.pass),
+        of_flight("refused", Kind::Text, refused),
+        of_flight("ended_early", Kind::Text, |of| of.ended_early.clone()),
+        not_flown,
+        of_flight("delta_m", Kind::Exact, |of| of.delta_m),
+        of_flight("min_m", Kind::Exact, |of| of.min_m),
+        of_flight("min_at_s", Kind::Exact, |of| of.min_at_s),
+        of_flight("min_vehicle_a", Kind::Integer, |of| of.min_pair.map(|pair| pair[0])),
+        of_flight("min_vehicle_b", Kind::Integer, |of| of.min_pair.map(|pair| pair[1])),
+        of_flight("certified_m", Kind::Exact, |of| of.certified_m),
+        of_flight("breaks_certificate", Kind::Flag, |of| of.breaks_certificate),
+        of_flight("reached", Kind::Flag, |of| of.reached),
+        of_flight("reached_at_s", Kind::Exact, |of| of.reached_at_s),
+        of_flight("peak_control_m_s2", Kind::Exact, |of| of.peak_control_m_s2),
+        of_flight("total_control_m_s", Kind::Exact, |of| of.total_control_m_s),
+        of_flight("path_length_m", Kind::Exact, |of| of.path_length_m),
+        of_flight("energy_max_over_initial", Kind::Exact, |of| of.energy_max_over_initial),
+        of_flight("steps", Kind::Count, |of| of.steps),
+        of_flight("refined_steps", Kind::Count, |of| of.refined_steps),
+        of_flight("overlong_steps", Kind::Count, |of| of.overlong_steps),
+        of_flight("scenario_sha256", Kind::Text, |of| of.scenario_sha256.clone()),
+        of_flight("state_hash", Kind::Text, |of| of.state_hash.clone()),
+    ]);
+    fields
 }

@@ -1,16 +1,26 @@
-//! What a campaign is asked to fly: the keys of its TOML file.
+//! Specification of a campaign: the keys of its TOML file, and their places for errors.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
+use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::error::CampaignError;
 use super::vary::Variation;
 use crate::Question;
+use crate::base::overlap;
 use crate::splitting::Settings;
+use tautline_report::request::Failure;
+use tautline_sim::scenario::{Place, ScenarioError};
 
-/// Words by which a table of `[vary]` says how it draws; another table holds keys of the scenario.
+/// Source of the overrides in errors of a scenario.
+const SET: &str = "--set";
+/// Forms of a variation.
+const VARIATIONS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, { normal = [mean, deviation] }, \
+                          { integer = [low, high] }, { list = [...] }, { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
+
+/// Names of distributions: a table of `[vary]` with one of these keys is a variation, any other table holds keys of the scenario.
 const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];
 
 /// The keys of a specification.
@@ -41,7 +51,16 @@ pub struct Spec {
     pub method: Method,
     /// How many flights each estimate has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub splitting: Option<SplittingKeys>,
+    pub splitting: Option<Settings>,
+    #[serde(skip)]
+    source: Source,
+}
+
+/// Name and text of the file, for the places of errors.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Source {
+    name: String,
+    text: String,
 }
 
 /// What a run is.
@@ -62,31 +81,6 @@ impl Method {
     }
 }
 
-/// `[splitting]`: the numbers of an estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SplittingKeys {
-    /// Flights at a time.
-    pub flights: usize,
-    /// At least so many are ended in a round.
-    pub kill: usize,
-    /// Most bad flights that are kept of each estimate.
-    pub keep: usize,
-}
-
-impl Default for SplittingKeys {
-    fn default() -> Self {
-        let Settings { flights, kill, keep } = Settings::default();
-        Self { flights, kill, keep }
-    }
-}
-
-impl From<SplittingKeys> for Settings {
-    fn from(keys: SplittingKeys) -> Self {
-        Self { flights: keys.flights, kill: keys.kill, keep: keys.keep }
-    }
-}
-
 /// When enough has been flown. What is decided is decided by intervals that hold at every look.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,24 +95,30 @@ pub struct Stop {
 }
 
 impl Spec {
-    /// Reads the TOML of a specification, which messages call `name`.
+    /// Reads the TOML of a specification. `name` is the source in messages.
     ///
     /// # Errors
-    /// [`CampaignError::Input`] for what is not TOML and for keys that there are not, with their place.
-    pub fn read(name: &str, text: &str) -> Result<Self, CampaignError> {
-        toml::from_str(text).map_err(|error| CampaignError::specification(name, error.to_string().trim_end()))
+    /// [`Failure`] `campaign/specification`, with its place.
+    pub fn read(name: &str, text: &str) -> Result<Self, Failure> {
+        let source = Source { name: name.to_owned(), text: text.to_owned() };
+        let refused = |error: toml::de::Error| {
+            let (problem, remedy) = in_words(error.message());
+            let remedy = remedy.unwrap_or_else(|| "docs/campaigns.md shows every key of a specification".to_owned());
+            let place = Place::new(name, text, error.span().unwrap_or_default());
+            Failure::input("campaign/specification", problem, remedy).at(&place)
+        };
+        Ok(Self { source, ..toml::from_str(text).map_err(refused)? })
     }
 
-    /// The specification as TOML that reads back as the same one.
+    /// Returns the specification as TOML from which [`Spec::read`] reads the same keys.
     ///
     /// # Errors
-    /// [`CampaignError::Input`] for numbers that TOML cannot hold, such as a seed of 64 bits.
-    pub fn to_toml(&self) -> Result<String, CampaignError> {
-        let wrong = |error: toml::ser::Error| CampaignError::plan(error.to_string(), "choose a seed below 2^63");
-        toml::to_string(self).map_err(wrong)
+    /// [`Failure`] for numbers that TOML cannot hold, such as a seed of 64 bits.
+    pub fn to_toml(&self) -> Result<String, Failure> {
+        toml::to_string(self).map_err(|error| refused(error.to_string(), "choose a seed below 2^63"))
     }
 
-    /// The keys of `[set]`, with their tables' names before them.
+    /// Returns the keys of `[set]`, with the names of their tables before them.
     #[must_use]
     pub fn sets(&self) -> BTreeMap<String, Value> {
         let mut keys = BTreeMap::new();
@@ -126,15 +126,88 @@ impl Spec {
         keys
     }
 
-    /// The keys of `[vary]`, with their tables' names before them, in the order of the alphabet.
+    /// Returns the keys of `[vary]`, with the names of their tables before them, in alphabetical order.
     ///
     /// # Errors
-    /// [`CampaignError::Input`] for what is no variation.
-    pub fn variations(&self) -> Result<BTreeMap<String, Variation>, CampaignError> {
+    /// [`Failure`] `campaign/variation`, with its place.
+    pub fn variations(&self) -> Result<BTreeMap<String, Variation>, Failure> {
         let mut keys = BTreeMap::new();
         flatten("", &self.vary, &draws, &mut keys);
-        keys.into_iter().map(|(key, said)| Variation::read(&key, &said).map(|read| (key, read))).collect()
+        let read = |(key, value): (String, Value)| match Variation::read(&value) {
+            Ok(variation) => Ok((key, variation)),
+            Err(problem) => {
+                let failure = Failure::input("campaign/variation", format!("vary.{key}: {problem}"), VARIATIONS);
+                Err(self.at(&format!("vary.{key}"), failure))
+            }
+        };
+        keys.into_iter().map(read).collect()
     }
+
+    /// Returns the failure with the place of a key, or else of its table; unchanged if the file has neither.
+    pub(super) fn at(&self, key: &str, failure: Failure) -> Failure {
+        self.at_first(&[key.to_owned()], failure)
+    }
+
+    /// Returns the failure of a key with its place.
+    pub(super) fn refuse(&self, key: &str, problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Failure {
+        self.at(key, refused(problem, remedy))
+    }
+
+    /// Returns the error of a scenario that a key of the specification caused, with the place in the specification unless the
+    /// scenario's own file has the place. `situation` precedes the message if it is not empty.
+    pub(super) fn scenario(&self, key: &str, situation: &str, error: ScenarioError) -> Failure {
+        let is_varied = key.starts_with("vary.");
+        let keys = match error.place() {
+            Some(place) if place.source == SET && !is_varied => {
+                let set = place.text.split('=').next().unwrap_or_default().trim();
+                vec![format!("vary.{set}"), format!("set.{set}"), key.to_owned()]
+            }
+            Some(place) if place.source != SET && !is_varied => Vec::new(),
+            _ => vec![key.to_owned()],
+        };
+        let failure = Failure::from(error);
+        self.at_first(&keys, if situation.is_empty() { failure } else { failure.under(situation) })
+    }
+
+    fn at_first(&self, keys: &[String], failure: Failure) -> Failure {
+        let Ok(parsed) = DeTable::parse(&self.source.text) else { return failure };
+        let of_table = || {
+            let tables = std::iter::successors(keys.first()?.rsplit_once('.'), |(table, _)| table.rsplit_once('.'));
+            tables.into_iter().find_map(|(table, _)| find(parsed.get_ref(), table))
+        };
+        let span = keys.iter().find_map(|key| find(parsed.get_ref(), key)).or_else(of_table);
+        match span {
+            Some(span) => failure.at(&Place::new(&self.source.name, &self.source.text, span)),
+            None => failure,
+        }
+    }
+}
+
+/// Returns the failure of a specification that makes no campaign.
+pub(super) fn refused(problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Failure {
+    Failure::input("campaign/plan", problem, remedy)
+}
+
+/// Returns problem and remedy of a message of serde, in the words of errors of scenarios.
+pub(super) fn in_words(message: &str) -> (String, Option<String>) {
+    let message = message.trim_end();
+    let (problem, expected) = message.split_once(", expected ").map_or((message, None), |(a, b)| (a, Some(b)));
+    let words =
+        [("unknown field", "unknown key"), ("missing field", "missing key"), ("unknown variant", "unknown choice")];
+    let problem = words.iter().fold(problem.to_owned(), |text, (serde, ours)| text.replace(serde, ours));
+    (problem, expected.map(|expected| format!("give {expected}")))
+}
+
+/// Returns the bytes of a key, whose name follows the names of its tables; each may be a table of its own or joined by dots.
+fn find(table: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
+    table.iter().find_map(|(name, value)| {
+        let rest = key.strip_prefix(&**name.get_ref())?;
+        match (rest.strip_prefix('.'), value.get_ref()) {
+            (None, _) => rest.is_empty().then(|| name.span()),
+            (Some(below), DeValue::Table(table)) => find(table, below),
+            (Some(_), _) => None,
+        }
+    })
 }
 
 /// Whether a table says how a value is drawn, and holds no keys of a scenario.
@@ -154,78 +227,54 @@ fn flatten(above: &str, table: &Table, is_value: &dyn Fn(&Table) -> bool, keys: 
     }
 }
 
-impl Stop {
-    /// Refuses numbers that no share can reach.
-    ///
-    /// # Errors
-    /// [`CampaignError::Input`].
-    pub fn check(&self) -> Result<(), CampaignError> {
-        let inside = |number: f64| number > 0.0 && number < 1.0;
-        for (key, number) in [("stop.width", self.width), ("stop.decided", self.decided)] {
-            if let Some(number) = number.filter(|&number| !inside(number)) {
-                return Err(CampaignError::plan(
-                    format!("{key} = {number}"),
-                    "it is a share: give a number between 0 and 1, such as 0.01",
-                )
-                .at(key));
+impl Spec {
+    /// Refuses numbers of `[stop]` that are not shares.
+    pub(super) fn check_stop(&self) -> Result<(), Failure> {
+        let Some(Stop { width, decided, .. }) = self.stop else { return Ok(()) };
+        let is_share = |number: f64| number > 0.0 && number < 1.0;
+        for (key, number) in [("stop.width", width), ("stop.decided", decided)] {
+            if let Some(number) = number.filter(|&number| !is_share(number)) {
+                let problem = format!("{key}: must be more than 0 and less than 1, got {number}");
+                return Err(self.refuse(key, problem, "give a share such as 0.01"));
             }
         }
-        if self.width.is_none() && self.decided.is_none() {
-            let help = "give width or decided, or leave the table out";
-            return Err(CampaignError::plan("[stop] says nothing", help).at("stop"));
+        if width.is_none() && decided.is_none() {
+            let remedy = "give width or decided, or leave the table out";
+            return Err(self.refuse("stop", "stop: neither width nor decided is given", remedy));
         }
         Ok(())
     }
-}
 
-/// Refuses keys of which one is the other, or a part of it, and a varied law where laws are named.
-pub(super) fn refuse_overlaps(
-    sets: &BTreeMap<String, toml::Value>,
-    variations: &BTreeMap<String, Variation>,
-    names_laws: bool,
-) -> Result<(), CampaignError> {
-    let place = |key: &String| format!("{}.{key}", if sets.contains_key(key) { "set" } else { "vary" });
-    let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
-    if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
-        let refused = CampaignError::plan(
-            format!("`{key}` is not a key of a scenario"),
-            "write the key as --set takes it: time.dt_s",
-        );
-        return Err(refused.at(&place(key)));
-    }
-    let plain = |key: &String| {
-        let axis = |part: &str| match part {
-            "x" => "1".to_owned(),
-            "y" => "2".to_owned(),
-            "z" => "3".to_owned(),
-            other => other.to_owned(),
-        };
-        key.split('.').map(axis).collect::<Vec<_>>()
-    };
-    let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
-    for (k, key) in all.iter().enumerate() {
-        let varies = |number: usize| number >= sets.len();
-        let clash = |&number: &usize| {
-            let (one, other) = (plain(key), plain(all[number]));
-            (varies(k) || varies(number)) && (one.starts_with(&other) || other.starts_with(&one))
-        };
-        if let Some(other) = (0..k).find(clash) {
-            let places = if varies(k) && varies(other) { "both in [vary]" } else { "in [set] and in [vary]" };
-            let refused = CampaignError::plan(
-                format!("{} and {key} stand {places}, and one is the other or a part of it", all[other]),
-                "a key either has one value or differs from run to run: take one of them out",
-            );
-            return Err(refused.at(&format!("vary.{key}")));
+    /// Refuses two keys of which one contains the other, and a varied law if laws are named.
+    pub(super) fn check_overlaps(
+        &self,
+        sets: &BTreeMap<String, Value>,
+        variations: &BTreeMap<String, Variation>,
+    ) -> Result<(), Failure> {
+        let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
+        if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
+            let place = format!("{}.{key}", if sets.contains_key(key) { "set" } else { "vary" });
+            let remedy = "write the key as --set takes it: time.dt_s";
+            return Err(self.refuse(&place, format!("{place}: not a key of a scenario"), remedy));
         }
-    }
-    let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
-    match variations.keys().find(is_law) {
-        Some(key) if names_laws => Err(CampaignError::plan(
-            format!("{key} stands in [vary], and laws are named beside it"),
-            "name laws to fly each of them from the same starts, or vary the law, and not both",
-        )
-        .at(&format!("vary.{key}"))),
-        _ => Ok(()),
+        let all: Vec<_> = sets.keys().chain(variations.keys()).collect();
+        for (k, key) in all.iter().enumerate().skip(sets.len()) {
+            if let Some(other) = all[..k].iter().find(|other| overlap(key, other)) {
+                let other_table = if sets.contains_key(*other) { "set" } else { "vary" };
+                let problem = format!("vary.{key}: overlaps with {other_table}.{other}");
+                let remedy = "a key either has one value or differs from run to run: leave one of the two out";
+                return Err(self.refuse(&format!("vary.{key}"), problem, remedy));
+            }
+        }
+        let is_law = |key: &&String| ["law", "law.kind"].contains(&key.as_str());
+        match variations.keys().find(is_law) {
+            Some(key) if !self.laws.is_empty() => {
+                let problem = format!("vary.{key}: must not be given with `laws`");
+                let remedy = "give `laws` to fly each of them from the same starts, or vary the law";
+                Err(self.refuse(&format!("vary.{key}"), problem, remedy))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -262,21 +311,48 @@ mod tests {
         assert_eq!(variations["start.seed"], Variation::Seed {});
         assert_eq!(spec.stop.map(|stop| stop.of), Some(Question::Clear));
         let again = Spec::read("again", &spec.to_toml().expect("TOML")).expect("read");
-        assert_eq!(again, spec);
+        assert_eq!(Spec { source: spec.source.clone(), ..again }, spec);
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
-        let refused = |text: &str| Spec::read("spec.toml", text).expect_err(text).to_string();
-        let said = refused("scenario = 'pentagon'\nruns = 10\nvery = 3\n");
-        assert!(said.contains("spec.toml") && said.contains("line 3") && said.contains("very"), "{said}");
-        assert!(refused("runs = 10").contains("scenario"));
-        assert!(refused("scenario = 'pentagon'\nruns = -1").contains("line 2"));
-        let said =
-            Spec::read("s", "scenario = 'p'\n[vary]\nlaw.alpha = { unifrom = [0.0, 1.0] }").expect("TOML").variations();
-        assert!(said.expect_err("no variation").to_string().contains("law.alpha.unifrom"));
-        for (width, decided) in [(Some(0.0), None), (None, Some(1.0)), (Some(f64::NAN), None), (None, None)] {
-            assert!(Stop { of: Question::Clear, width, decided }.check().is_err());
+    fn an_error_has_the_place_and_the_words_of_errors_of_scenarios() {
+        let refused = |text: &str| {
+            let spec = Spec::read("spec.toml", text);
+            spec.and_then(|spec| spec.variations().and(spec.check_stop())).expect_err(text).to_string()
+        };
+        for (text, expected) in [
+            (
+                "scenario = 'pentagon'\nruns = 10\nvery = 3\n",
+                "spec.toml, line 3: unknown key `very` (give one of `scenario`",
+            ),
+            ("runs = 10", "spec.toml, line 1: missing key `scenario`"),
+            ("scenario = 'p'\nmethod = 'split'", "line 2: unknown choice `split` (give `flights` or `splitting`)"),
+            ("scenario = 'pentagon'\nruns = -1", "line 2: "),
+            ("scenario = 'p'\n[vary]\nlaw.alpha = { unifrom = [0.0, 1.0] }", "line 3: vary.law.alpha.unifrom: "),
+            ("scenario = 'p'\n[stop]\nwidth = 0", "line 3: stop.width: must be more than 0 and less than 1, got 0 "),
+            (
+                "scenario = 'p'\n[stop]\ndecided = 1",
+                "line 3: stop.decided: must be more than 0 and less than 1, got 1 ",
+            ),
+            ("scenario = 'p'\n[stop]\nwidth = nan", "line 3: stop.width: "),
+            ("scenario = 'p'\n[stop]", "line 2: stop: neither width nor decided is given"),
+        ] {
+            assert!(refused(text).contains(expected), "{}", refused(text));
         }
+    }
+
+    #[test]
+    fn a_key_is_found_in_any_notation_and_otherwise_its_table() {
+        const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = 1\nlaw.alpha = { unifrom = [0, 1] }\n\
+                            [vary.network]\n  loss = 2\n[stop]\nwidth = 3\n";
+        let spec = Spec::read("spec.toml", KEYS).expect("read");
+        let at = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
+        assert_eq!(at("runs"), Some((2, 1)));
+        assert_eq!(at("vary.start.jitter_m"), Some((4, 1)));
+        assert_eq!(at("vary.law.alpha.unifrom"), Some((5, 15)));
+        assert_eq!(at("vary.network.loss"), Some((7, 3)));
+        assert_eq!(at("stop.width"), Some((9, 1)));
+        assert_eq!(at("stop.decided"), Some((8, 2)), "its table");
+        assert_eq!((at("laws"), at("")), (None, None));
     }
 }

@@ -1,16 +1,14 @@
 //! What came of a campaign: `campaign.json`.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
-use super::bins::{KeyColumn, Varied};
-use super::flights::Campaign;
-use super::row::{Known, Row};
+use super::flights::{Campaign, Law};
+use super::shard::{Known, Row};
 use super::tally::{Intervals, Tally, UpperBound};
+use super::tally::{KeyColumn, Varied};
 use crate::Question;
 use crate::SCHEMA_VERSION;
-use crate::flight::Outcome;
+use crate::flight::{FlightSummary, Outcome};
 use crate::splitting::{Repetitions, Splitting};
 use crate::statistics::{Estimate, Paired, Proportion};
 use tautline_report::figures::Histogram;
@@ -140,19 +138,20 @@ pub struct Pair {
 pub(super) struct Gathered {
     intervals: Intervals,
     tally: Tally,
-    numbers: Vec<Numbers>,
-    worst: Vec<WorstList>,
+    laws: Vec<LawNumbers>,
     keys: Vec<KeyColumn>,
-    /// Clear and reached of each law in a run, as bits; none where it was not flown.
-    outcomes: Vec<Vec<Option<[bool; 2]>>>,
 }
 
+/// Numbers of the rows of a law.
 #[derive(Clone, Debug, Default)]
-struct Numbers {
+struct LawNumbers {
     clearance_m: Vec<f64>,
     reached_at_s: Vec<f64>,
     path_length_m: Vec<f64>,
+    /// Whether each run was clear and reached the formation; `None` for a run that was not flown.
+    outcomes: Vec<Option<[bool; 2]>>,
     not_flown_because: Option<String>,
+    worst: Vec<Worst>,
     estimates: Vec<Splitting>,
     bad: Vec<BadRun>,
 }
@@ -171,35 +170,21 @@ impl Gathered {
         Self {
             intervals,
             tally: Tally::new(laws, campaign.stop()),
-            numbers: vec![Numbers::default(); laws],
-            worst: vec![WorstList::default(); laws],
+            laws: vec![LawNumbers::default(); laws],
             keys: campaign.variations().iter().map(|(key, variation)| KeyColumn::new(key, variation, laws)).collect(),
-            outcomes: vec![Vec::new(); laws],
         }
     }
 
-    /// Takes the next row in the order of runs and laws; says whether it counts, which none does once enough has been flown.
+    /// Takes the next row in the order of runs and laws. Returns whether the row counts, which no row does after the decision.
     pub(super) fn take(&mut self, row: &Row) -> bool {
         if !self.tally.take(row) {
             return false;
         }
-        let Some(numbers) = self.numbers.get_mut(row.law) else { return true };
-        let known = row.known();
-        if let Some(flight) = &row.flight {
-            numbers.clearance_m.extend(row.clearance_m());
-            numbers.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));
-            numbers.path_length_m.push(flight.path_length_m);
-            self.worst[row.law].take(row);
-        } else if let Some(splitting) = &row.splitting {
-            numbers.take_estimate(row.run, splitting);
-        } else if numbers.not_flown_because.is_none() {
-            numbers.not_flown_because.clone_from(&row.not_flown);
-        }
+        let Some(numbers) = self.laws.get_mut(row.law) else { return true };
+        numbers.take(row);
         let reached = row.flight.as_ref().is_some_and(|flight| flight.reached);
-        let outcome = (known != Known::NotFlown).then_some([known == Known::Clear, reached]);
-        self.outcomes[row.law].push(outcome);
         for (column, value) in std::iter::zip(&mut self.keys, &row.drawn) {
-            column.take(row.law, value, known, reached);
+            column.take(row.law, value, row.known(), reached);
         }
         true
     }
@@ -213,10 +198,12 @@ impl Gathered {
     /// The summary of what was taken.
     #[must_use]
     pub(super) fn finish(self, campaign: &Campaign) -> Summary {
-        let Self { intervals, tally, numbers, worst, keys, outcomes } = self;
-        let names: Vec<_> = campaign.laws().iter().map(|law| law.name.clone()).collect();
-        let laws = std::iter::zip(campaign.laws(), tally.counts()).zip(std::iter::zip(numbers, worst));
-        let laws = laws.map(|((law, counts), (numbers, worst))| LawSummary {
+        let Self { intervals, tally, laws, keys } = self;
+        // Tests of pairs hold for a number of runs that was fixed beforehand.
+        let has_pairs = intervals == Intervals::ClopperPearson && campaign.splitting().is_none();
+        let pairs = if has_pairs { pairs(campaign.laws(), &laws) } else { Vec::new() };
+        let laws = std::iter::zip(campaign.laws(), tally.counts()).zip(laws);
+        let laws = laws.map(|((law, counts), numbers)| LawSummary {
             name: law.name.clone(),
             overrides: law.overrides.clone(),
             not_flown: counts.not_flown,
@@ -233,7 +220,7 @@ impl Gathered {
             path_length_m: Quantiles::of(&numbers.path_length_m, intervals),
             clearance_histogram_m: Histogram::of(&numbers.clearance_m, HISTOGRAM_INTERVALS),
             reached_histogram_s: Histogram::of(&numbers.reached_at_s, HISTOGRAM_INTERVALS),
-            worst: worst.0,
+            worst: numbers.worst,
             splitting: campaign.splitting().map(|_| Repetitions::new(&numbers.estimates)),
             bad: numbers.bad,
         });
@@ -247,19 +234,50 @@ impl Gathered {
             runs_planned: manifest.runs,
             stopped_early: tally.is_enough() && tally.runs() < manifest.runs,
             intervals,
-            // Tests of pairs hold for a number of runs that was fixed beforehand.
-            pairs: if intervals == Intervals::ClopperPearson && campaign.splitting().is_none() {
-                pairs(&names, &outcomes)
-            } else {
-                Vec::new()
-            },
+            pairs,
             varied: keys.into_iter().filter_map(|column| column.finish(intervals)).collect(),
             laws: laws.collect(),
         }
     }
 }
 
-impl Numbers {
+impl LawNumbers {
+    fn take(&mut self, row: &Row) {
+        let (known, reached) = (row.known(), row.flight.as_ref().is_some_and(|flight| flight.reached));
+        self.outcomes.push((known != Known::NotFlown).then_some([known == Known::Clear, reached]));
+        if let Some(flight) = &row.flight {
+            self.clearance_m.extend(row.clearance_m());
+            self.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));
+            self.path_length_m.push(flight.path_length_m);
+            self.take_worst(row.run, flight);
+        } else if let Some(splitting) = &row.splitting {
+            self.take_estimate(row.run, splitting);
+        } else if self.not_flown_because.is_none() {
+            self.not_flown_because.clone_from(&row.not_flown);
+        }
+    }
+
+    /// Keeps a flight that is among the worst. Of equal flights the first is worse.
+    fn take_worst(&mut self, run: u64, flight: &FlightSummary) {
+        let (Some(min_m), Some(clearance_m)) = (flight.min_m, flight.clearance_m()) else { return };
+        // A violation, which may be of an obstacle's clearance, is worse than none.
+        let rank = |outcome: Outcome| outcome != Outcome::Violated;
+        let own = (rank(flight.outcome), clearance_m);
+        let place = self.worst.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
+        let worst = Worst {
+            run,
+            outcome: flight.outcome,
+            clearance_m,
+            min_m,
+            min_at_s: flight.min_at_s,
+            min_pair: flight.min_pair,
+            reached: flight.reached,
+            state_hash: flight.state_hash.clone(),
+        };
+        self.worst.insert(place, worst);
+        self.worst.truncate(WORST);
+    }
+
     fn take_estimate(&mut self, run: u64, splitting: &Splitting) {
         self.bad.extend(splitting.bad.iter().enumerate().map(|(bad, flight)| BadRun {
             run,
@@ -291,40 +309,18 @@ impl Quantiles {
     }
 }
 
-/// Each two laws on the runs that both flew.
-fn pairs(names: &[String], outcomes: &[Vec<Option<[bool; 2]>>]) -> Vec<Pair> {
-    let both = |first: usize, second: usize| {
-        let runs = std::iter::zip(&outcomes[first], &outcomes[second]);
-        runs.filter_map(|(first, second)| Some(((*first)?, (*second)?))).collect::<Vec<_>>()
+/// Returns each two laws on the runs that both flew.
+fn pairs(laws: &[Law], numbers: &[LawNumbers]) -> Vec<Pair> {
+    let pair = |first: usize, second: usize| {
+        let runs = std::iter::zip(&numbers[first].outcomes, &numbers[second].outcomes);
+        let runs: Vec<_> = runs.filter_map(|(first, second)| Some(((*first)?, (*second)?))).collect();
+        let paired = |what: usize| {
+            let count = |of: [bool; 2]| runs.iter().filter(|run| [run.0[what], run.1[what]] == of).count() as u64;
+            Paired::new(count([true, false]), count([false, true]), runs.len() as u64)
+        };
+        Pair { laws: [first, second].map(|law| laws[law].name.clone()), clear: paired(0), reached: paired(1) }
     };
-    let paired = |runs: &[([bool; 2], [bool; 2])], what: usize| {
-        let count = |of: [bool; 2]| runs.iter().filter(|run| [run.0[what], run.1[what]] == of).count() as u64;
-        Paired::new(count([true, false]), count([false, true]), runs.len() as u64)
-    };
-    let each_two = (0..names.len()).flat_map(|first| (first + 1..names.len()).map(move |second| (first, second)));
-    each_two
-        .map(|(first, second)| {
-            let runs = both(first, second);
-            let laws = [names[first].clone(), names[second].clone()];
-            Pair { laws, clear: paired(&runs, 0), reached: paired(&runs, 1) }
-        })
-        .collect()
-}
-
-impl Summary {
-    /// Whether no flight violated, and that is known of each; estimates of rare violations never say so.
-    #[must_use]
-    pub fn is_clear(&self) -> bool {
-        self.laws.iter().all(|law| {
-            law.violated.count == 0 && law.unknown == 0 && law.certificates_broken == 0 && law.splitting.is_none()
-        })
-    }
-
-    /// Flights that were impossible, by law.
-    #[must_use]
-    pub fn not_flown(&self) -> BTreeMap<&str, u64> {
-        self.laws.iter().map(|law| (law.name.as_str(), law.not_flown)).filter(|&(_, count)| count > 0).collect()
-    }
+    (0..laws.len()).flat_map(|first| (first + 1..laws.len()).map(move |second| pair(first, second))).collect()
 }
 
 /// A flight to look at.
@@ -346,34 +342,4 @@ pub struct Worst {
     pub reached: bool,
     /// Hash over the bits of every recorded state.
     pub state_hash: String,
-}
-
-/// The worst so far, the worst first; of equal ones the first flown.
-#[derive(Clone, Debug, Default)]
-struct WorstList(Vec<Worst>);
-
-impl WorstList {
-    /// Takes a row, if it is among the worst.
-    fn take(&mut self, row: &Row) {
-        let (Some(flight), Some(clearance_m)) = (&row.flight, row.clearance_m()) else { return };
-        // One that violated, an obstacle's clearance it may be, is worse than any that did not.
-        let rank = |outcome: Outcome| outcome != Outcome::Violated;
-        let own = (rank(flight.outcome), clearance_m);
-        let place = self.0.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
-        if place >= WORST {
-            return;
-        }
-        let worst = Worst {
-            run: row.run,
-            outcome: flight.outcome,
-            clearance_m,
-            min_m: flight.min_m.unwrap_or(f64::NAN),
-            min_at_s: flight.min_at_s,
-            min_pair: flight.min_pair,
-            reached: flight.reached,
-            state_hash: flight.state_hash.clone(),
-        };
-        self.0.insert(place, worst);
-        self.0.truncate(WORST);
-    }
 }

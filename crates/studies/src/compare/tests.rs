@@ -1,6 +1,6 @@
 //! An interrupted comparison, wrong laws, and times to reach.
 
-use super::{Comparison, Options, by_law};
+use super::{Comparison, Options};
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _};
@@ -38,13 +38,6 @@ fn an_interrupted_comparison_has_the_starts_that_were_flown_under_every_law() {
     let whole = interrupted_after(u64::MAX, 2).expect("a comparison");
     assert_eq!((whole.runs, whole.laws[1].flights.len()), (3, 3));
     assert!(!whole.notes().iter().any(|note| note.starts_with("interrupted")));
-}
-
-#[test]
-fn a_start_that_was_not_flown_under_every_law_is_left_out() {
-    let flown = [Some(10), Some(11), None, Some(21), Some(30), Some(31), Some(40), None, None, None];
-    assert_eq!(by_law(flown.to_vec(), 2), [vec![10, 30], vec![11, 31]]);
-    assert_eq!(by_law(Vec::<Option<u8>>::new(), 3), vec![Vec::<u8>::new(); 3]);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::levels::{Path, Rule, Split, split};
 use super::lineage::{Genealogy, Lineage};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
+use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
 
@@ -16,14 +17,15 @@ const ENOUGH: usize = 100;
 /// Estimates below which Student's interval of what is skewed is too optimistic to go without a word.
 const MANY: usize = 20;
 
-/// How flights are split.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Settings of an estimate: the keys of `[splitting]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Flights at a time, n; 100 and more are good, 2 the least.
+    /// Flights at a time, n: at least 2, better 100 or more.
     pub flights: usize,
-    /// At least so many are ended in a round, k, less than n: 1 is the most accurate for the steps flown.
+    /// Smallest number of flights that a round ends, k, less than n. 1 is the most accurate for the steps flown.
     pub kill: usize,
-    /// Most bad flights that are kept.
+    /// Most bad flights that are kept of an estimate.
     pub keep: usize,
 }
 
@@ -33,47 +35,23 @@ impl Default for Settings {
     }
 }
 
-/// Why there is no estimate.
-#[derive(Debug, thiserror::Error)]
-pub enum SplittingError {
-    /// Too few flights for one to be a copy of another.
-    #[error("splitting with {flights} flights: at least 2 are needed, and 100 are advised")]
-    Flights {
-        /// So many.
-        flights: usize,
-    },
-    /// A number to be ended that leaves none, or ends none.
-    #[error("splitting that ends {kill} of {flights} flights in a round: between 1 and {} are possible", flights - 1)]
-    Kill {
-        /// So many are to be ended.
-        kill: usize,
-        /// Of so many.
-        flights: usize,
-    },
-    /// Two flights that go on from one state are the same flight.
-    #[error(
-        "nothing in this flight is random from step to step, and splitting needs two flights from one state to differ: add \
-         turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses or jitter \
-         of messages (network.loss, network.jitter_s)"
-    )]
-    NoNoise,
-    /// Law or judge do not exist.
-    #[error(transparent)]
-    Flight(#[from] SimError),
-}
-
 impl Settings {
-    /// Whether there are flights to be ended, and others to take their place.
+    /// Refuses numbers that leave no flight to end or to copy.
     ///
     /// # Errors
-    /// [`SplittingError::Flights`] and [`SplittingError::Kill`].
-    pub fn check(&self) -> Result<(), SplittingError> {
+    /// [`Failure`] `campaign/splitting`.
+    pub fn check(&self) -> Result<(), Failure> {
         let &Self { flights, kill, .. } = self;
+        let refuse = |problem: String, remedy: &str| Err(Failure::input("campaign/splitting", problem, remedy));
         if flights < 2 {
-            return Err(SplittingError::Flights { flights });
+            return refuse(format!("splitting.flights: must be at least 2, got {flights}"), "give 100 or more");
         }
         if kill == 0 || kill >= flights {
-            return Err(SplittingError::Kill { kill, flights });
+            let most = flights - 1;
+            return refuse(
+                format!("splitting.kill: must be from 1 to {most}, got {kill}"),
+                "give a number in this range",
+            );
         }
         Ok(())
     }
@@ -128,14 +106,14 @@ pub struct Splitting {
 /// each for three vehicles, 0.3 MB for a hundred, so that a hundred flights of a hundred vehicles take 0.3 GB.
 ///
 /// # Errors
-/// [`SplittingError`] for settings that leave nothing to split, a scenario without noise from step to step, or one without law or
-/// judge.
+/// [`Failure`] for settings that leave nothing to split, for a scenario without noise from step to step, and for a law or a judge
+/// that cannot be built.
 pub fn estimate(
     scenario: &Scenario,
     settings: &Settings,
     [seed, repetition]: [u64; 2],
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
-) -> Result<Option<Splitting>, SplittingError> {
+) -> Result<Option<Splitting>, Failure> {
     check(scenario, settings)?;
     let mut path = Running { scenario, simulation: begun(scenario, scenario.noise_seed)? };
     let rule = Rule::new(settings.flights, settings.kill, 0.0);
@@ -149,10 +127,18 @@ pub fn estimate(
 /// Refuses what [`estimate`] refuses before it flies.
 ///
 /// # Errors
-/// [`SplittingError`] for settings that leave nothing to split, and a scenario without noise from step to step.
-pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), SplittingError> {
+/// [`Failure`] `campaign/splitting` for settings that leave nothing to split, and for a scenario without noise from step to step.
+pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), Failure> {
     settings.check()?;
-    if is_noisy(scenario) { Ok(()) } else { Err(SplittingError::NoNoise) }
+    if is_noisy(scenario) {
+        return Ok(());
+    }
+    Err(Failure::input(
+        "campaign/splitting",
+        "nothing in this flight is random from step to step, and splitting needs two flights from one state to differ",
+        "add turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses or jitter of \
+         messages (network.loss, network.jitter_s)",
+    ))
 }
 
 /// Whether two flights from one state differ: errors that last are drawn once.

@@ -14,6 +14,6 @@ mod lineage;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{BadFlight, Repetitions, Settings, Splitting, SplittingError, StateAt, check, estimate, replay};
+pub use estimate::{BadFlight, Repetitions, Settings, Splitting, StateAt, check, estimate, replay};
 pub use levels::{Path, Rule, Split, split};
 pub use lineage::{Branch, Genealogy, Lineage};

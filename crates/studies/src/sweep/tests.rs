@@ -121,6 +121,8 @@ fn wrong_grids_are_refused() {
     assert_eq!(refused(&Options { keys: Vec::new(), ..key("law.alpha=1") }).0, "sweep/grid");
     assert_eq!(refused(&options(&["law.alpha=1", "law.delta_m=1", "time.dt_s=1"], 1)).0, "sweep/grid");
     assert_eq!(refused(&options(&["law.alpha=1,2", "law.alpha=3"], 1)).0, "sweep/grid");
+    let axes = ["start.positions_m.2.x=1,2", "start.positions_m.2.1=3"];
+    assert_eq!(refused(&options(&axes, 1)).0, "sweep/grid", "the name and the number of one axis");
     assert_eq!(refused(&Options { runs: 0, ..key("law.alpha=1") }).0, "request/out-of-range");
     let (code, said) = refused(&options(&["law.alpha=0:1:51", "law.delta_m=0:1:50"], 1));
     assert!(code == "sweep/grid" && said.contains("2550 points") && said.contains(&MOST_POINTS.to_string()), "{said}");
@@ -145,11 +147,4 @@ fn an_interrupted_sweep_has_the_points_that_were_flown() {
     let sweep = fly(3 * steps).expect("a point");
     assert!(sweep.interrupted && !sweep.is_good() && sweep.points.len() == 1, "{}", sweep.points.len());
     assert_eq!(sweep.notes()[0], "interrupted: of 3 points 1 were flown");
-}
-
-#[test]
-fn a_group_that_lacks_a_result_takes_none_of_the_next_group() {
-    let results = vec![None, Some(1), Some(2), Some(3), Some(4), None];
-    assert_eq!(super::complete_groups(results, 2), [None, Some(vec![2, 3]), None]);
-    assert_eq!(super::complete_groups(vec![Some(7)], 1), [Some(vec![7])]);
 }
