@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, ReadError, quoted};
+use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
@@ -137,7 +137,7 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
     if recording.is_planar() && !options.turn().keeps_plane() {
         let problem = "its third axis would become x or y, and it has none";
         let remedy = "name the column of the third axis with --column z=NAME, or give --axes that leave z in its place";
-        return Err(Fault::coded("recording/contradicts-option", problem, remedy).into());
+        return refuse("recording/contradicts-option", problem, remedy);
     }
     let notes = [recording.notes(), &[options.turn().note()]].concat();
     Ok(Box::new(Turned { recording, axes: options.turn(), notes }))
@@ -148,11 +148,11 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
     if options.turn().is_identity() {
         return Ok(());
     }
-    Err(Fault::coded(
+    refuse(
         "recording/contradicts-option",
         format!("{what} gives the directions of its axes"),
         "leave --axes and signs of --scale away",
-    ))
+    )
 }
 
 /// Refuses to turn a height over that is up by the name of its column.
@@ -163,7 +163,7 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
     let problem =
         format!("column {} says by its name which way is up, and --axes or --scale another way", quoted(column));
     let remedy = format!("leave z as it is there, or have the numbers taken as they are with --column z={column}");
-    Err(Fault::coded("recording/contradicts-option", problem, remedy))
+    refuse("recording/contradicts-option", problem, remedy)
 }
 
 struct Turned {
@@ -187,12 +187,11 @@ impl Tracks for Turned {
                 Item::Sample(sample) => {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
                         let problem = "its axes are scaled by different numbers, and vehicles have a radius";
-                        return Err(Fault::coded(
+                        return refuse(
                             "recording/contradicts-option",
                             problem,
                             "give one number of metres with --scale",
-                        )
-                        .into());
+                        );
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));

@@ -6,7 +6,7 @@ use std::str;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::{Lines, Source};
@@ -45,11 +45,7 @@ pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marke
     for (name, columns) in markers {
         if !names.insert(name.clone()) {
             let problem = format!("two markers are called {}", quoted(&name));
-            return Err(Fault::coded(
-                "recording/vehicle-twice",
-                problem,
-                "give each a name of its own, and export it again",
-            ));
+            return refuse("recording/vehicle-twice", problem, "give each a name of its own, and export it again");
         }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
         let at = *known.entry(subject.clone()).or_insert(vehicles.len());
@@ -83,7 +79,7 @@ pub(super) fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
 pub(super) fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.metres() != 1.0 {
         let problem = format!("it says its unit of length, and --scale {} another", options.metres());
-        return Err(Fault::coded("recording/contradicts-option", problem, "leave --scale away").into());
+        return refuse("recording/contradicts-option", problem, "leave --scale away");
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
     let (said, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
@@ -121,11 +117,7 @@ impl Table {
             When::Frames(rate) => {
                 if let Some(part) = number(cells, 1)?.filter(|part| *part != 0.0) {
                     let problem = format!("it is part {part} of a frame");
-                    return Err(Fault::coded(
-                        "recording/frame-rate",
-                        problem,
-                        "export trajectories at the rate of the cameras",
-                    ));
+                    return refuse("recording/frame-rate", problem, "export trajectories at the rate of the cameras");
                 }
                 Ok(Stamp::Real(needed(0)? / rate))
             }
@@ -154,11 +146,11 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
 fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
         let problem = format!("it has {} fields, and field {} belongs to a vehicle", cells.len(), column + 1);
-        return Err(Fault::coded(
+        return refuse(
             "recording/field-count",
             problem,
             "every line needs a field for each column; a marker that is lost has empty ones",
-        ));
+        );
     };
     let text = str::from_utf8(cell).map_err(|_| Fault::NotUtf8)?;
     match text.parse::<f64>() {
@@ -167,11 +159,7 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
         Ok(_) => Err(Fault::not_finite(&(column + 1).to_string(), text, UNSEEN)),
         Err(_) => {
             let problem = format!("column `{}` holds {}, which is not a number", column + 1, quoted(text));
-            Err(Fault::coded(
-                "recording/not-a-number",
-                problem,
-                "export it again, with numbers that have a decimal point",
-            ))
+            refuse("recording/not-a-number", problem, "export it again, with numbers that have a decimal point")
         }
     }
 }

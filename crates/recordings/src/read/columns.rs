@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::{Stamp, TimeUnit};
 use super::earth::Heights;
-use super::error::{Fault, list, quoted};
+use super::error::{Fault, list, quoted, refuse};
 use super::heading::{EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::options::{ColumnNames, ReadOptions};
 use super::{axes, heading};
@@ -118,11 +118,7 @@ impl<'a> Columns<'a> {
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
         let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
-        Err(Fault::coded(
-            "recording/ambiguous-column",
-            problem,
-            "name the one that is meant with --column, or take the other out",
-        ))
+        refuse("recording/ambiguous-column", problem, "name the one that is meant with --column, or take the other out")
     }
 
     /// Finds the vehicles of a wide table, and gives their names in order of appearance.
@@ -137,11 +133,7 @@ impl<'a> Columns<'a> {
         if let (Some((odd, _)), Some((word, _))) = (odd, words) {
             let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
             let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
-            return Err(Fault::coded(
-                "recording/ambiguous-column",
-                problem,
-                "give the column a longer name, or take it out",
-            ));
+            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or take it out");
         }
         let mut names: Vec<String> = Vec::new();
         // `cf1_v_x` is a velocity where there is a `cf1_x`.
@@ -235,19 +227,19 @@ impl<'a> Columns<'a> {
         };
         if let Some(silent) = silent {
             let problem = format!("column {other} says its unit, and column {silent} none");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/unit-conflict",
                 problem,
                 "write the unit of each column into its name, as in `x [mm]`",
-            ));
+            );
         }
         if scale != 1.0 {
             let problem = format!("column {other} says its unit, and --scale {scale} another");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/contradicts-option",
                 problem,
                 "leave --scale away, or take the units out of the header",
-            ));
+            );
         }
         Ok(metres)
     }
@@ -284,7 +276,7 @@ impl Rest {
             (_, None) => format!("column {own} holds {}, which is no whole number", rest.approximately()),
         };
         let remedy = "where one of the two is the whole time, name it with --column t=NAME";
-        Err(Fault::coded("recording/time-format", problem, remedy))
+        refuse("recording/time-format", problem, remedy)
     }
 }
 
@@ -314,11 +306,11 @@ pub(super) fn find(header: &[String], options: &ReadOptions) -> Result<Option<(u
             if options.time_unit.is_some() || options.times_per_second.is_some() {
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
-                return Err(Fault::coded(
+                return refuse(
                     "recording/contradicts-option",
                     problem,
                     "leave --time-unit, --fps and --time-scale away",
-                ));
+                );
             }
             Ok(Some((whole.column, Some(rest))))
         }

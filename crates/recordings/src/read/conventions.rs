@@ -11,7 +11,7 @@
 use std::collections::BTreeSet;
 
 use super::axes::Axes;
-use super::error::Fault;
+use super::error::{Fault, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
 
@@ -94,7 +94,7 @@ impl Convention {
         };
         let Some(alt) = at("ref_alt") else {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, and there is no column `ref_alt`";
-            return Err(Fault::coded("recording/missing-column", problem, GLOBAL));
+            return refuse("recording/missing-column", problem, GLOBAL);
         };
         let mut px4 = self.clone();
         for start in ["", "v"] {

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::axes;
 use super::conventions::GLOBAL;
-use super::error::{Fault, ReadError, quoted};
+use super::error::{Fault, ReadError, quoted, refuse};
 use super::heading::{DEPTH, HEIGHT, Heading, POSITION, Role};
 use super::layout::Layout;
 use super::options::ReadOptions;
@@ -66,7 +66,7 @@ impl Local {
         // Another file would begin somewhere else.
         let problem = "nothing says what its places on the Earth are measured from, the same for all files";
         let remedy = format!("say it with --origin, such as --origin {}", local.origin());
-        Err(Fault::coded("recording/no-origin", problem, remedy))
+        refuse("recording/no-origin", problem, remedy)
     }
 
     /// A place that is given east, north and up of another origin \[m\].
@@ -130,13 +130,13 @@ fn angles(place: Geodetic) -> [(f64, f64); 2] {
 
 /// A place in the frame of the Earth's centre \[m\].
 fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
-    let range = |what: &str, value: f64, most: f64| {
+    let range = |what: &str, value: f64, most: f64| -> Result<(), Fault> {
         if value.abs() <= most {
             return Ok(());
         }
         let problem = format!("{} is no {what}: it is not within {most} degrees", quoted(&format!("{value:?}")));
         let remedy = "write degrees with decimals; whole numbers of 1e-7 degrees are to be divided by 1e7";
-        Err(Fault::coded("recording/not-on-earth", problem, remedy))
+        refuse("recording/not-on-earth", problem, remedy)
     };
     range("latitude", place.x, 90.0)?;
     range("longitude", place.y, 360.0)?;
@@ -177,16 +177,11 @@ pub(super) fn origin<C: Cells>(
     }
     if reference.is_some() {
         let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
-        return Err(Fault::coded("recording/no-fix", problem, GLOBAL).into());
+        return refuse("recording/no-fix", problem, GLOBAL);
     }
     if unfixed {
         let problem = "no row has a fix: every latitude and longitude is exactly 0";
-        return Err(Fault::coded(
-            "recording/no-fix",
-            problem,
-            "record again once the receiver has a fix, or give another file",
-        )
-        .into());
+        return refuse("recording/no-fix", problem, "record again once the receiver has a fix, or give another file");
     }
     Ok(None)
 }

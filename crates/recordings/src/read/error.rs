@@ -257,6 +257,15 @@ impl Fault {
     }
 }
 
+/// Fails with a fault of the content.
+pub(super) fn refuse<T, E: From<Fault>>(
+    code: &'static str,
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> Result<T, E> {
+    Err(Fault::coded(code, problem, remedy).into())
+}
+
 /// A value between backticks, shortened, and without what would steer a terminal.
 pub(super) fn quoted(value: &str) -> String {
     let harmless = |c: char| if c.is_control() { '\u{fffd}' } else { c };

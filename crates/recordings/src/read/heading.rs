@@ -1,7 +1,7 @@
 //! Names of columns: a quantity, perhaps of one vehicle, perhaps with a unit; and the units.
 
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted};
+use super::error::{Fault, quoted, refuse};
 
 /// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
 /// other.
@@ -401,7 +401,7 @@ fn joined(name: &str) -> String {
 /// Names of columns with the units that a row below them says. A name that says the same keeps it, and so does one that is
 /// nothing but the unit of a part of a time.
 pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String>, Fault> {
-    let with_unit = |(name, unit): (&String, &&str)| {
+    let with_unit = |(name, unit): (&String, &&str)| -> Result<String, Fault> {
         let is_time = is_time(name);
         let is_part =
             !is_time && TimeUnit::from_name(name.rsplit(['.', '/', '_', ' ']).next().unwrap_or_default()).is_some();
@@ -424,7 +424,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         }
         let problem =
             format!("column {} says the unit {}, and the row of units {}", quoted(name), quoted(&said), quoted(unit));
-        Err(Fault::coded("recording/unit-conflict", problem, "take one of the two units out"))
+        refuse("recording/unit-conflict", problem, "take one of the two units out")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, quoted};
+use super::error::{Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
 
@@ -280,7 +280,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
                 let problem = format!("column {called} gives a time of vehicle {vehicle} alone");
                 let remedy =
                     "write one row for each vehicle and time, or remove the column if it repeats the time of the row";
-                return Err(Fault::coded("recording/several-clocks", problem, remedy));
+                return refuse("recording/several-clocks", problem, remedy);
             }
             let Some(last) = rest.rsplit(['.', '/']).next().filter(|last| heading::is_id(last)) else { continue };
             quantities.entry(rest).or_default().push(column);
@@ -294,16 +294,16 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     if let Some((first, vehicle)) = ids.clone().next().zip((0..vehicles.len()).find(|of| !names.contains_key(of))) {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
-        return Err(Fault::coded(
+        return refuse(
             "recording/ambiguous-vehicle",
             problem,
             "add such a column for each vehicle, or remove these columns",
-        ));
+        );
     }
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
         let remedy = "rename these columns like those of the other vehicles, or remove them";
-        return Err(Fault::coded("recording/ambiguous-column", problem, remedy));
+        return refuse("recording/ambiguous-column", problem, remedy);
     }
     let ids: Vec<_> = ids.collect();
     let is_watched = |columns: &Vec<usize>| columns.len() > 1 && !columns.iter().all(|column| ids.contains(column));
@@ -338,7 +338,7 @@ impl Watch {
                 let problem =
                     format!("the values of column {called} and of its like change places, as names of vehicles do");
                 let remedy = "name these columns like `a.id`, or remove them if their values are no names";
-                return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+                return refuse("recording/ambiguous-vehicle", problem, remedy);
             }
         }
         self.last = now;

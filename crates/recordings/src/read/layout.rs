@@ -9,7 +9,7 @@ use super::clock::TimeUnit;
 use super::columns::{Body, Columns, Rest, missing};
 use super::conventions::Convention;
 use super::earth::Heights;
-use super::error::{Fault, list, quoted};
+use super::error::{Fault, list, quoted, refuse};
 use super::heading::{EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
 use super::identity::Slots;
 use super::options::ReadOptions;
@@ -178,11 +178,11 @@ impl Layout {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
-                Err(Fault::coded(
+                refuse(
                     "recording/several-frames",
                     problem,
                     "name the axes of all positions in the same way, as in `x_ned` or `north`",
-                ))
+                )
             }
             _ => Ok(()),
         }
@@ -194,18 +194,18 @@ impl Layout {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
             let problem = format!("its positions are in metres, and --scale {} says another unit", options.metres());
-            return Err(Fault::coded("recording/contradicts-option", problem, "leave --scale away"));
+            return refuse("recording/contradicts-option", problem, "leave --scale away");
         }
         let several = self
             .id
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/contradicts-option",
                 format!("{namer} names the vehicles"),
                 "leave --one-vehicle away",
-            ));
+            );
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -224,11 +224,11 @@ impl Layout {
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/ambiguous-column",
                 problem,
                 "give the columns of each vehicle a name of their own, or take these out",
-            ));
+            );
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_told = is_one_vehicle || convention.is_one_vehicle;

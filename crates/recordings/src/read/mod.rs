@@ -58,6 +58,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::mcap::McapRecording;
+use error::refuse;
 use folder::{ARCHIVE, Folder};
 use recognise::recognise;
 use source::Source;
@@ -136,12 +137,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     if data.is_dir() {
         if bag::is_bag(path) {
             let remedy = "give it alone, without --join: its topics are its vehicles";
-            return Err(Fault::coded(
-                "recording/several-vehicles",
-                "it is a ROS 2 bag, and no file of one vehicle",
-                remedy,
-            )
-            .into());
+            return refuse("recording/several-vehicles", "it is a ROS 2 bag, and no file of one vehicle", remedy);
         }
         let folder = Folder::open(path)?;
         let remedy =
@@ -150,7 +146,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, and a recording is read more than once";
-        return Err(Fault::coded("recording/not-a-file", problem, "save it to a file first, and give the file").into());
+        return refuse("recording/not-a-file", problem, "save it to a file first, and give the file");
     }
     if !recognise::is_archive(path)? {
         return Ok(None);

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
@@ -87,7 +87,7 @@ impl Head {
         })?;
         if let Some(space) = self.said("Coordinate Space").filter(|space| *space != "Global") {
             let problem = format!("its places are given in the space {}", quoted(space));
-            return Err(Fault::coded("recording/unusable-frame", problem, "export it in global coordinates"));
+            return refuse("recording/unusable-frame", problem, "export it in global coordinates");
         }
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
         let time =
@@ -100,20 +100,20 @@ impl Head {
             by_subject(self.positions("Marker"))?
         };
         if vehicles.is_empty() {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/no-positions",
                 "it has neither the position of a rigid body nor of a labelled marker",
                 EXPORT,
-            ));
+            );
         }
         let mut known = BTreeSet::new();
         if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
             let problem = format!("two rigid bodies are called {}", quoted(name));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/vehicle-twice",
                 problem,
                 "give each a name of its own, and export the take again",
-            ));
+            );
         }
         let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
         notes.extend(note_of_markers(&vehicles));

@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, refuse};
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
 use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
@@ -64,11 +64,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut times = Vec::new();
     for k in 0..stamps.count() {
         let stamp = stamps.next_stamp().and_then(|stamp| match stamp {
-            Stamp::Real(time) if !time.is_finite() => Err(Fault::coded(
-                "recording/not-finite",
-                format!("it is {time}"),
-                "times are finite: take the instant out",
-            )),
+            Stamp::Real(time) if !time.is_finite() => {
+                refuse("recording/not-finite", format!("it is {time}"), "times are finite: take the instant out")
+            }
             stamp => Ok(stamp),
         });
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
@@ -130,16 +128,12 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
         [] => {
             let remedy = "save as many instants as times, and two or three axes: T x N x 3, or say what the axes are \
                           with --layout, such as --layout time,vehicle,axis";
-            Err(Fault::coded("recording/array-shape", problem(""), remedy))
+            refuse("recording/array-shape", problem(""), remedy)
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
             let remedy = format!("say what its axes are with --layout {}", ways.join(" or "));
-            Err(Fault::coded(
-                "recording/ambiguous-layout",
-                problem(": its shape does not say which axis is which"),
-                remedy,
-            ))
+            refuse("recording/ambiguous-layout", problem(": its shape does not say which axis is which"), remedy)
         }
     }
 }
@@ -168,11 +162,11 @@ impl Arrays {
         match (found.next(), found.next()) {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                Err(Fault::coded(
+                refuse(
                     "recording/ambiguous-column",
                     problem,
                     format!("name the one that is meant with --column {option}=NAME"),
-                ))
+                )
             }
             (first, _) => Ok(first),
         }
@@ -336,11 +330,11 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
-    Err(Fault::coded(
+    refuse(
         "recording/radius",
         format!("the radius is {radius}"),
         "radii are finite and 0 or more, or NaN where unknown",
-    ))
+    )
 }
 
 /// The rows of an archive.
@@ -369,16 +363,16 @@ impl Instants {
         }
         if let Some(odd) = position.iter().find(|x| !x.is_finite()) {
             let remedy = "save an array `seen` of T x N booleans that is false where a vehicle was not seen";
-            return Err(Fault::coded("recording/not-finite", format!("the position holds {odd}"), remedy));
+            return refuse("recording/not-finite", format!("the position holds {odd}"), remedy);
         }
         // A vehicle without a velocity has NaN among those with one.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/not-finite",
                 "the velocity is not finite",
                 "velocities are finite, or all NaN where unknown",
-            ));
+            );
         }
         let place = (self.at * self.table.vehicles() + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))

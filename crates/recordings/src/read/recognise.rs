@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 use std::str;
 
-use super::error::{Fault, ReadError};
+use super::error::{Fault, ReadError, refuse};
 use super::heading;
 use super::readers::{Format, Head, Packing};
 use super::skybrush::SHOW;
@@ -37,12 +37,7 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     if (source.gzip || packed) && !unpacks {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
         let problem = format!("it is {} inside {within}", format.title);
-        return Err(Fault::coded(
-            "recording/unsupported-compression",
-            problem,
-            format!("unpack it first, with {remedy}"),
-        )
-        .into());
+        return refuse("recording/unsupported-compression", problem, format!("unpack it first, with {remedy}"));
     }
     Ok(format)
 }

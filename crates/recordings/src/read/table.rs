@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use super::clock::{Date, Probe, Stamp, TimeUnit};
 use super::columns::Body;
 use super::earth::{Local, bring, is_no_fix, no_fixes, origin};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::identity::{Rival, Suspect, Watch};
 use super::layout::Layout;
 use super::options::ReadOptions;
@@ -58,12 +58,7 @@ pub(super) fn open<C: Cells + 'static>(
 ) -> Result<Recording, ReadError> {
     if let (Some(rest), Some(_)) = (layout.rest, unit) {
         let problem = format!("it has a column of time stamps, and {} as well", quoted(&cells.header()[rest.column]));
-        return Err(Fault::coded(
-            "recording/ambiguous-column",
-            problem,
-            "name the one that is meant with --column t=NAME",
-        )
-        .into());
+        return refuse("recording/ambiguous-column", problem, "name the one that is meant with --column t=NAME");
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
@@ -109,12 +104,7 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
     let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
-        return Err(Fault::coded(
-            "recording/contradicts-option",
-            problem,
-            "leave --time-unit, --fps and --time-scale away",
-        )
-        .into());
+        return refuse("recording/contradicts-option", problem, "leave --time-unit, --fps and --time-scale away");
     }
     Ok(first)
 }
@@ -148,12 +138,12 @@ impl<C: Cells> Table<C> {
         if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
             let what = if Date::parse(&of_day).is_some() { "a date below numbers" } else { "a time of day" };
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/time-format",
                 problem,
                 "write all times as numbers, in seconds or in s, ms, us or ns since 1970, or all as dates with a time \
                  like 2023-11-14T22:13:20.5Z",
-            ));
+            );
         }
         let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
         number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
@@ -280,14 +270,14 @@ impl<C: Cells> Table<C> {
             let problem =
                 format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
             let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
-            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+            return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
             let (first, other) = (called(id), called(rival.column));
             let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
             let [first, other] = [&header[id], &header[rival.column]];
             let remedy = format!("say which one does with --column id={first} or --column id={other}");
-            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+            return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         Ok(())
     }
@@ -304,7 +294,7 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[
     };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
-        return Err(Fault::coded("recording/radius", problem, "write 0 or more"));
+        return refuse("recording/radius", problem, "write 0 or more");
     }
     Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
@@ -436,7 +426,7 @@ pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Res
     let text = text.trim();
     let holds = |code, what: &str, remedy| {
         let problem = format!("column `{column}` holds {}, {what}", quoted(text));
-        Err(Fault::coded(code, problem, remedy))
+        refuse(code, problem, remedy)
     };
     match text.parse::<f64>() {
         _ if text.is_empty() => Ok(None),

@@ -13,7 +13,7 @@
 //! trajectories of markers.
 
 use super::capture::{Capture, When, by_subject, note_of_markers, note_of_others};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
@@ -72,12 +72,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
         let problem = format!("it has neither objects nor trajectories, but {}", sections.join(", "));
-        return Err(Fault::coded(
+        return refuse(
             "recording/no-positions",
             problem,
             "export the trajectories of markers, or the objects of Tracker",
-        )
-        .into());
+        );
     };
     let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
     let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
@@ -139,20 +138,20 @@ impl Head {
         let parts = markers.len();
         let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/no-positions",
                 "it names no marker and no object",
                 "export it again, with labelled trajectories",
-            ));
+            );
         }
         if is_objects && vehicles.len() < parts {
             let several = vehicles.iter().find(|(_, of)| of.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/ambiguous-column",
                 problem,
                 "export objects of one segment each, or the trajectories of markers",
-            ));
+            );
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
         let when = When::Frames(rate);
@@ -177,7 +176,7 @@ impl Head {
         if let Some(other) = units.find(|unit| unit.map_or("", |unit| unit.as_str()) != first) {
             let problem =
                 format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
-            return Err(Fault::coded("recording/unit-conflict", problem, "export all in millimetres"));
+            return refuse("recording/unit-conflict", problem, "export all in millimetres");
         }
         heading::size_of(first, false).ok_or_else(|| {
             Fault::coded(

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::curves::Curves;
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
@@ -82,12 +82,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let show = parse(&bytes)?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
         let problem = format!("its axes are those of {}, which are not known", quoted(frame));
-        return Err(Fault::coded(
-            "recording/unusable-frame",
-            problem,
-            "export it with the axes `ogl`: x right, y up, z forward",
-        )
-        .into());
+        return refuse("recording/unusable-frame", problem, "export it with the axes `ogl`: x right, y up, z forward");
     }
     let (mut vehicles, mut names) = (Vec::new(), BTreeSet::new());
     for performance in &show.performances {
@@ -109,12 +104,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         vehicles.push((name, items));
     }
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
-        return Err(Fault::coded(
+        return refuse(
             "recording/no-positions",
             "it has no drone with a sample of its way",
             "export it with the ways of its drones",
-        )
-        .into());
+        );
     }
     let mut notes = vec!["axes of graphics are turned: x right, y forward, z up".to_owned()];
     let still: Vec<_> = vehicles.iter().filter(|(_, items)| items.is_empty()).map(|(name, _)| quoted(name)).collect();
@@ -182,10 +176,10 @@ fn duration(step: &Step, show: &Show) -> Result<f64, Fault> {
     match (step.dt, show.default_position_rate) {
         (Some(duration_s), _) => Ok(duration_s),
         (None, Some(rate)) if rate > 0.0 => Ok(rate.recip()),
-        _ => Err(Fault::coded(
+        _ => refuse(
             "recording/frame-rate",
             "neither `dt` nor a positive `defaultPositionRate` says when it is",
             "export the show again",
-        )),
+        ),
     }
 }

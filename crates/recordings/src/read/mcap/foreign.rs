@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
-use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::options::{Duplicates, ReadOptions};
 use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
@@ -188,7 +188,7 @@ impl Splits {
             let problem =
                 format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
-                return Err(Fault::coded("recording/bag-index", problem, "copy the whole folder again").into());
+                return refuse("recording/bag-index", problem, "copy the whole folder again");
             }
             self.note(problem);
         }
@@ -270,11 +270,11 @@ impl Poses {
         };
         if wanted == EARTH {
             let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/unusable-frame",
                 problem,
                 "leave --frame out, or name a frame of poses; --topic says which topics are read",
-            ));
+            );
         }
         if *wanted == seen.frame {
             return Ok(Some(seen.position));
@@ -335,7 +335,7 @@ impl Poses {
                 let problem =
                     format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
                 let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
-                return Err(Fault::coded("recording/several-frames", problem, remedy));
+                return refuse("recording/several-frames", problem, remedy);
             }
         }
         Ok(())

@@ -26,7 +26,7 @@ pub use own::Channels;
 
 use std::path::Path;
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
@@ -104,7 +104,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
                   geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, sensor_msgs/msg/NavSatFix, \
                   motion_capture_tracking_interfaces/msg/NamedPoseArray or tf2_msgs/msg/TFMessage are read";
-    Err(Fault::coded("recording/no-positions", "it has no topic with positions", remedy).into())
+    refuse("recording/no-positions", "it has no topic with positions", remedy)
 }
 
 impl From<RecordError> for ReadError {

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::super::earth::is_no_fix;
-use super::super::error::{Fault, Place, ReadError, quoted};
+use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::foreign::Splits;
 use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
 use super::tree::{Body, Placed, Tree};
@@ -104,12 +104,12 @@ impl Outline {
                 "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
                 told.listed
             );
-            return Err(Fault::coded(
+            return refuse(
                 "recording/list-length",
                 problem,
                 "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
                  --topic if the list is of no vehicles",
-            ));
+            );
         }
         told.listed = listed;
         Ok(())
@@ -130,7 +130,7 @@ impl Outline {
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
-            return Err(Fault::coded("recording/unusable-frame", problem, "give the frame another name"));
+            return refuse("recording/unusable-frame", problem, "give the frame another name");
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
@@ -148,7 +148,7 @@ impl Outline {
         let What::Odometry(child) = seen.what else { return Ok(()) };
         if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
             let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
-            return Err(Fault::coded("recording/several-vehicles", problem, "record each robot on a topic of its own"));
+            return refuse("recording/several-vehicles", problem, "record each robot on a topic of its own");
         }
         told.child = Some(child);
         Ok(())
@@ -213,7 +213,7 @@ impl Outline {
         let problem = format!(
             "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
         );
-        Err(Fault::coded("recording/ambiguous-topics", problem, CHOOSE))
+        refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
     /// Topics that tell by their names where somebody is asked to be, unless the user names those that are read.
@@ -278,7 +278,7 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
             "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
         );
         let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
-        return Err(Fault::coded("recording/several-frames", problem, remedy));
+        return refuse("recording/several-frames", problem, remedy);
     }
     Ok(())
 }
