@@ -1,12 +1,12 @@
 //! The audit of a flight: straight steps of all vehicles, one after the other.
 
 use super::candidates::{Candidates, pair_count, pairs, pairs_of};
+use super::cross_check::KeepOut;
 use super::error::AuditError;
 use super::exact::ExactMotion;
 use super::ledger::Ledger;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
-use super::parry::KeepOut;
-use super::polynomial::Line;
+use super::segment::Line;
 use super::sweep::{ClosestPoint, Interval, MAX_LENGTH_M, MIN_LIMIT_M, RelativeMotion};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, row, separation};
 

@@ -2,14 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::cross_check::cross_check;
+use super::cross_check::{KeepOut, cross_check};
 use super::enclosure::{Minimum, Search, Target};
 use super::exact::ExactMotion;
+use super::ledger::Results;
 use super::outcome::{Approach, ObjectPair, Undecided, Violation};
-use super::parry::KeepOut;
-use super::polynomial::Line;
-use super::results::Results;
-use super::segment::Segment;
+use super::segment::{Line, Segment};
 use super::sweep::{ClosestPoint, Interval, RelativeMotion};
 
 /// Two that must keep a distance.

@@ -3,17 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::outcome::{Outcome, Tallies, alone};
-use super::presence::{Gaps, Rates, absences};
+use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, alone};
 use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::Smallest;
 use super::vehicle::Vehicle;
 use super::window::Windows;
-use crate::envelope::Watch;
+use crate::envelope::LimitMonitor;
 use crate::error::Interruption;
-use crate::ledger::Lists;
+use crate::ledger::{Lists, Results};
 use crate::outcome::Status;
-use crate::results::Results;
 use crate::sweep::Interval;
 use tautline_core::track::Item;
 
@@ -41,7 +39,7 @@ pub struct TrackAuditor {
     results: Results,
     gaps: Gaps,
     smallest: Option<Smallest>,
-    envelope: Option<Watch>,
+    envelope: Option<LimitMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and of the last one before that time \[s\].
@@ -74,7 +72,7 @@ impl TrackAuditor {
             least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles),
             envelope: (!settings.envelope.is_empty())
-                .then(|| Watch::new(&settings.envelope, settings.window(), settings.accel_window_s)),
+                .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),
             settings,
             vehicles: Vec::new(),
             rates: None,

@@ -39,10 +39,8 @@
 //! ```
 
 mod auditor;
-mod lookup;
 mod outcome;
-mod presence;
-mod proof;
+mod second_pass;
 mod settings;
 mod smallest;
 mod vehicle;
@@ -51,7 +49,6 @@ mod window;
 pub use super::error::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
-pub use lookup::{PairSample, PairSeries, PositionLookup};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
-pub use proof::{Proof, ProofBuilder, ProofWindow};
+pub use second_pass::{PairSample, PairSeries, PositionLookup, Proof, ProofBuilder, ProofWindow};
 pub use settings::{Interpolation, RecordedError, Settings, VehicleSettings};

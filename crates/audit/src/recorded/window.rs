@@ -12,14 +12,14 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::vehicle::Vehicle;
+use crate::cross_check::KeepOut;
 use crate::enclosure::Target;
 use crate::error::Limits;
+use crate::ledger::{KEPT, Results};
 use crate::obstacle::Obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;
-use crate::parry::KeepOut;
 use crate::polynomial::stray;
-use crate::results::{KEPT, Results};
 use crate::segment::Segment;
 use crate::sweep::{Interval, RelativeMotion, larger};
 use tautline_core::swarm::Pair;
