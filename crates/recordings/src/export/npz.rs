@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::error::ExportError;
+use super::ExportError;
 use super::source::{About, Source, Written};
 use tautline_core::track::Sample;
 

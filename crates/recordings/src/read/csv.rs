@@ -10,17 +10,14 @@ use std::str;
 use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
-use super::columns::Body;
-use super::conventions::Convention;
 use super::error::{Fault, Place, ReadError, quoted, refuse};
-use super::identity::Slots;
-use super::layout::Layout;
+use super::layout::{Body, Layout};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table::Cells;
-use super::{columns, heading, table};
+use super::{clock, heading, table};
 
 /// A table in CSV, or text without a row.
 pub(super) const CSV: Reader = Reader {
@@ -238,7 +235,7 @@ impl Text {
 
     /// Takes a row of units below the header for what it says: each into the name of its column.
     fn take_units(&mut self) -> Result<(), ReadError> {
-        let found = columns::find(&self.header, &ReadOptions::default()).ok().flatten();
+        let found = clock::time_columns(&self.header, &ReadOptions::default()).ok().flatten();
         let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
         if !next_line(&mut self.lines, self.comments)? {
             return Ok(());
@@ -528,20 +525,12 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         let note = format!("there is no header: the numbers are taken as {words}");
         Layout {
             time,
-            rest: None,
-            unit: None,
-            id: None,
-            is_id_given: false,
-            rivals: Vec::new(),
-            suspects: Vec::new(),
             names,
             metres: vec![1.0; count],
-            on_earth: false,
-            convention: Convention::default(),
             is_planar: bodies.iter().any(|body| body.position[2].is_none()),
             bodies,
-            slots: Slots::default(),
             notes: vec![note],
+            ..Layout::default()
         }
     };
     let one = |time, position: [usize; 3], words| {

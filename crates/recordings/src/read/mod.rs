@@ -13,11 +13,8 @@
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod axes;
-mod bag;
 mod capture;
 mod clock;
-mod columns;
-mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
@@ -28,7 +25,6 @@ mod heading;
 mod identity;
 mod layout;
 pub(crate) mod mcap;
-mod motive;
 mod npy;
 mod npz;
 mod objects;
@@ -36,12 +32,10 @@ mod options;
 mod order;
 pub(crate) mod parquet;
 mod readers;
-mod recognise;
 mod skybrush;
 mod source;
 mod table;
 mod ulog;
-mod vicon;
 mod vviz;
 
 pub use self::parquet::is_guarded;
@@ -60,7 +54,8 @@ use std::path::Path;
 use crate::mcap::McapRecording;
 use error::refuse;
 use folder::{ARCHIVE, Folder};
-use recognise::recognise;
+use mcap::bag;
+use readers::recognise;
 use source::Source;
 
 /// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with a file for each vehicle.
@@ -148,7 +143,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
         let problem = "it is a pipe or a device, and a recording is read more than once";
         return refuse("recording/not-a-file", problem, "save it to a file first, and give the file");
     }
-    if !recognise::is_archive(path)? {
+    if !readers::is_archive(path)? {
         return Ok(None);
     }
     let folder = Folder::of_archive(path)?;

@@ -20,9 +20,10 @@ use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, refuse};
+use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
+use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
 
@@ -92,7 +93,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
     let mut about = About::new(source, options, unit, notes, none);
-    about.frame.is_planar = is_planar;
+    about.metadata.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }

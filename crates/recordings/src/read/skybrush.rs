@@ -10,13 +10,13 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::curves::{Curves, distinct, piece};
+use super::curves::{Curves, distinct, from_json, piece};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
-use super::{npz, recognise};
+use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
 
 pub(super) const READER: Reader = Reader {
@@ -126,7 +126,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         return refuse(
             "recording/unsupported-format",
             "it is JSON, but no Skybrush show: it has no `swarm`",
-            recognise::TABLE,
+            readers::TABLE,
         );
     };
     let mut names = Vec::new();
@@ -182,17 +182,12 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
 }
 
 fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    serde_json::from_slice(text).map_err(|error| {
-        let line = u64::try_from(error.line()).unwrap_or(0);
-        let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
-        let fault = if error.is_eof() {
-            Fault::Truncated("the JSON ends before it is complete".to_owned())
-        } else {
-            let remedy = "give a show as Skybrush exports it";
-            Fault::coded("recording/malformed", format!("it is not the JSON of a Skybrush show: {error}"), remedy)
-        };
-        fault.at(place)
+    from_json(bytes, "a Skybrush show", "give a show as Skybrush exports it").map_err(|error| match entry {
+        Some(entry) => {
+            let line = error.place.as_ref().map_or_else(String::new, Place::to_string);
+            ReadError { place: Some(Place::Part(format!("entry `{entry}`, {line}"))), ..error }
+        }
+        None => error,
     })
 }
 

@@ -6,13 +6,12 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::clock::{Date, Probe, Stamp, TimeUnit};
-use super::columns::Body;
 use super::earth::{Local, bring, is_no_fix, no_fixes, origin};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
-use super::identity::{Rival, Suspect, Watch};
-use super::layout::Layout;
+use super::identity::{Names, Rival, Suspect, SwapMonitor};
+use super::layout::{Body, Layout};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
 
 /// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.
@@ -36,7 +35,7 @@ struct Table<C> {
     /// Columns that may name several vehicles among the rows of one, for each vehicle.
     suspects: Vec<Vec<Suspect>>,
     /// Columns of a wide table that may name vehicles.
-    watches: Vec<Watch>,
+    watches: Vec<SwapMonitor>,
     /// Positions of a wide table whose vehicle a column names.
     named: usize,
     /// How many rows of each vehicle have no fix.
@@ -64,20 +63,20 @@ pub(super) fn open<C: Cells + 'static>(
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
     let mut about = About::new(source, options, unit, layout.notes.clone(), Fault::header_only());
     if dates.is_some_and(|first| !first.has_zone) {
-        about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
+        about.metadata.notes.push("times are dates without a zone and are taken as UTC".to_owned());
     }
-    about.frame.has_directions = layout.convention.has_directions();
-    about.frame.is_planar = layout.is_planar;
+    about.metadata.has_directions = layout.convention.has_directions();
+    about.metadata.is_planar = layout.is_planar;
     let names = Names::from_list(layout.names.clone())?;
     let local = origin(&mut cells, &layout, options)?;
-    about.notes.extend(local.map(|local| local.note()));
-    about.frame.earth_origin = local.map(|local| local.measured_from(options.origin));
+    about.metadata.notes.extend(local.map(|local| local.note()));
+    about.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
     // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
     let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
-    let watches = layout.slots.watched.iter().cloned().map(Watch::new).collect();
+    let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let table = Table {
         cells,
         layout,

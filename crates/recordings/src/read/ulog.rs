@@ -83,7 +83,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
     let none = Fault::coded("recording/empty", "it holds no position", "record again");
     let mut about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
-    about.frame.earth_origin = Some(local.measured_from(options.origin));
+    about.metadata.earth_origin = Some(local.measured_from(options.origin));
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
     Ok(Box::new(Ordered::open(rows, about)?))

@@ -10,7 +10,7 @@ use std::io::Read as _;
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::curves::Curves;
+use super::curves::{Curves, from_json};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -79,7 +79,7 @@ struct Step {
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut bytes = Vec::new();
     source.bytes()?.read_to_end(&mut bytes)?;
-    let show = parse(&bytes)?;
+    let show: Show = from_json(&bytes, "a VVIZ show", "export the show as VVIZ 1.0")?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
         let problem = format!("its axes are those of {}, which are not known", quoted(frame));
         return refuse("recording/unusable-frame", problem, "export it with the axes `ogl`: x right, y up, z forward");
@@ -116,22 +116,6 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         notes.push(format!("not judged, for the show does not say when they are at their homes: {}", still.join(", ")));
     }
     Ok(Curves::recording(vehicles, notes))
-}
-
-fn parse(bytes: &[u8]) -> Result<Show, ReadError> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    serde_json::from_slice(text).map_err(|error| {
-        let fault = if error.is_eof() {
-            Fault::Truncated("the JSON ends before it is complete".to_owned())
-        } else {
-            Fault::coded(
-                "recording/malformed",
-                format!("it is not the JSON of a VVIZ show: {error}"),
-                "export the show as VVIZ 1.0",
-            )
-        };
-        fault.at(Place::Line(u64::try_from(error.line()).unwrap_or(0)))
-    })
 }
 
 /// The samples of a drone, or the number of the step that is wrong.

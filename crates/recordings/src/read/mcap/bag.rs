@@ -8,12 +8,12 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::error::{Fault, Place, ReadError, quoted, refuse};
-use super::mcap;
-use super::options::ReadOptions;
-use super::order::Recording;
-use super::recognise::BAG;
-use super::source::{Source, ZSTD_MAGIC};
+use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::options::ReadOptions;
+use super::super::order::Recording;
+use super::super::readers::BAG;
+use super::super::source::{Source, ZSTD_MAGIC};
+use super::foreign::{self, Splits};
 
 /// What a bag says of itself.
 const METADATA: &str = "metadata.yaml";
@@ -42,14 +42,14 @@ struct Bag {
 }
 
 /// Whether a folder is a bag.
-pub(super) fn is_bag(folder: &Path) -> bool {
+pub(in crate::read) fn is_bag(folder: &Path) -> bool {
     let path = folder.join(METADATA);
     path.is_file()
         && bytes_of(&path).is_ok_and(|bytes| memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some())
 }
 
 /// Opens a bag.
-pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let metadata = folder.join(METADATA);
     let bag = read(&metadata).map_err(|error| error.of(&metadata))?;
     let files = files_of(&bag, folder).map_err(|fault| ReadError::new(&metadata, fault))?;
@@ -71,7 +71,7 @@ pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, Re
         Ok(source)
     };
     let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
-    mcap::open_bag(&Source::file(folder), files, bag.message_count, options)
+    foreign::open(&Source::file(folder), Splits::new(files, bag.message_count, options), options)
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {

@@ -5,8 +5,9 @@ use nalgebra::{Point3, Vector3};
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::super::identity::Names;
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use super::messages::{EARTH, Seen, What, Who, is_list, reader_of_topic};
 use super::outline::{is_static, place, space};
@@ -19,7 +20,7 @@ pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) ->
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
     let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    about.frame.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
+    about.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Messages that are there twice are those of a bag that is.
     about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
     let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };

@@ -13,13 +13,12 @@
 //! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
 //! what it holds.
 
+pub(super) mod bag;
 mod foreign;
-mod foxglove_poses;
 mod messages;
 mod outline;
 pub(crate) mod own;
 mod plan;
-mod ros;
 mod tree;
 
 pub use own::Channels;
@@ -35,16 +34,6 @@ use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
 use foreign::Splits;
 use tautline_core::record::{ReadFault, RecordError};
-
-/// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
-pub(super) fn open_bag(
-    folder: &Source,
-    files: Vec<Source>,
-    messages: u64,
-    options: &ReadOptions,
-) -> Result<Recording, ReadError> {
-    foreign::open(folder, Splits::new(files, messages, options), options)
-}
 
 pub(in crate::read) const READER: Reader = Reader {
     name: "mcap",

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::heading::Words;
 use super::foreign::Splits;
 use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
 use super::tree::{Body, Placed, Tree};
@@ -286,28 +287,10 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
 /// Words in topics of setpoints, which hold commanded instead of measured positions: of MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
 /// (`motion_reference/pose`), planners, and what is clicked in a viewer.
-const WISHES: [&str; 20] = [
-    "clicked",
-    "cmd",
-    "command",
-    "commanded",
-    "des",
-    "desired",
-    "goal",
-    "initialpose",
-    "plan",
-    "planned",
-    "planner",
-    "planning",
-    "predicted",
-    "ref",
-    "reference",
-    "setpoint",
-    "sp",
-    "target",
-    "waypoint",
-    "wp",
-];
+const WISHES: Words = Words(
+    "clicked cmd command commanded des desired goal initialpose plan planned planner planning predicted ref \
+     reference setpoint sp target waypoint wp",
+);
 
 /// Whether a topic holds transforms that never change.
 pub(super) fn is_static(topic: &str) -> bool {
@@ -331,7 +314,7 @@ pub(super) fn space(topic: &str) -> &str {
 
 /// Returns whether a name contains a word for setpoints, in the singular or the plural.
 pub(super) fn is_wish(name: &str) -> bool {
-    let is_one = |word: &str| WISHES.contains(&word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(&one));
+    let is_one = |word: &str| WISHES.contains(word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(one));
     words(name).split(' ').any(is_one)
 }
 

@@ -16,8 +16,9 @@ use serde::{Deserialize, Serialize};
 use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
+use super::super::identity::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
@@ -56,7 +57,7 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     let is_planar = exported.instants.axes == Some(2);
     let none = Fault::coded("recording/empty", "it holds no instant", "export again");
     let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    (about.epoch_ns, about.frame.is_planar) = (exported.instants.epoch_ns, is_planar);
+    (about.epoch_ns, about.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
     Ok(Box::new(Ordered::open(exported, about)?))
 }
