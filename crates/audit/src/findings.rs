@@ -270,7 +270,8 @@ impl<T: Finding> Episodes<T> {
 
     /// Returns the findings in the order of their beginning and then by pair, shortened where the list is long, and their
     /// number.
-    pub(super) fn finish(self, is_bounded: bool) -> (Vec<T>, Tally) {
+    pub(super) fn finish(self) -> (Vec<T>, Tally) {
+        let is_bounded = self.settled.is_some();
         let (mut list, settled) = self.settled.map_or((Vec::new(), 0), |of| (of.list.into_list(), of.count));
         let count = settled + self.all.len() as u64;
         list.extend(self.all);
@@ -370,7 +371,7 @@ mod tests {
             sweep(&mut episodes, [from_s, from_s + 1.0], 5000, [from_s + 0.25, from_s + 0.5])
         });
         assert!(most.max().is_some_and(|most| most <= FEWEST_HELD), "they are not all held");
-        let (list, tally) = episodes.finish(true);
+        let (list, tally) = episodes.finish();
         assert_eq!((tally.count, tally.is_exact), (200_000, true));
         // The worst thousand are of pair 4999 down to 4975, and the first thousand pairs begin first.
         assert_eq!((list.len(), list[0].pair), (2 * LISTED, 0));
@@ -379,7 +380,7 @@ mod tests {
             let from_s = f64::from(k);
             sweep(&mut going_on, [from_s, from_s + 1.0], 5000, [from_s, from_s + 1.0]);
         }
-        let (list, tally) = going_on.finish(true);
+        let (list, tally) = going_on.finish();
         assert_eq!((tally.count, tally.is_exact), (5000, true));
         assert!(list.iter().all(|of| of.span_s == [0.0, 40.0]));
     }
@@ -391,7 +392,7 @@ mod tests {
         let most =
             [0.0, 1.0, 2.0].map(|from_s| sweep(&mut episodes, [from_s, from_s + 1.0], pairs, [from_s, from_s + 1.0]));
         assert!(most.into_iter().all(|most| most <= 4 * MOST_OPEN), "{most:?}");
-        let (list, tally) = episodes.finish(true);
+        let (list, tally) = episodes.finish();
         assert!(!tally.is_exact && list.len() <= 2 * LISTED);
         assert!(tally.count <= u64::from(pairs) && tally.count > u64::from(pairs / 2), "{tally:?}");
     }

@@ -2,9 +2,10 @@
 //! approaches.
 
 use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::cross_check::{CrossCheck, KeepOut};
-use super::error::Interruption;
 use super::exact::ExactMotion;
 use super::findings::{Episodes, Finding, Tally};
 use super::outcome::{Approach, Disagreement, ObjectPair, ParryEvidence, Undecided, Violation};
@@ -19,7 +20,6 @@ pub(super) struct Ledger<P: Copy + Ord + fmt::Debug> {
     /// The sampling rate that would decide all that is undecided \[Hz\]; none where there is none that would.
     deciding_rate_hz: Option<f64>,
     pub(super) parry: ParryEvidence<P>,
-    is_bounded: bool,
 }
 
 /// Every violation and every undecided time, or the worst and the first of them, and how many there are.
@@ -70,7 +70,6 @@ impl<P: Copy + Ord + fmt::Debug> Default for Ledger<P> {
             undecided: Episodes::default(),
             deciding_rate_hz: Some(0.0),
             parry: ParryEvidence::default(),
-            is_bounded: false,
         }
     }
 }
@@ -79,7 +78,7 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     /// One that counts what it finds, and lists the worst and the first of it.
     pub(super) fn bounded() -> Self {
         let (violations, undecided) = (Episodes::bounded(), Episodes::bounded());
-        Self { violations, undecided, is_bounded: true, ..Self::default() }
+        Self { violations, undecided, ..Self::default() }
     }
 
     /// The window that is swept from now on, behind all that were.
@@ -180,8 +179,8 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
 
     /// What was found, in the order of its beginning and then by pair.
     pub(super) fn into_lists(self) -> Lists<P> {
-        let (violations, violations_tally) = self.violations.finish(self.is_bounded);
-        let (undecided, undecided_tally) = self.undecided.finish(self.is_bounded);
+        let (violations, violations_tally) = self.violations.finish();
+        let (undecided, undecided_tally) = self.undecided.finish();
         let deciding_rate_hz = self.deciding_rate_hz.filter(|_| !undecided.is_empty());
         Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz }
     }
@@ -284,6 +283,22 @@ impl Results {
             ObjectPair::Vehicles(_) => &mut self.closest,
             ObjectPair::Obstacle { .. } => &mut self.obstacles,
         }
+    }
+}
+
+/// Flag that stops the work. Long loops check the flag and return an incomplete result. The caller that started the work
+/// checks the flag too and drops the result.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Interruption(Option<Arc<AtomicBool>>);
+
+impl Interruption {
+    pub(super) fn new(flag: Arc<AtomicBool>) -> Self {
+        Self(Some(flag))
+    }
+
+    #[inline]
+    pub(super) fn is_set(&self) -> bool {
+        self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 }
 

@@ -41,7 +41,6 @@ mod cross_check;
 mod double_double;
 mod enclosure;
 pub mod envelope;
-mod error;
 mod exact;
 mod findings;
 mod ledger;
@@ -54,9 +53,8 @@ mod segment;
 mod slices;
 mod sweep;
 
-pub use auditor::Auditor;
+pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
-pub use error::AuditError;
 pub use findings::{LISTED, Tally};
 pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{

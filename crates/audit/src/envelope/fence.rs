@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::error::Interruption;
+use crate::ledger::Interruption;
 use crate::sweep::MAX_LENGTH_M;
 
 /// Corners of a fence: every edge is compared with every other.

@@ -36,44 +36,36 @@ impl Quantity {
     pub const NUMBERS: [Self; 7] =
         [Self::Speed, Self::HorizontalSpeed, Self::Climb, Self::Descent, Self::Acceleration, Self::Height, Self::Floor];
 
-    /// What it is called on the command line.
+    /// Name on the command line, key in files, and unit.
+    fn names(self) -> [&'static str; 3] {
+        match self {
+            Self::Speed => ["speed", "speed_m_s", "m/s"],
+            Self::HorizontalSpeed => ["horizontal", "horizontal_speed_m_s", "m/s"],
+            Self::Climb => ["climb", "climb_m_s", "m/s"],
+            Self::Descent => ["descent", "descent_m_s", "m/s"],
+            Self::Acceleration => ["accel", "accel_m_s2", "m/s^2"],
+            Self::Height => ["height", "height_m", "m"],
+            Self::Floor => ["floor", "floor_m", "m"],
+            Self::Fence => ["fence", "fence_room_m", "m"],
+        }
+    }
+
+    /// Name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::HorizontalSpeed => "horizontal",
-            Self::Climb => "climb",
-            Self::Descent => "descent",
-            Self::Acceleration => "accel",
-            Self::Height => "height",
-            Self::Floor => "floor",
-            Self::Fence => "fence",
-        }
+        self.names()[0]
     }
 
-    /// What it is called in files, with its unit.
+    /// Key in files, with the unit.
     #[must_use]
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Speed => "speed_m_s",
-            Self::HorizontalSpeed => "horizontal_speed_m_s",
-            Self::Climb => "climb_m_s",
-            Self::Descent => "descent_m_s",
-            Self::Acceleration => "accel_m_s2",
-            Self::Height => "height_m",
-            Self::Floor => "floor_m",
-            Self::Fence => "fence_room_m",
-        }
+        self.names()[1]
     }
 
-    /// Its unit.
+    /// Unit.
     #[must_use]
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Speed | Self::HorizontalSpeed | Self::Climb | Self::Descent => "m/s",
-            Self::Acceleration => "m/s^2",
-            Self::Height | Self::Floor | Self::Fence => "m",
-        }
+        self.names()[2]
     }
 
     /// Whether it depends on heights, and has no value in the plane of x and y.

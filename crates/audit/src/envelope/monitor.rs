@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use super::extremum::{Enclosure, Found, Goal, MeanAcceleration, Velocity, WIDTH, derivative, largest, largest_of};
 use super::fence::Fence;
 use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
-use crate::error::Interruption;
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
+use crate::ledger::Interruption;
 use crate::outcome::Status;
 use crate::polynomial::{rescale, stray_across, value};
 use crate::sweep::Interval;
@@ -27,7 +27,7 @@ fn by_windows(length_s: f64) -> String {
     format!("accelerations are means over {length_s:?} s")
 }
 
-/// What is known of an item beside itself.
+/// Context of an item.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// Added to its times \[s\].
@@ -63,7 +63,7 @@ impl MonitoredFence {
     }
 }
 
-/// What was seen of a vehicle last.
+/// Last state of a vehicle.
 #[derive(Clone, Copy, Debug, Default)]
 struct Last {
     sample: Option<Sample>,
@@ -86,7 +86,7 @@ impl LimitMonitor {
         }
     }
 
-    /// Takes what is said of a vehicle next.
+    /// Takes the next item of a vehicle.
     pub(crate) fn take(&mut self, item: &Item, seen: Seen) {
         let vehicle = item.vehicle();
         if self.vehicles.len() <= vehicle {
@@ -178,7 +178,7 @@ impl LimitMonitor {
         }
     }
 
-    /// A vehicle of which nothing is known before.
+    /// Judges the first sample of a vehicle, or the first sample after a gap.
     fn instant(&mut self, seen: &Sample) {
         let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
         self.each(seen.vehicle, |limit, fence, window, _| {
@@ -307,7 +307,7 @@ fn place_between(
         }
         Some(fence) => {
             let drawn = -fence.clearance_margin_m(from, to);
-            // Where it is no worse than what is known, nobody asks at which end.
+            // The end matters only where the value is worse than the worst known value.
             let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
                 [drawn; 2]
             } else {

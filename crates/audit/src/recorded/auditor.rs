@@ -9,7 +9,7 @@ use super::smallest::Smallest;
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::envelope::LimitMonitor;
-use crate::error::Interruption;
+use crate::ledger::Interruption;
 use crate::ledger::{Lists, Results};
 use crate::outcome::Status;
 use crate::sweep::Interval;
@@ -19,8 +19,8 @@ use tautline_core::track::Item;
 const SEGMENTS: usize = 16;
 /// Fewest items between two windows.
 const FEWEST_ITEMS: usize = 48;
-/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock: nobody would ever be there with
-/// the other, and nothing would be judged of both.
+/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock. They would never be present
+/// together, and no distance between them would be judged.
 const ONE_CLOCK_S: f64 = 30.0 * DAY_S;
 const DAY_S: f64 = 86_400.0;
 /// Names that an error lists.
@@ -201,7 +201,7 @@ impl TrackAuditor {
             self.judge_until(until_s);
             self.pending = 0;
         } else {
-            // Somebody is seen more seldom: look again after as many items.
+            // Some vehicle has a lower rate: look again after as many items.
             self.pending /= 2;
         }
     }
@@ -268,7 +268,7 @@ impl TrackAuditor {
             let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();
             envelope.finish(&judged, self.gaps.is_empty() && contradiction.is_none())
         });
-        // Of a gap that nobody could have used nothing is asked about pairs.
+        // A gap does not matter for pairs if no other vehicle is present during the gap.
         let obstructed = !self.settings.obstacles.is_empty();
         let (gaps, gaps_tally, is_gapless) = self.gaps.finish(&presence, obstructed, envelope.is_some());
         let envelope = envelope.unwrap_or_default();

@@ -46,9 +46,8 @@ mod smallest;
 mod vehicle;
 mod window;
 
-pub use super::error::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
 pub use second_pass::{PairSample, PairSeries, PositionLookup, Proof, ProofBuilder, ProofWindow};
-pub use settings::{Interpolation, RecordedError, Settings, VehicleSettings};
+pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};

@@ -79,7 +79,7 @@ impl Tallies {
     }
 }
 
-/// Vehicles that are never there together with another: when nobody else was, nothing is judged.
+/// Returns the vehicles that are never present together with another vehicle. No pair of such a vehicle is judged.
 pub(super) fn alone(presence: &[Option<Presence>]) -> Vec<usize> {
     let there = presence.iter().enumerate().filter_map(|(vehicle, there)| Some((there.as_ref()?, vehicle)));
     let mut there: Vec<_> = there.collect();
@@ -111,7 +111,7 @@ pub struct Contradiction {
     pub assumed_m_s2: f64,
 }
 
-/// The verdict and what it rests on.
+/// The verdict and its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// Clear where everything asked for was judged and nothing came too close; undecided where something could not be

@@ -93,7 +93,7 @@ pub enum ExportError {
     /// The file cannot be written.
     #[error("cannot write the exported file: {0}")]
     Write(#[from] io::Error),
-    /// The recording holds curves, and nobody says how often they are to be sampled.
+    /// The recording holds curves, and no sampling rate is given.
     #[error("the recording holds curves, and the file would hold samples")]
     Curves,
     /// The recording holds samples, which are written as they are.

@@ -31,19 +31,19 @@ use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 
-/// When a row is.
+/// Time of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
     /// In a column \[s\].
     Column(usize),
-    /// The first column counts frames, of which there are so many in a second; the second one parts of frames, if any.
+    /// The first column counts frames at this rate \[Hz\]; the second column counts parts of frames.
     Frames(f64),
 }
 
 /// A vehicle, with the columns x, y and z of its markers.
 type Marked = (String, Vec<[usize; 3]>);
 
-/// What stands in the columns of a table.
+/// Columns of a table.
 struct Capture {
     /// The line of the first row, from 1.
     first_line: u64,
@@ -52,7 +52,7 @@ struct Capture {
     vehicles: Vec<Marked>,
     /// The length of a unit \[m\].
     metres: f64,
-    /// Whether y is up, and z towards the one who looks along it.
+    /// Whether y is up, x right and z backwards.
     y_up: bool,
     notes: Vec<String>,
 }
@@ -402,7 +402,7 @@ fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadE
     open(source, capture, options)
 }
 
-/// Whose a marker is.
+/// Returns the vehicle of a marker.
 fn subject(name: &str) -> &str {
     name.split(':').next().unwrap_or_default()
 }

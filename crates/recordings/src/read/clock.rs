@@ -173,7 +173,7 @@ impl Stamp {
 /// Smallest step of times that may be in milliseconds, since vehicles are recorded at most 500 times a second.
 const LONG_STEP: f64 = 2.0;
 
-/// What the times of a recording look like.
+/// Properties of the times of a recording.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
     first: Stamp,
@@ -268,7 +268,7 @@ impl Timing {
         (Self { clock, per_second: per_second as f64, epoch }, note)
     }
 
-    /// A clock of which so many units make a second.
+    /// Returns a clock with `per_second` units in a second.
     pub(super) fn given(per_second: f64) -> Self {
         Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
     }

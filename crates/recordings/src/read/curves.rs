@@ -9,7 +9,7 @@ use super::error::{Fault, Place, ReadError};
 use super::order::{BATCH, Recording};
 use tautline_core::track::{Item, Metadata, Piece, Tracks};
 
-/// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.
+/// Jump between two pieces of a curve from which on the user is told \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 
 /// Pieces of curves in order of time.

@@ -206,7 +206,7 @@ impl Fault {
         Self::coded("recording/time-backwards", problem, remedy)
     }
 
-    /// Times are numbers of frames, and nobody says how long one lasts.
+    /// Times are numbers of frames, and the duration of a frame is not given.
     pub(super) fn frames(problem: impl Into<String>) -> Self {
         let remedy = "say how many there are in a second with --fps, such as --fps 30, or how many seconds each lasts \
                       with --time-scale";

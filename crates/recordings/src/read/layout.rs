@@ -44,16 +44,16 @@ pub(super) struct Layout {
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
-    /// What the names of the columns say of frames and of programs.
+    /// Frames and programs that the names of the columns tell.
     pub(super) convention: Convention,
     /// Whether some vehicle has no column of its height: then no vehicle has one.
     pub(super) is_planar: bool,
-    /// What a person should know about the columns.
+    /// Notes for the user about the columns.
     pub(super) notes: Vec<String>,
 }
 
 impl Layout {
-    /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
+    /// Returns the layout of a table with this header. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions() {
@@ -202,7 +202,7 @@ impl Layout {
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        // A user who says which column names the vehicles, or that all rows are of one vehicle, knows.
+        // The user names the column of the vehicle, or says that all rows are of one vehicle.
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
             let may_name =
                 |column: &usize| heading::may_name(&header[*column]) && !clock::is_part_of_time(&header[*column]);

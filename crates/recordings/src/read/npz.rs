@@ -316,7 +316,7 @@ fn next(numbers: &mut Numbers) -> Result<f64, Fault> {
     numbers.next().unwrap_or(Ok(f64::NAN))
 }
 
-/// The next vector of so many axes; what is missing is 0.
+/// Returns the next vector of `axes` axes. The other axes are 0.
 fn next_vector(numbers: &mut Numbers, axes: usize) -> Result<Vector3<f64>, Fault> {
     let mut vector = Vector3::zeros();
     for x in vector.iter_mut().take(axes) {

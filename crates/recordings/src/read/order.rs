@@ -73,11 +73,9 @@ impl About {
 /// vehicle must not go back in time: that is a clock that was set, or two vehicles under one name. A user who knows better
 /// has them sorted.
 pub(super) struct Ordered<R> {
-    path: PathBuf,
+    about: About,
     rows: R,
     timing: Timing,
-    metadata: Metadata,
-    scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
     /// All rows have been read.
@@ -90,15 +88,14 @@ pub(super) struct Ordered<R> {
     last: Vec<Option<(f64, Row)>>,
     /// Place of each vehicle's last row among the items of the current call, where a later row may replace it.
     given: Vec<usize>,
-    duplicates: Option<Duplicates>,
     /// Rows left out because an earlier or a later one of the vehicle is of the same time.
     left_out: u64,
 }
 
 impl<R: Rows> Ordered<R> {
-    /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut metadata, none } = about;
+    /// Reads as much of the recording as its order and its clock need.
+    pub(super) fn open(mut rows: R, mut about: About) -> Result<Self, ReadError> {
+        let (sort, metadata) = (about.sort, &mut about.metadata);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -116,10 +113,10 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(none.into()) };
-        let settled = || Timing::settle(&probe, unit);
-        let (mut timing, note) = times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
-        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
+        let Some(probe) = probe else { return Err(about.none.into()) };
+        let settled = || Timing::settle(&probe, about.unit);
+        let (mut timing, note) = about.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
+        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(about.epoch_ns);
         metadata.notes.extend(note);
         // What is known by now of all rows, where they were surveyed.
         metadata.assumed = rows.assumed();
@@ -141,18 +138,15 @@ impl<R: Rows> Ordered<R> {
         metadata.clock = timing.clock.clone();
         let batch = first.into_iter();
         Ok(Self {
-            path,
+            about,
             rows,
             timing,
-            metadata,
-            scale,
             batch,
             ended,
             finished: false,
             now: None,
             last: Vec::new(),
             given: Vec::new(),
-            duplicates,
             left_out: 0,
         })
     }
@@ -191,7 +185,8 @@ impl<R: Rows> Ordered<R> {
             }
         }
         let sample = self.sample(row, time_s)?;
-        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.metadata.earth_origin.is_some()) {
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.about.metadata.earth_origin.is_some())
+        {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
                 return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
@@ -208,7 +203,7 @@ impl<R: Rows> Ordered<R> {
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
         let says_the_same =
             (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+        match self.about.duplicates.or(says_the_same.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
@@ -226,9 +221,9 @@ impl<R: Rows> Ordered<R> {
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,
-            position_m: row.position * self.scale,
-            velocity_m_s: row.velocity.map(|velocity| velocity * self.scale),
-            radius_m: row.radius.map(|radius| radius * self.scale),
+            position_m: row.position * self.about.scale,
+            velocity_m_s: row.velocity.map(|velocity| velocity * self.about.scale),
+            radius_m: row.radius.map(|radius| radius * self.about.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         if time_s.is_finite()
@@ -293,7 +288,7 @@ impl<R: Rows> Ordered<R> {
 
     fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        let waits = self.duplicates == Some(Duplicates::Last);
+        let waits = self.about.duplicates == Some(Duplicates::Last);
         while items.len() < before + BATCH || (waits && self.goes_on_at_once()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
@@ -302,13 +297,14 @@ impl<R: Rows> Ordered<R> {
         if items.len() == before && self.left_out > 0 {
             let rows = std::mem::take(&mut self.left_out);
             let which = if waits { "a later" } else { "an earlier" };
-            self.metadata
+            self.about
+                .metadata
                 .notes
                 .push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            self.metadata.notes.extend(self.rows.late_notes());
+            self.about.metadata.notes.extend(self.rows.late_notes());
         }
         Ok(items.len() > before)
     }
@@ -322,11 +318,11 @@ impl<R: Rows> Tracks for Ordered<R> {
     }
 
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        self.try_read(items).map_err(|fault| fault.of(&self.path))
+        self.try_read(items).map_err(|fault| fault.of(&self.about.path))
     }
 
     fn metadata(&self) -> &Metadata {
-        &self.metadata
+        &self.about.metadata
     }
 }
 

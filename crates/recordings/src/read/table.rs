@@ -14,7 +14,7 @@ use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
 
-/// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.
+/// Number of vehicles, from the first, whose rows are examined for several vehicles under one name.
 const MOST_SUSPECTED: usize = 256;
 
 /// A table, long or wide.
@@ -30,7 +30,7 @@ struct Table<C> {
     has_own_clock: bool,
     /// The first time, where times are written as dates.
     dates: Option<Date>,
-    /// Columns that may say otherwise whose rows they are.
+    /// Other columns that may name the vehicles.
     rivals: Vec<Rival>,
     /// Columns that may name several vehicles among the rows of one, for each vehicle.
     suspects: Vec<Vec<Suspect>>,
@@ -233,7 +233,7 @@ impl<C: Cells> Table<C> {
         Ok(())
     }
 
-    /// The fault of a vehicle whose rows look like those of several.
+    /// Returns the fault of a vehicle whose rows look like rows of several vehicles.
     fn suspicion(&self) -> Option<Fault> {
         let header = self.cells.header();
         if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)

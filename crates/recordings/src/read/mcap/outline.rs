@@ -93,8 +93,8 @@ impl Outline {
         reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
     }
 
-    /// Takes note of how many poses a list has. One that is shorter or longer than those before does not say whose pose came or
-    /// went; an empty one says that nobody is seen.
+    /// Records the number of poses of a list. A list of another length does not tell which vehicle appeared or left. In an
+    /// empty list no vehicle is seen.
     fn count(&mut self, message: &Message<'_>, listed: usize) -> Result<(), Fault> {
         if listed == 0 {
             return Ok(());
@@ -205,8 +205,8 @@ impl Outline {
         Ok(())
     }
 
-    /// Refuses topics that tell by their names where somebody is asked to be beside topics that do not, unless the user names
-    /// those that are read: a vehicle is never judged against what it was asked to do, nor that in its place.
+    /// Refuses topics of setpoints beside topics of measured positions, unless the user names the topics that are read. A
+    /// setpoint is never judged in place of a measured position.
     pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
         let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
         let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
@@ -217,7 +217,7 @@ impl Outline {
         refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
-    /// Topics that tell by their names where somebody is asked to be, unless the user names those that are read.
+    /// Topics of setpoints by their names, unless the user names the topics that are read.
     pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
         let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
         guessed.map(String::as_str).filter(|topic| is_wish(topic))
@@ -243,7 +243,7 @@ impl Outline {
     }
 }
 
-/// Whom topics of poses tell of.
+/// Vehicles that topics of poses describe.
 #[derive(Default)]
 pub(super) struct Cover<'a> {
     /// Names in messages and of the namespaces of topics.

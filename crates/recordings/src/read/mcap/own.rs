@@ -102,7 +102,7 @@ impl Instants {
     }
 }
 
-/// Appends the rows of an instant of this number, whose positions have so many axes; the error says what is wrong with it.
+/// Appends the rows of an instant with this number and number of axes; the error is the fault of the message.
 fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &mut Vec<Row>)) -> Result<(), String> {
     let count = instant.vehicles.len();
     let fits = |length: usize, each: usize| length == each * count;
@@ -181,7 +181,7 @@ impl Channels {
         Ok(has_some.then_some(channels))
     }
 
-    /// The channels of the next instant, which is of so many vehicles, a row for each in the order of the instant; none
+    /// The channels of the next instant, which is of `vehicles` vehicles, a row for each in the order of the instant; none
     /// behind the last one.
     ///
     /// # Errors
