@@ -12,7 +12,7 @@ use super::skybrush::SHOW;
 use super::source::{Archive, GZIP_MAGIC, Source};
 use super::{capture, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
 
-/// Reader of a format. Each reader is a file of this module and a row of [`READERS`].
+/// Reader of a format: a row of [`READERS`].
 pub struct Reader {
     /// Name for `--format`.
     pub name: &'static str,
