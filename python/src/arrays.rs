@@ -2,7 +2,7 @@
 
 use numpy::ndarray::{ArrayView1, ArrayView3};
 use tautline::read::{Fault, Place, ReadError};
-use tautline::track::{Clock, Item, Sample, Tracks};
+use tautline::track::{Item, Metadata, Sample, Tracks};
 
 /// Items that are made at a time, about: few enough to stay near the processor.
 const BATCH: usize = 4096;
@@ -22,9 +22,7 @@ pub(crate) struct Arrays<'a> {
     pub(crate) velocities_m_s: Option<ArrayView3<'a, f64>>,
     /// A name for each vehicle.
     pub(crate) names: &'a [String],
-    /// What should be said of them, a sentence each.
-    pub(crate) notes: &'a [String],
-    clock: Clock,
+    metadata: Metadata,
     /// The next instant.
     at: usize,
 }
@@ -35,10 +33,11 @@ impl<'a> Arrays<'a> {
         positions_m: ArrayView3<'a, f64>,
         velocities_m_s: Option<ArrayView3<'a, f64>>,
         names: &'a [String],
-        notes: &'a [String],
+        notes: &[String],
     ) -> Self {
-        let clock = Clock { unit: "s", ..Clock::default() };
-        Self { times_s, positions_m, velocities_m_s, names, notes, clock, at: 0 }
+        let is_planar = positions_m.shape()[2] == 2;
+        let metadata = Metadata { is_planar, ..Metadata::in_seconds(notes.to_vec()) };
+        Self { times_s, positions_m, velocities_m_s, names, metadata, at: 0 }
     }
 
     /// The next instant, appended to `items`.
@@ -133,15 +132,7 @@ impl Tracks for Arrays<'_> {
         Ok(self.at > from)
     }
 
-    fn clock(&self) -> &Clock {
-        &self.clock
-    }
-
-    fn notes(&self) -> &[String] {
-        self.notes
-    }
-
-    fn is_planar(&self) -> bool {
-        self.positions_m.shape()[2] == 2
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 }

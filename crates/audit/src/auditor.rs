@@ -1,12 +1,11 @@
 //! The audit of a flight: straight steps of all vehicles, one after the other.
 
 use super::candidates::{Candidates, pair_count, pairs, pairs_of};
-use super::error::AuditError;
+use super::cross_check::KeepOut;
 use super::exact::ExactMotion;
 use super::ledger::Ledger;
 use super::outcome::{AuditOutcome, Status, StepFinding, Violation};
-use super::parry::KeepOut;
-use super::polynomial::Line;
+use super::segment::Line;
 use super::sweep::{ClosestPoint, Interval, MAX_LENGTH_M, MIN_LIMIT_M, RelativeMotion};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, row, separation};
 
@@ -36,7 +35,7 @@ pub struct Auditor {
 }
 
 impl Auditor {
-    /// An auditor of so many vehicles by the safety distance delta \[m\]. Fewer than two vehicles are always clear.
+    /// Creates an auditor of `vehicles` vehicles by the safety distance delta \[m\]. Fewer than two vehicles are always clear.
     ///
     /// # Errors
     /// [`AuditError::Delta`] unless delta is between 1e-70 m and 1e70 m; [`AuditError::TooManyVehicles`] beyond 2^32 - 1.
@@ -210,6 +209,73 @@ pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) ->
             AuditError::NotFinite { vehicle, time_s }
         })
     })
+}
+
+/// Why something could not be judged. Nothing changes then, except that the outcome is no longer clear.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum AuditError {
+    /// The safety distance is not a positive number within range.
+    #[error("the safety distance must be between {min_m:e} m and {max_m:e} m, not {delta_m} m")]
+    Delta {
+        /// The safety distance offered \[m\].
+        delta_m: f64,
+        /// Smallest that is accepted \[m\].
+        min_m: f64,
+        /// Largest that is accepted \[m\].
+        max_m: f64,
+    },
+    /// More vehicles than can be numbered.
+    #[error("{vehicles} vehicles are more than can be judged ({max})", max = u32::MAX)]
+    TooManyVehicles {
+        /// How many were asked for.
+        vehicles: usize,
+    },
+    /// A step came before the start.
+    #[error("a step was offered before the start")]
+    NotStarted,
+    /// A second start came.
+    #[error("a second start was offered")]
+    AlreadyStarted,
+    /// Positions of another number of vehicles.
+    #[error("expected the positions of {expected} vehicles, found {found}")]
+    WrongCount {
+        /// Vehicles that are judged.
+        expected: usize,
+        /// Vehicles offered.
+        found: usize,
+    },
+    /// A time that is not a finite number.
+    #[error("the time {time_s} s is not a finite number")]
+    TimeNotFinite {
+        /// The time offered \[s\].
+        time_s: f64,
+    },
+    /// A time not later than the one before.
+    #[error("the time {time_s} s is not later than the time before, {previous_s} s")]
+    TimeNotIncreasing {
+        /// The time before \[s\].
+        previous_s: f64,
+        /// The time offered \[s\].
+        time_s: f64,
+    },
+    /// A position that is not a finite number.
+    #[error("the position of vehicle {} at {time_s} s is not a finite number", vehicle + 1)]
+    NotFinite {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The time \[s\].
+        time_s: f64,
+    },
+    /// A position whose square could overflow.
+    #[error("the position of vehicle {} at {time_s} s is beyond {limit_m:e} m, too far to judge", vehicle + 1)]
+    TooFar {
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The time \[s\].
+        time_s: f64,
+        /// Largest coordinate that is accepted \[m\].
+        limit_m: f64,
+    },
 }
 
 #[cfg(test)]

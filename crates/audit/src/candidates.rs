@@ -55,7 +55,7 @@ struct Reach {
     vehicle: u32,
 }
 
-/// These pairs, or all of so many vehicles where none are listed, in the order of pairs.
+/// Iterates over the listed pairs, or over all pairs of `n` vehicles without a list, in the order of pairs.
 #[inline]
 pub(super) fn pairs(listed: Option<&[[u32; 2]]>, n: usize) -> impl Iterator<Item = (usize, usize)> {
     let (mut k, mut next) = (0, (0, 1));
@@ -72,7 +72,7 @@ pub(super) fn pairs(listed: Option<&[[u32; 2]]>, n: usize) -> impl Iterator<Item
     })
 }
 
-/// How many these pairs are, or all of so many vehicles where none are listed.
+/// Returns the number of the listed pairs, or of all pairs of `n` vehicles without a list.
 pub(super) fn pairs_of(listed: Option<&[[u32; 2]]>, n: usize) -> u64 {
     listed.map_or_else(|| pair_count(n), |pairs| pairs.len() as u64)
 }
@@ -83,7 +83,7 @@ pub(super) fn pair_count(n: usize) -> u64 {
 }
 
 impl Candidates {
-    /// Of so many vehicles.
+    /// Creates an empty list for `n` vehicles.
     pub(super) fn new(n: usize) -> Self {
         let reference_m = Rows::zeros(n);
         let columns = Columns::default();
@@ -154,7 +154,7 @@ impl Candidates {
         for (k, a) in self.reaches.iter().enumerate() {
             for b in self.reaches[k + 1..].iter().take_while(|b| b.column == a.column && b.low <= a.high) {
                 let reach_m = a.half_m + b.half_m;
-                // Two who share columns meet in the first of them.
+                // Two vehicles that share columns are compared in the first shared column.
                 if (a.across_m - b.across_m).abs() > reach_m || self.columns.shared(a.first, b.first) != a.column {
                     continue;
                 }

@@ -1,14 +1,12 @@
 //! The audit of a flight among obstacles: straight steps of all vehicles, one after the other.
 
-use super::auditor::check_instant;
+use super::auditor::{AuditError, check_instant};
+use super::cross_check::KeepOut;
 use super::enclosure::Target;
-use super::error::AuditError;
-use super::ledger::Lists;
+use super::ledger::{ClosestPairs, Lists, Results};
 use super::obstacle::{Obstacle, ObstacleError};
 use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use super::pair_sweep::PairSweep;
-use super::parry::KeepOut;
-use super::results::{ClosestPairs, Results};
 use super::segment::Segment;
 use super::sweep::{Interval, MIN_LIMIT_M};
 use tautline_core::swarm::{Rows, row};
@@ -75,7 +73,7 @@ pub struct ClearanceOutcome {
 }
 
 impl ClearanceAuditor {
-    /// An auditor of so many vehicles among obstacles that stand, each with a clearance.
+    /// Creates an auditor of `vehicles` vehicles among obstacles at rest, each with a clearance.
     ///
     /// # Errors
     /// [`ObstacleError`] for one that cannot be judged, moves, or has no clearance above zero.

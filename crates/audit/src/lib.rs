@@ -41,32 +41,26 @@ mod cross_check;
 mod double_double;
 mod enclosure;
 pub mod envelope;
-mod episodes;
-mod error;
 mod exact;
+mod findings;
 mod ledger;
 mod obstacle;
 mod outcome;
 mod pair_sweep;
-mod parry;
 mod polynomial;
 pub mod recorded;
-mod results;
 mod segment;
-mod shortlist;
 mod slices;
 mod sweep;
-mod whole_motion;
 
-pub use auditor::Auditor;
+pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
-pub use error::AuditError;
+pub use findings::{LISTED, Tally};
 pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };
 pub use recorded::TrackAuditor;
-pub use shortlist::{LISTED, Tally};
 pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;
 pub use tautline_core::{swarm, track};

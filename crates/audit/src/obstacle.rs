@@ -130,7 +130,7 @@ impl Obstacle {
         })
     }
 
-    /// The same with all lengths so many times as long.
+    /// Returns the shape with all lengths multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         let shape = match self.shape {

@@ -2,17 +2,15 @@
 
 use nalgebra::Vector3;
 
-use super::cross_check::cross_check;
+use super::cross_check::{KeepOut, cross_check};
 use super::enclosure::{Minimum, Search, Target};
 use super::exact::ExactMotion;
+use super::ledger::Results;
 use super::outcome::{Approach, ObjectPair, Undecided, Violation};
-use super::parry::KeepOut;
-use super::polynomial::Line;
-use super::results::Results;
-use super::segment::Segment;
+use super::segment::{Line, Segment};
 use super::sweep::{ClosestPoint, Interval, RelativeMotion};
 
-/// Two that must keep a distance.
+/// Sweep of two objects that must keep a distance.
 #[derive(Debug)]
 pub(super) struct PairSweep<'a> {
     pub(super) pair: ObjectPair,
@@ -20,7 +18,7 @@ pub(super) struct PairSweep<'a> {
     pub(super) keep_out: KeepOut,
     /// What the distance must come below to be among the closest.
     pub(super) cutoff: f64,
-    /// Whether the distance is held against the limit, and not only who came closest is asked.
+    /// Whether the distance is compared with the limit. If not, only the closest approach is found.
     pub(super) judges: bool,
     /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
     pub(super) may_violate: bool,
@@ -183,7 +181,7 @@ impl PairSweep<'_> {
         }
     }
 
-    /// A time in which somebody is on a curve, or an obstacle is in the way.
+    /// Judges an interval in which one of the two is on a curve or is an obstacle.
     fn curved(&self, overlap: &Overlap<'_>, results: &mut Results) {
         let Overlap { first, second, over } = *overlap;
         let (pair, limit_m) = (self.pair, self.keep_out.delta_m);

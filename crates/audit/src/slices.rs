@@ -12,7 +12,7 @@ pub struct Slice {
     pub from_s: f64,
     /// To \[s\].
     pub to_s: f64,
-    /// Who, how near and when.
+    /// Closest approach: pair, distance and time.
     pub closest: Approach,
     /// Whether two are there all the time. Where it is not so nothing is known of some of it, and the distance is one of the
     /// rest alone.
@@ -31,7 +31,7 @@ pub struct Slices {
     width_s: f64,
 }
 
-/// Most slices, where nobody says another number.
+/// Largest number of slices by default.
 const MOST: usize = 2000;
 
 impl Default for Slices {
@@ -65,7 +65,7 @@ impl Slice {
 }
 
 impl Slices {
-    /// None yet, and at most so many, at least two.
+    /// Creates an empty list of at most `most` slices, and of at least two.
     #[must_use]
     pub fn new(most: usize) -> Self {
         Self { all: Vec::new(), most: most.max(2), width_s: 0.0 }
@@ -106,7 +106,7 @@ impl Slices {
         }
     }
 
-    /// At most so many, at least one, in order of time.
+    /// Returns at most `most` slices, at least one, in order of time.
     #[must_use]
     pub fn finish(mut self, most: usize) -> Vec<Slice> {
         if self.all.len() > most.max(1) {

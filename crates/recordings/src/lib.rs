@@ -2,9 +2,9 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`read`] | recordings of any origin as tracks, one file a format |
+//! | [`read`] | recordings of any origin as tracks, one file per format or family of formats |
 //! | [`mcap`] | `run.mcap`, written as a flight goes and read back |
-//! | [`export`] | recordings written in other formats, one file a format |
+//! | [`export`] | recordings written in other formats, one file per format |
 //!
 //! Memory grows with the bytes read, not with lengths that a file claims. Ambiguous input is an error that names the option
 //! to set.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::error::Interruption;
+use crate::ledger::Interruption;
 use crate::sweep::MAX_LENGTH_M;
 
 /// Corners of a fence: every edge is compared with every other.
@@ -137,16 +137,16 @@ impl Fence {
     /// The least room \[m\] of a vehicle that flies straight from one place to another: its distance from the nearest wall, floor
     /// or ceiling, below 0 by how far it gets outside.
     #[must_use]
-    pub fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
-        self.room_until(from, to, &Interruption::default())
+    pub fn clearance_margin_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+        self.margin_until(from, to, &Interruption::default())
     }
 
     /// The same, or some number once the work is interrupted.
-    pub(super) fn room_until(&self, from: Vector3<f64>, to: Vector3<f64>, interruption: &Interruption) -> f64 {
+    pub(super) fn margin_until(&self, from: Vector3<f64>, to: Vector3<f64>, interruption: &Interruption) -> f64 {
         if interruption.is_set() {
             return f64::INFINITY;
         }
-        let across = self.room_across(from.xy(), to.xy(), interruption);
+        let across = self.margin_across(from.xy(), to.xy(), interruption);
         self.height_m.map_or(across, |[low, high]| {
             let (least, most) = (from.z.min(to.z), from.z.max(to.z));
             across.min(least - low).min(high - most)
@@ -158,7 +158,7 @@ impl Fence {
         self.corners_m.iter().zip(next).map(|(&from, &to)| [from, to])
     }
 
-    fn room_across(&self, from: Vector2<f64>, to: Vector2<f64>, interruption: &Interruption) -> f64 {
+    fn margin_across(&self, from: Vector2<f64>, to: Vector2<f64>, interruption: &Interruption) -> f64 {
         let wall_m = self.edges().map(|edge| distance(edge, [from, to])).fold(f64::INFINITY, f64::min);
         if wall_m > 0.0 && self.holds(from) {
             return wall_m;
@@ -247,7 +247,7 @@ mod tests {
     }
 
     fn room(from: [f64; 3], to: [f64; 3]) -> f64 {
-        l_shape().room_m(Vector3::from(from), Vector3::from(to))
+        l_shape().clearance_margin_m(Vector3::from(from), Vector3::from(to))
     }
 
     #[test]
@@ -277,10 +277,11 @@ mod tests {
         let past = room([10.0, 5.5, 10.0], [5.5, 10.0, 10.0]);
         assert!((past + 2.75).abs() < 1e-8, "{past}");
         let (low, high) = (Vector3::new(9.0, 5.5, 10.0), Vector3::new(6.0, 9.5, 10.0));
-        let seen =
-            (0..=3000).map(|k| low.lerp(&high, f64::from(k) / 3000.0)).map(|place| l_shape().room_m(place, place));
+        let seen = (0..=3000)
+            .map(|k| low.lerp(&high, f64::from(k) / 3000.0))
+            .map(|place| l_shape().clearance_margin_m(place, place));
         let seen = seen.fold(0.0, f64::min);
-        let told = l_shape().room_m(low, high);
+        let told = l_shape().clearance_margin_m(low, high);
         assert!(told <= seen + 1e-12 && seen - told < 1e-3, "{told} {seen}");
     }
 
@@ -290,7 +291,10 @@ mod tests {
         let turned = Fence::new(&turned, None, 0.0).expect("a fence");
         for (x, y) in [(1.0, 1.0), (7.0, 7.0), (-1.0, 2.0), (4.999, 9.0), (9.9, 4.9)] {
             let place = Vector3::new(x, y, 5.0);
-            assert_eq!(turned.room_m(place, place).signum(), l_shape().room_m(place, place).signum());
+            assert_eq!(
+                turned.clearance_margin_m(place, place).signum(),
+                l_shape().clearance_margin_m(place, place).signum()
+            );
         }
     }
 

@@ -1,8 +1,11 @@
-//! What is limited, and to how much.
+//! Limits on single vehicles, and what was found of each limit.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::fence::Fence;
+use crate::findings::Tally;
+use crate::outcome::Status;
 
 /// Part of a limit, or of 1 where it is less, by which it counts as exceeded.
 const ALLOWANCE: f64 = 1e-9;
@@ -33,44 +36,36 @@ impl Quantity {
     pub const NUMBERS: [Self; 7] =
         [Self::Speed, Self::HorizontalSpeed, Self::Climb, Self::Descent, Self::Acceleration, Self::Height, Self::Floor];
 
-    /// What it is called on the command line.
+    /// Name on the command line, key in files, and unit.
+    fn names(self) -> [&'static str; 3] {
+        match self {
+            Self::Speed => ["speed", "speed_m_s", "m/s"],
+            Self::HorizontalSpeed => ["horizontal", "horizontal_speed_m_s", "m/s"],
+            Self::Climb => ["climb", "climb_m_s", "m/s"],
+            Self::Descent => ["descent", "descent_m_s", "m/s"],
+            Self::Acceleration => ["accel", "accel_m_s2", "m/s^2"],
+            Self::Height => ["height", "height_m", "m"],
+            Self::Floor => ["floor", "floor_m", "m"],
+            Self::Fence => ["fence", "fence_room_m", "m"],
+        }
+    }
+
+    /// Name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Speed => "speed",
-            Self::HorizontalSpeed => "horizontal",
-            Self::Climb => "climb",
-            Self::Descent => "descent",
-            Self::Acceleration => "accel",
-            Self::Height => "height",
-            Self::Floor => "floor",
-            Self::Fence => "fence",
-        }
+        self.names()[0]
     }
 
-    /// What it is called in files, with its unit.
+    /// Key in files, with the unit.
     #[must_use]
     pub fn key(self) -> &'static str {
-        match self {
-            Self::Speed => "speed_m_s",
-            Self::HorizontalSpeed => "horizontal_speed_m_s",
-            Self::Climb => "climb_m_s",
-            Self::Descent => "descent_m_s",
-            Self::Acceleration => "accel_m_s2",
-            Self::Height => "height_m",
-            Self::Floor => "floor_m",
-            Self::Fence => "fence_room_m",
-        }
+        self.names()[1]
     }
 
-    /// Its unit.
+    /// Unit.
     #[must_use]
     pub fn unit(self) -> &'static str {
-        match self {
-            Self::Speed | Self::HorizontalSpeed | Self::Climb | Self::Descent => "m/s",
-            Self::Acceleration => "m/s^2",
-            Self::Height | Self::Floor | Self::Fence => "m",
-        }
+        self.names()[2]
     }
 
     /// Whether it depends on heights, and has no value in the plane of x and y.
@@ -162,5 +157,100 @@ impl Envelope {
     /// Some quantity of a derivative of the position, which vehicles that jump do not have.
     pub(crate) fn of_motion(&self) -> Option<Quantity> {
         self.limits.iter().map(|limit| limit.quantity).find(|quantity| quantity.derivative() > 0)
+    }
+}
+
+/// What was found of all that is asked of each vehicle by itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EnvelopeOutcome {
+    /// Limit by limit, in the order in which they were given; that of the fence last.
+    pub limits: Vec<LimitOutcome>,
+}
+
+/// What was found of one limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LimitOutcome {
+    /// What was asked.
+    pub limit: Limit,
+    /// The verdict.
+    pub status: Status,
+    /// The value that came nearest to the limit, or went farthest beyond it; none where nothing tells any.
+    pub extreme: Option<Exceeding>,
+    /// Times that a vehicle was beyond it, in order of time; of many the worst, and the first of each vehicle.
+    pub violations: Vec<Exceeding>,
+    /// Times of which it cannot be told, likewise.
+    pub undecided: Vec<Exceeding>,
+    /// How many times a vehicle was beyond it.
+    pub violations_tally: Tally,
+    /// How many times it cannot be told.
+    pub undecided_tally: Tally,
+    /// Vehicles of which nothing tells it at all.
+    pub unknown: Vec<usize>,
+    /// What was taken for granted to tell it, beyond what happens between samples.
+    pub assumes: Option<String>,
+    /// Corners of curves, which are not held against it; none where there are none.
+    pub corners: Option<Corners>,
+}
+
+/// Instants at which the velocity of a recorded curve jumps: no vehicle flies them as they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corners {
+    /// How many there are, of all vehicles.
+    pub count: u64,
+    /// The one at which the velocity jumps most.
+    pub largest: Corner,
+}
+
+/// An instant at which a velocity jumps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Corner {
+    /// The vehicle.
+    #[serde(skip)]
+    pub vehicle: usize,
+    /// When \[s\].
+    pub at_s: f64,
+    /// By how much \[m/s\].
+    pub by_m_s: f64,
+}
+
+/// A vehicle over a time. The time is that of the samples or pieces around.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Exceeding {
+    /// The vehicle.
+    #[serde(skip)]
+    pub vehicle: usize,
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// The worst value within is at least this, in the unit of its limit.
+    pub lower: f64,
+    /// And at most this.
+    pub upper: f64,
+    /// When the worst that is certain is reached \[s\].
+    pub at_s: f64,
+}
+
+impl EnvelopeOutcome {
+    /// Whether some limit is exceeded.
+    #[must_use]
+    pub fn is_exceeded(&self) -> bool {
+        self.limits.iter().any(|limit| limit.status == Status::Violation)
+    }
+
+    /// Whether everything is known of every limit but for what it lists as undecided.
+    #[must_use]
+    pub fn is_else_known(&self) -> bool {
+        let is_listed = |limit: &LimitOutcome| {
+            let is_whole = !limit.violations_tally.is_shortened() && !limit.undecided_tally.is_shortened();
+            is_whole && (limit.status != Status::Undecided || !limit.undecided.is_empty())
+        };
+        self.limits.iter().all(|limit| limit.unknown.is_empty() && is_listed(limit))
+    }
+
+    /// Whether every limit is known to be kept, or nothing is asked.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.limits.iter().all(|limit| limit.status == Status::Clear)
     }
 }

@@ -20,13 +20,9 @@
 
 mod extremum;
 mod fence;
-mod followed;
 mod limit;
-mod mean_acceleration;
-mod outcome;
-mod watch;
+mod monitor;
 
 pub use fence::{Fence, FenceError};
-pub use limit::{Envelope, Limit, Quantity};
-pub use outcome::{Corner, Corners, EnvelopeOutcome, Exceeding, LimitOutcome};
-pub(super) use watch::{Seen, Watch};
+pub use limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
+pub(super) use monitor::{LimitMonitor, Seen};

@@ -3,17 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::outcome::{Outcome, Tallies, alone};
-use super::presence::{Gaps, Rates, absences};
+use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, alone};
 use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::Smallest;
 use super::vehicle::Vehicle;
 use super::window::Windows;
-use crate::envelope::Watch;
-use crate::error::Interruption;
-use crate::ledger::Lists;
+use crate::envelope::LimitMonitor;
+use crate::ledger::Interruption;
+use crate::ledger::{Lists, Results};
 use crate::outcome::Status;
-use crate::results::Results;
 use crate::sweep::Interval;
 use tautline_core::track::Item;
 
@@ -21,8 +19,8 @@ use tautline_core::track::Item;
 const SEGMENTS: usize = 16;
 /// Fewest items between two windows.
 const FEWEST_ITEMS: usize = 48;
-/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock: nobody would ever be there with
-/// the other, and nothing would be judged of both.
+/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock. They would never be present
+/// together, and no distance between them would be judged.
 const ONE_CLOCK_S: f64 = 30.0 * DAY_S;
 const DAY_S: f64 = 86_400.0;
 /// Names that an error lists.
@@ -41,7 +39,7 @@ pub struct TrackAuditor {
     results: Results,
     gaps: Gaps,
     smallest: Option<Smallest>,
-    envelope: Option<Watch>,
+    envelope: Option<LimitMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and of the last one before that time \[s\].
@@ -74,7 +72,7 @@ impl TrackAuditor {
             least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles),
             envelope: (!settings.envelope.is_empty())
-                .then(|| Watch::new(&settings.envelope, settings.window(), settings.accel_window_s)),
+                .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),
             settings,
             vehicles: Vec::new(),
             rates: None,
@@ -203,7 +201,7 @@ impl TrackAuditor {
             self.judge_until(until_s);
             self.pending = 0;
         } else {
-            // Somebody is seen more seldom: look again after as many items.
+            // Some vehicle has a lower rate: look again after as many items.
             self.pending /= 2;
         }
     }
@@ -270,7 +268,7 @@ impl TrackAuditor {
             let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();
             envelope.finish(&judged, self.gaps.is_empty() && contradiction.is_none())
         });
-        // Of a gap that nobody could have used nothing is asked about pairs.
+        // A gap does not matter for pairs if no other vehicle is present during the gap.
         let obstructed = !self.settings.obstacles.is_empty();
         let (gaps, gaps_tally, is_gapless) = self.gaps.finish(&presence, obstructed, envelope.is_some());
         let envelope = envelope.unwrap_or_default();

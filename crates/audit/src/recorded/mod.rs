@@ -39,19 +39,15 @@
 //! ```
 
 mod auditor;
-mod lookup;
 mod outcome;
-mod presence;
-mod proof;
+mod second_pass;
 mod settings;
 mod smallest;
 mod vehicle;
 mod window;
 
-pub use super::error::TOUCHING_ELLIPSOIDS;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
-pub use lookup::{PairSample, PairSeries, PositionLookup};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
-pub use proof::{Proof, ProofBuilder, ProofWindow};
-pub use settings::{Interpolation, RecordedError, Settings, VehicleSettings};
+pub use second_pass::{PairSample, PairSeries, PositionLookup, Proof, ProofBuilder, ProofWindow};
+pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};

@@ -3,9 +3,9 @@
 use super::settings::Settings;
 use super::vehicle::Vehicle;
 use super::window::{Windows, within};
-use crate::error::Interruption;
+use crate::ledger::Interruption;
+use crate::ledger::Results;
 use crate::outcome::Approach;
-use crate::results::Results;
 use crate::segment::Segment;
 use crate::slices::{Slice, Slices};
 use crate::sweep::Interval;
@@ -16,7 +16,7 @@ const MOST_KEPT: usize = 4096;
 const MOST_SAMPLES: usize = 256;
 const MOST_STRETCHES: usize = 64;
 const MOST_CHANGES: usize = 64;
-/// No samples of a window are passed over up to so many.
+/// Number of samples of a window up to which none is skipped.
 const FEWEST_SAMPLES: usize = 32;
 
 /// Follows the closest approach of all pairs, slice of time by slice of time.

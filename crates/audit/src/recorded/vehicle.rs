@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use super::outcome::{Contradiction, Gap, Presence};
 use super::settings::{Interpolation, RecordedError, Settings};
 use crate::envelope::Seen;
+use crate::exact::compare_height;
 use crate::polynomial::{BernsteinBasis, parts_told};
 use crate::segment::{Curve, Deviation, Segment};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
-use crate::whole_motion::compare_height;
 use tautline_core::track::{Item, Piece, Sample};
 
 /// Pieces of a curve that follow each other within this \[s\] leave no gap: files write times with about this resolution. A

@@ -11,15 +11,15 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
+use super::settings::Limits;
 use super::vehicle::Vehicle;
+use crate::cross_check::KeepOut;
 use crate::enclosure::Target;
-use crate::error::Limits;
+use crate::ledger::{KEPT, Results};
 use crate::obstacle::Obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;
-use crate::parry::KeepOut;
 use crate::polynomial::stray;
-use crate::results::{KEPT, Results};
 use crate::segment::Segment;
 use crate::sweep::{Interval, RelativeMotion, larger};
 use tautline_core::swarm::Pair;
@@ -28,7 +28,7 @@ use tautline_core::swarm::Pair;
 const PAIRS_PER_VEHICLE: usize = 4;
 /// With more pairs left than this in one that is not halved they are swept before others are looked for.
 const MOST_LISTED: usize = 1 << 20;
-/// A window is not halved below so many segments for each vehicle, unless there are curves in it.
+/// Fewest segments per vehicle of a window that is halved, unless the window has curves.
 const FEWEST_SEGMENTS: usize = 4;
 /// A window is not halved more often than this.
 const MOST_HALVINGS: u32 = 12;
@@ -54,7 +54,7 @@ struct Extent {
 #[derive(Clone, Debug)]
 pub(super) struct Windows {
     limits: Limits,
-    /// Whether distances are held against the limits, and not only who came closest is asked.
+    /// Whether distances are compared with the limits. If not, only the closest pairs are found.
     judges: bool,
     /// Obstacles, each with its path.
     obstacles: Vec<(Obstacle, Vec<Segment>)>,
@@ -99,7 +99,7 @@ impl Windows {
         Self { limits, judges: true, obstacles, extents: Vec::new(), near: Vec::new() }
     }
 
-    /// Which ask who came closest, and nothing else.
+    /// Returns windows that find only the closest pairs.
     pub(super) fn of_closest(limits: Limits) -> Self {
         Self { judges: false, ..Self::new(limits, &[]) }
     }

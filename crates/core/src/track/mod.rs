@@ -86,6 +86,33 @@ pub struct Clock {
     pub epoch_ns: i64,
 }
 
+/// Properties of a recording as a whole.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Metadata {
+    /// How time is counted.
+    pub clock: Clock,
+    /// Notes for the user about how the recording was read, a sentence each: rows were sorted, the unit of time was inferred.
+    pub notes: Vec<String>,
+    /// Assumption that the positions at the times of items rest on, in words that follow "if"; none if the recording holds
+    /// these positions. A recording with an assumption proves nothing.
+    pub assumed: Option<String>,
+    /// Whether the height of some vehicle is unknown. Then z is 0 in every item and has no meaning: only distances in the
+    /// plane of x and y can be judged.
+    pub is_planar: bool,
+    /// Whether the recording gives the directions of its axes. The axes are then east, north and up.
+    pub has_directions: bool,
+    /// Origin from which positions are measured, if the recording has latitudes and longitudes.
+    pub earth_origin: Option<EarthOrigin>,
+}
+
+impl Metadata {
+    /// Metadata of a recording whose times are in seconds.
+    #[must_use]
+    pub fn in_seconds(notes: Vec<String>) -> Self {
+        Self { clock: Clock { unit: "s", ..Clock::default() }, notes, ..Self::default() }
+    }
+}
+
 /// A recording being read.
 ///
 /// Items come in order of time ([`Item::time_s`]), and those of one vehicle at strictly increasing times; pieces of one
@@ -104,32 +131,31 @@ pub trait Tracks {
     /// When the recording cannot be read further; what was appended before stays true.
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, Self::Error>;
 
-    /// How time is counted.
-    fn clock(&self) -> &Clock;
+    /// Properties of the recording as a whole. Notes may grow as the recording is read.
+    fn metadata(&self) -> &Metadata;
 
-    /// What a person should know about how the recording was read, a sentence each: that rows were sorted, that the unit
-    /// of time was inferred.
-    fn notes(&self) -> &[String];
+    /// [`Metadata::clock`].
+    fn clock(&self) -> &Clock {
+        &self.metadata().clock
+    }
 
-    /// What was assumed to know positions at the very times of items, in words that go on after "if": nothing may be said to
-    /// be proved then. None where the recording says them itself.
+    /// [`Metadata::notes`].
+    fn notes(&self) -> &[String] {
+        &self.metadata().notes
+    }
+
+    /// [`Metadata::assumed`].
     fn assumed(&self) -> Option<&str> {
-        None
+        self.metadata().assumed.as_deref()
     }
 
-    /// Whether the height of some vehicle is not known. Then z is 0 in every item and has no meaning: only distances in the
-    /// plane of x and y can be judged, and no question about heights has an answer.
+    /// [`Metadata::is_planar`].
     fn is_planar(&self) -> bool {
-        false
+        self.metadata().is_planar
     }
 
-    /// Whether the recording itself gives the directions of its axes. The axes are then east, north and up.
-    fn has_directions(&self) -> bool {
-        self.earth_origin().is_some()
-    }
-
-    /// What positions are measured from, where the recording has latitudes and longitudes.
+    /// [`Metadata::earth_origin`].
     fn earth_origin(&self) -> Option<&EarthOrigin> {
-        None
+        self.metadata().earth_origin.as_ref()
     }
 }

@@ -5,7 +5,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
-use super::error::ExportError;
+use super::ExportError;
 use super::source::{About, Column, Source};
 
 /// From here on a reader counts times from an epoch again \[s\].

@@ -6,7 +6,7 @@ use std::io::BufWriter;
 
 use mcap::WriteOptions;
 
-use super::error::ExportError;
+use super::ExportError;
 use super::source::{About, Source};
 use crate::mcap::topic::{TopicWriter, encode, log_time_ns};
 use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};

@@ -12,11 +12,11 @@ use nalgebra::Vector3;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::error::ExportError;
+use super::ExportError;
 use super::source::{About, Source, Written};
 use tautline_core::track::Sample;
 
-/// Arrays that mean something to who reads motion.
+/// Names of arrays that readers of motion use.
 const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];
 
 /// Headers of arrays end at a multiple of this \[bytes\].

@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
-use super::error::ExportError;
+use super::ExportError;
 use super::source::{About, Source};
 use crate::read::parquet::EPOCH_KEY;
 use tautline_core::track::Sample;

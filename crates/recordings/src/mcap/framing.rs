@@ -105,7 +105,7 @@ impl RecordReader {
         }
     }
 
-    /// Reads the next record of the file into `body`, or only its opcode where nobody wants the content.
+    /// Reads the next record of the file into `body`, or only its opcode where the content is not used.
     fn read_record(&mut self) -> io::Result<Option<u8>> {
         if self.ended {
             return Ok(None);

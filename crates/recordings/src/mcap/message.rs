@@ -147,7 +147,7 @@ impl<'a> ChannelMessage<&'a str, &'a [String], &'a [f64]> {
 }
 
 impl ChannelMessage<String, Vec<String>, Vec<f64>> {
-    /// The channel of so many vehicles.
+    /// Returns the channel of `vehicles` vehicles.
     pub(crate) fn into_channel(self, vehicles: usize) -> Result<Channel, ReadFault> {
         let (columns, numbers) = (self.columns.len(), self.values.len());
         if Some(numbers) != columns.checked_mul(vehicles) {
@@ -207,7 +207,7 @@ impl SummaryMessage {
     }
 }
 
-/// What stands before the slots that vehicles 1, 2, ... are given: the numbers of those who had them.
+/// Text before the slots that vehicles 1, 2, ... are given. A slot has the number of its previous vehicle.
 const ASSIGNED: &str = "vehicles 1, 2, ... go to the slots of ";
 
 /// The fields of `event.msg`, in order.
@@ -333,7 +333,7 @@ impl EventMessage<String> {
         both.ok_or_else(|| Own::Events.fault("there is no vehicle or obstacle 0".to_owned()))
     }
 
-    /// Those of the text, from 0: an order of so many vehicles.
+    /// Returns the slots in the text, from 0: a permutation of the vehicles.
     fn slots(&self) -> Result<Vec<usize>, ReadFault> {
         let listed = self.text.strip_prefix(ASSIGNED).unwrap_or_default().split_whitespace();
         let slots = listed.map(|number| number.parse::<usize>().ok()?.checked_sub(1)).collect::<Option<Vec<_>>>();

@@ -148,7 +148,7 @@ struct Contents {
 }
 
 impl Contents {
-    /// Takes in one part; `false` when there is none.
+    /// Takes one part; returns `false` at the end of the file.
     fn advance(&mut self, topics: &mut TopicReader) -> Result<bool, RecordError> {
         let taken = match topics.next()? {
             Some(Part::Topic(declared)) => self.declare(declared),

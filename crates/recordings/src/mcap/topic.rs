@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 use super::framing::{self, Fields, Record, RecordReader, damaged};
 use tautline_core::record::{ReadFault, RecordError};
 
-/// Who wrote the file, for MCAP tools.
+/// Name of the writer of the file, for MCAP tools.
 const LIBRARY: &str = concat!("tautline ", env!("CARGO_PKG_VERSION"));
 
 /// How ROS 2 marks plain little-endian CDR at the head of each message.

@@ -48,7 +48,7 @@ type Out = TopicWriter<NoSeek<BufWriter<File>>>;
 ///
 /// Memory holds one chunk ([`FLUSH_BYTES`] and one sample at most) and an index entry of some 200 bytes per chunk
 /// written. [`McapRecorder::finish`] closes the file and reports what went wrong. A recorder that is dropped closes the
-/// file too, but can tell nobody about an error. After an error the file stays as it is and every further call fails.
+/// file too, but cannot report an error. After an error the file stays as it is and every further call fails.
 pub struct McapRecorder {
     path: PathBuf,
     /// Begins with [`Own::ALL`], so that their numbers are their places.

@@ -1,13 +1,25 @@
 //! Directions of the axes of a recording, and recordings turned to x east, y north and z up.
+//!
+//! The directions are those that the user gives, or those that the names of columns give:
+//!
+//! | columns | frame | vehicle |
+//! | --- | --- | --- |
+//! | `north`, `east`, `down` or `up`; `n`, `e`, `d` or `u` | as they say | as in any table |
+//! | `x_ned`, `ned_x` and the like, with any three directions | as they say | as in any table |
+//! | `x`, `y`, `z` beside `ref_lat`, `ref_lon`, `ref_alt` (PX4 `vehicle_local_position`) | north, east, down of the reference | one |
+//! | `px`, `py`, `pz` beside `ledr`, `ledg`, `ledb` (trajectories of MAVSDK Drone Show) | north, east, down | one |
+//! | `p_RS_R_x`, ... (ground truth of `EuRoC`) | x, y, z | one |
 
+use std::collections::BTreeSet;
 use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, ReadError, quoted};
-use super::options::ReadOptions;
+use super::error::{Fault, ReadError, quoted, refuse};
+use super::heading;
+use super::options::{ColumnNames, ReadOptions};
 use super::order::Recording;
-use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Item, Metadata, Tracks};
 
 /// Which axis of a recording becomes x, y and z, and by what it is multiplied.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,10 +149,11 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
     if recording.is_planar() && !options.turn().keeps_plane() {
         let problem = "its third axis would become x or y, and it has none";
         let remedy = "name the column of the third axis with --column z=NAME, or give --axes that leave z in its place";
-        return Err(Fault::coded("recording/contradicts-option", problem, remedy).into());
+        return refuse("recording/contradicts-option", problem, remedy);
     }
-    let notes = [recording.notes(), &[options.turn().note()]].concat();
-    Ok(Box::new(Turned { recording, axes: options.turn(), notes }))
+    let mut metadata = recording.metadata().clone();
+    metadata.notes.push(options.turn().note());
+    Ok(Box::new(Turned { recording, axes: options.turn(), metadata }))
 }
 
 /// Refuses to turn axes whose directions are known, in what is called so.
@@ -148,11 +161,11 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
     if options.turn().is_identity() {
         return Ok(());
     }
-    Err(Fault::coded(
+    refuse(
         "recording/contradicts-option",
         format!("{what} gives the directions of its axes"),
         "leave --axes and signs of --scale away",
-    ))
+    )
 }
 
 /// Refuses to turn a height over that is up by the name of its column.
@@ -163,13 +176,13 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
     let problem =
         format!("column {} says by its name which way is up, and --axes or --scale another way", quoted(column));
     let remedy = format!("leave z as it is there, or have the numbers taken as they are with --column z={column}");
-    Err(Fault::coded("recording/contradicts-option", problem, remedy))
+    refuse("recording/contradicts-option", problem, remedy)
 }
 
 struct Turned {
     recording: Recording,
     axes: Axes,
-    notes: Vec<String>,
+    metadata: Metadata,
 }
 
 impl Tracks for Turned {
@@ -187,12 +200,11 @@ impl Tracks for Turned {
                 Item::Sample(sample) => {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
                         let problem = "its axes are scaled by different numbers, and vehicles have a radius";
-                        return Err(Fault::coded(
+                        return refuse(
                             "recording/contradicts-option",
                             problem,
                             "give one number of metres with --scale",
-                        )
-                        .into());
+                        );
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
@@ -203,30 +215,262 @@ impl Tracks for Turned {
             }
         }
         if !more {
-            let turned = self.axes.note();
-            self.notes = [self.recording.notes(), &[turned]].concat();
+            self.metadata.notes = [self.recording.notes(), &[self.axes.note()]].concat();
         }
         Ok(more)
     }
 
-    fn clock(&self) -> &Clock {
-        self.recording.clock()
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+}
+
+/// The remedy for positions that are relative to a place of each vehicle.
+pub(super) const GLOBAL: &str =
+    "give vehicle_global_position in its place: its lat, lon and alt are measured from one place for all vehicles";
+
+/// What stands between the words of a name.
+const SEPARATORS: [char; 4] = ['_', '.', '/', ' '];
+
+/// Words that name a frame. Others of such letters are words of English, such as `end`.
+const FRAMES: [&str; 5] = ["enu", "ned", "nwu", "seu", "eus"];
+
+/// What the set of columns of a table says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Convention {
+    /// The names of the columns as any other table has them.
+    pub(super) header: Vec<String>,
+    /// What the numbers of each column are multiplied by: -1 where an axis points the other way.
+    pub(super) signs: Vec<f64>,
+    /// Columns that lie along an axis of known direction.
+    pub(super) directed: BTreeSet<usize>,
+    /// Columns of latitude, longitude and height of the place that positions are measured from.
+    pub(super) reference: Option<[usize; 3]>,
+    /// Columns that hold 0 where the position is not known.
+    pub(super) valid: Vec<usize>,
+    /// Whether times count from the start of each vehicle's computer, in microseconds.
+    pub(super) counts_from_boot: bool,
+    /// Whether the table is of one vehicle, whatever other columns it has.
+    pub(super) is_one_vehicle: bool,
+    /// What a person should know.
+    pub(super) note: Option<String>,
+}
+
+impl Convention {
+    /// What these columns say. Nothing beside the names themselves where the user names columns of positions.
+    pub(super) fn of(header: &[String], options: &ReadOptions) -> Result<Self, Fault> {
+        let plain = Self { header: header.to_vec(), signs: vec![1.0; header.len()], ..Self::default() };
+        let is_place = |role: usize| !matches!(ColumnNames::ROLES[role], "t" | "id" | "radius");
+        if options.columns.given().any(|(role, _)| is_place(role)) {
+            return Ok(plain);
+        }
+        let lower: Vec<String> = header.iter().map(|name| name.trim().to_lowercase()).collect();
+        let found = match plain.of_px4(&lower)? {
+            Some(found) => Some(found),
+            None => {
+                plain.of_drone_show(&lower).or_else(|| plain.of_euroc(&lower)).or_else(|| plain.of_directions(&lower))
+            }
+        };
+        Ok(found.unwrap_or(plain))
     }
 
-    fn notes(&self) -> &[String] {
-        &self.notes
+    /// Whether the directions of axes are known.
+    pub(super) fn has_directions(&self) -> bool {
+        !self.directed.is_empty()
     }
 
-    fn assumed(&self) -> Option<&str> {
-        self.recording.assumed()
+    /// Gives a column that lies along an axis of these its name, with what the name has before and behind the axis.
+    fn turn(&mut self, column: usize, axes: &Axes, axis: usize, [before, behind]: [&str; 2]) {
+        let (to, sign) = axes.of(axis);
+        self.header[column] = format!("{before}{}{behind}", ["x", "y", "z"][to]);
+        self.signs[column] = sign;
+        self.directed.insert(column);
     }
 
-    fn is_planar(&self) -> bool {
-        self.recording.is_planar()
+    /// Turns the columns of this start and an axis, such as `vx`.
+    fn turn_all(&mut self, lower: &[String], start: &str, axes: &Axes) {
+        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+            let named = lower.iter().enumerate().filter(|(_, name)| name.strip_prefix(start) == Some(letter));
+            for (column, _) in named {
+                self.turn(column, axes, axis, [start, ""]);
+            }
+        }
     }
 
-    fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.recording.earth_origin()
+    fn of_px4(&self, lower: &[String]) -> Result<Option<Self>, Fault> {
+        let at = |name: &str| lower.iter().position(|known| known == name);
+        let (Some(_), Some(_), Some(lat), Some(lon)) = (at("x"), at("y"), at("ref_lat"), at("ref_lon")) else {
+            return Ok(None);
+        };
+        let Some(alt) = at("ref_alt") else {
+            let problem = "its positions are relative to `ref_lat` and `ref_lon`, and there is no column `ref_alt`";
+            return refuse("recording/missing-column", problem, GLOBAL);
+        };
+        let mut px4 = self.clone();
+        for start in ["", "v"] {
+            px4.turn_all(lower, start, &ned());
+        }
+        px4.reference = Some([lat, lon, alt]);
+        px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(at).collect();
+        px4.counts_from_boot = at("timestamp").is_some();
+        px4.is_one_vehicle = true;
+        let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt`, as PX4 writes them";
+        let clock = "; times count from the start of the vehicle's computer";
+        px4.note = Some(format!("{what}{}", if px4.counts_from_boot { clock } else { "" }));
+        Ok(Some(px4))
+    }
+
+    fn of_drone_show(&self, lower: &[String]) -> Option<Self> {
+        let is_there = |name: &str| lower.iter().any(|known| known == name);
+        if !["t", "px", "py", "pz", "ledr", "ledg", "ledb"].into_iter().all(is_there) {
+            return None;
+        }
+        let mut show = self.clone();
+        for start in ["p", "v"] {
+            show.turn_all(lower, start, &ned());
+        }
+        show.is_one_vehicle = true;
+        show.note = Some("positions are north, east and down, as MAVSDK Drone Show writes them".to_owned());
+        Some(show)
+    }
+
+    fn of_euroc(&self, lower: &[String]) -> Option<Self> {
+        lower.iter().find(|name| name.starts_with("p_rs_r_x"))?;
+        let mut truth = self.clone();
+        for (column, name) in lower.iter().enumerate() {
+            let stem = heading::bracketed(name).0;
+            if let Some(axis) = stem.strip_prefix("p_rs_r_") {
+                truth.header[column] = format!("{axis} [m]");
+            } else if let Some(axis) = stem.strip_prefix("v_rs_r_") {
+                truth.header[column] = format!("v{axis} [m/s]");
+            }
+        }
+        truth.is_one_vehicle = true;
+        Some(truth)
+    }
+
+    /// Columns that are called by directions.
+    fn of_directions(&self, lower: &[String]) -> Option<Self> {
+        let mut turned = self.clone();
+        // `x_ned`, `ned_x`, `cf1.vx_ned [m/s]`.
+        for (column, name) in self.header.iter().enumerate() {
+            let (stem, unit) = without_unit(name);
+            let Some((rest, axes)) = without_frame(stem) else { continue };
+            let start = rest.rfind(SEPARATORS).map_or(0, |at| at + 1);
+            let word = rest[start..].to_lowercase();
+            let axis = ["x", "y", "z"].iter().position(|axis| word.strip_prefix(['v', 'p']).unwrap_or(&word) == *axis);
+            if let Some(axis) = axis {
+                turned.turn(column, &axes, axis, [&rest[..rest.len() - 1], unit]);
+            }
+        }
+        // `north`, `cf1.east [m]`, `vel_d_m_s`.
+        let enu = Axes::default();
+        let places: Vec<_> = lower.iter().filter_map(|name| Direction::of(without_unit(name).0)).collect();
+        let across = |axis: usize, is_letter: bool| {
+            places.iter().any(|of| of.axis == axis && of.is_letter == is_letter && !of.is_velocity)
+        };
+        let has_words = across(0, false) && across(1, false);
+        let has_letters = across(0, true) && across(1, true) && across(2, true);
+        for (column, name) in self.header.iter().enumerate() {
+            let (stem, unit) = without_unit(name);
+            let Some(of) = Direction::of(stem) else { continue };
+            let is_meant = if of.is_letter { has_letters || (has_words && of.is_velocity) } else { has_words };
+            if is_meant {
+                let before = if of.is_velocity { format!("{}v", of.vehicle) } else { of.vehicle.to_owned() };
+                turned.turn(column, &enu, of.axis, [&before, unit]);
+                turned.signs[column] = of.sign;
+            }
+        }
+        if !turned.has_directions() {
+            return None;
+        }
+        turned.note = Some("positions are turned to east, north and up, as the names of columns say".to_owned());
+        Some(turned)
+    }
+}
+
+fn ned() -> Axes {
+    Axes::from_name("ned").unwrap_or_default()
+}
+
+/// A name without the unit at its end, and this end as it is written.
+fn without_unit(name: &str) -> (&str, &str) {
+    let name = name.trim();
+    let stem = match heading::bracketed(name) {
+        (stem, Some(_)) => stem,
+        (_, None) => heading::endings(name).next().map_or(name, |(stem, ..)| stem),
+    };
+    name.split_at(stem.len())
+}
+
+/// A name without the word that says a frame, and the axes of that.
+fn without_frame(stem: &str) -> Option<(String, Axes)> {
+    let lower = stem.to_lowercase();
+    // A name that changes its length in lower case is none of ours.
+    let words = lower.split(SEPARATORS).filter(|_| lower.len() == stem.len());
+    let (at, word, axes) = words
+        .map(|word| (word.as_ptr() as usize - lower.as_ptr() as usize, word))
+        .find_map(|(at, word)| Some((at, word, Axes::from_name(word).filter(|_| FRAMES.contains(&word))?)))?;
+    let (before, behind) = (&stem[..at], &stem[at + word.len()..]);
+    // One of the two separators around it goes with it.
+    let rest = if behind.is_empty() {
+        before.strip_suffix(SEPARATORS)?.to_owned()
+    } else {
+        format!("{before}{}", behind.strip_prefix(SEPARATORS)?)
+    };
+    (!rest.is_empty()).then_some((rest, axes))
+}
+
+/// A column that is called by a direction.
+#[derive(Debug, PartialEq)]
+struct Direction<'a> {
+    /// What stands before the quantity, with its separator.
+    vehicle: &'a str,
+    is_velocity: bool,
+    /// East, north or up.
+    axis: usize,
+    sign: f64,
+    is_letter: bool,
+}
+
+impl<'a> Direction<'a> {
+    fn of(stem: &'a str) -> Option<Self> {
+        const WORDS: [(&[&str], usize, f64); 6] = [
+            (&["east", "easting"], 0, 1.0),
+            (&["west"], 0, -1.0),
+            (&["north", "northing"], 1, 1.0),
+            (&["south"], 1, -1.0),
+            (&["up"], 2, 1.0),
+            (&["down"], 2, -1.0),
+        ];
+        const LETTERS: [(&str, usize, f64); 4] = [("e", 0, 1.0), ("n", 1, 1.0), ("u", 2, 1.0), ("d", 2, -1.0)];
+        let end = stem.rfind(SEPARATORS).map_or(0, |at| at + 1);
+        let word = stem[end..].to_lowercase();
+        let mut before = &stem[..end];
+        let by_word = WORDS.iter().find(|(words, ..)| words.contains(&&*word)).map(|&(_, axis, sign)| (axis, sign));
+        let by_letter = || LETTERS.iter().find(|(letter, ..)| *letter == word).map(|&(_, axis, sign)| (axis, sign));
+        let by_velocity = || {
+            let letter = word.strip_prefix('v')?;
+            LETTERS.iter().find(|(known, ..)| *known == letter).map(|&(_, axis, sign)| (axis, sign))
+        };
+        let (is_letter, mut is_velocity, (axis, sign)) = match by_word {
+            Some(found) => (false, false, found),
+            None => match by_letter() {
+                Some(found) => (true, false, found),
+                None => (true, true, by_velocity()?),
+            },
+        };
+        // The quantity before it: `vel_n`, `position_east`.
+        let quantity = before.trim_end_matches(SEPARATORS);
+        let start = quantity.rfind(SEPARATORS).map_or(0, |at| at + 1);
+        match quantity[start..].to_lowercase().as_str() {
+            "v" | "vel" | "velocity" => (is_velocity, before) = (true, &before[..start]),
+            "p" | "pos" | "position" => before = &before[..start],
+            // A letter alone behind the name of anything may be anything.
+            _ if is_letter && !quantity.is_empty() => return None,
+            _ => {}
+        }
+        Some(Self { vehicle: before, is_velocity, axis, sign, is_letter })
     }
 }
 
@@ -264,5 +508,48 @@ mod tests {
             Axes::default().scaled([1.0, -1.0, 1.0]).keeps_lengths() && !ned.scaled([1.0, 2.0, 1.0]).keeps_lengths()
         );
         assert!(ned.turn(Vector3::zeros()).iter().all(|x| x.is_sign_positive()));
+    }
+
+    fn convention(header: &str) -> Convention {
+        let header: Vec<_> = header.split(',').map(str::to_owned).collect();
+        Convention::of(&header, &ReadOptions::default()).expect("a convention")
+    }
+
+    #[test]
+    fn names_that_say_a_frame_are_turned() {
+        for (header, expected, signs) in [
+            ("t,north,east,down", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
+            ("t,n,e,d", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
+            ("t,e,n,u", "t,x,y,z", [1.0; 4]),
+            ("t,North [m],East [m],Up [m]", "t,y [m],x [m],z [m]", [1.0; 4]),
+            ("t,cf1.north_m,cf1.east_m,cf1.down_m", "t,cf1.y_m,cf1.x_m,cf1.z_m", [1.0, 1.0, 1.0, -1.0]),
+            ("t,x_ned,y_ned,z_ned", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
+            ("t,ned_x,ned_y,ned_z", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
+            ("t,cf1.x_nwu [m],cf1.y_nwu [m],cf1.z_nwu [m]", "t,cf1.y [m],cf1.x [m],cf1.z [m]", [1.0, 1.0, -1.0, 1.0]),
+            ("t,pos_n,pos_e,pos_d", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
+        ] {
+            let found = convention(header);
+            assert_eq!((found.header.join(","), &found.signs[..]), (expected.to_owned(), &signs[..]), "{header}");
+            assert!(found.has_directions(), "{header}");
+        }
+        let velocities = convention("t,north,east,down,vel_n_m_s,v_east,vd");
+        assert_eq!(velocities.header[4..], ["vy_m_s", "vx", "vz"]);
+        assert_eq!(velocities.signs[4..], [1.0, 1.0, -1.0]);
+    }
+
+    #[test]
+    fn other_names_stay() {
+        for header in [
+            "t,x,y,z",
+            "t,x,y,up",
+            "t,e,f,g",
+            "t,n,x,y",
+            "t,lat,lon,vel_n_m_s,vel_e_m_s",
+            "t,x,y,depth,n_e",
+            "t,end_x,end_y,max_ned",
+        ] {
+            let found = convention(header);
+            assert_eq!((found.header.join(","), found.has_directions()), (header.to_owned(), false), "{header}");
+        }
     }
 }

@@ -1,4 +1,22 @@
-//! What the tables of motion capture share: rows below a head of several lines, a vehicle in several markers.
+//! CSV exports of motion capture: takes of `OptiTrack` Motive, and of Vicon Nexus and Tracker. Rows follow a head of several
+//! lines. A vehicle has one or several markers.
+//!
+//! An export of Vicon has sections, each with a rate, names, axes and units above its rows:
+//!
+//! ```text
+//! Trajectories
+//! 100
+//! ,,cf1:front,,,cf1:back,,
+//! Frame,Sub Frame,X,Y,Z,X,Y,Z
+//! ,,mm,mm,mm,mm,mm,mm
+//! 1,0,102.5,-3.1,955.0,82.5,-3.0,955.1
+//! ```
+//!
+//! Objects have translations (`TX`, `TY`, `TZ`) beside their rotations. A section with translations is read if the file has
+//! one, else the trajectories of markers.
+//!
+//! The first line of a take of Motive gives the unit of length. Some five lines name the columns: type, name, ID, perhaps the
+//! parent, the quantity (`Position`) and its axis. The y axis is up. Rigid bodies are read, or markers where there are none.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str;
@@ -6,50 +24,48 @@ use std::str;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::heading;
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::readers::{Packing, Reader, Takes};
 use super::source::{Lines, Source};
 
-/// When a row is.
+/// Time of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum When {
+enum When {
     /// In a column \[s\].
     Column(usize),
-    /// The first column counts frames, of which there are so many in a second; the second one parts of frames, if any.
+    /// The first column counts frames at this rate \[Hz\]; the second column counts parts of frames.
     Frames(f64),
 }
 
 /// A vehicle, with the columns x, y and z of its markers.
-pub(super) type Marked = (String, Vec<[usize; 3]>);
+type Marked = (String, Vec<[usize; 3]>);
 
-/// What stands in the columns of a table.
-pub(super) struct Capture {
+/// Columns of a table.
+struct Capture {
     /// The line of the first row, from 1.
-    pub(super) first_line: u64,
-    pub(super) when: When,
+    first_line: u64,
+    when: When,
     /// Vehicles, each with the columns x, y and z of its markers: its place is the middle of these.
-    pub(super) vehicles: Vec<Marked>,
+    vehicles: Vec<Marked>,
     /// The length of a unit \[m\].
-    pub(super) metres: f64,
-    /// Whether y is up, and z towards the one who looks along it.
-    pub(super) y_up: bool,
-    pub(super) notes: Vec<String>,
+    metres: f64,
+    /// Whether y is up, x right and z backwards.
+    y_up: bool,
+    notes: Vec<String>,
 }
 
 /// Groups the columns of markers by what is before the colon of their names: these are on one vehicle. Two markers of one
 /// name are refused: their middle would be where neither is.
-pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> {
+fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> {
     let mut vehicles: Vec<Marked> = Vec::new();
     let (mut known, mut names) = (BTreeMap::new(), BTreeSet::new());
     for (name, columns) in markers {
         if !names.insert(name.clone()) {
             let problem = format!("two markers are called {}", quoted(&name));
-            return Err(Fault::coded(
-                "recording/vehicle-twice",
-                problem,
-                "give each a name of its own, and export it again",
-            ));
+            return refuse("recording/vehicle-twice", problem, "give each a name of its own, and export it again");
         }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
         let at = *known.entry(subject.clone()).or_insert(vehicles.len());
@@ -62,7 +78,7 @@ pub(super) fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marke
 }
 
 /// Names that are not read, a few of them by name.
-pub(super) fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Option<String> {
+fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Option<String> {
     const LISTED: usize = 8;
     let others: BTreeSet<_> = others.collect();
     let more = others.len().saturating_sub(LISTED);
@@ -72,7 +88,7 @@ pub(super) fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str
 }
 
 /// Which vehicles are the middle of several markers.
-pub(super) fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
+fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
     let several = vehicles.iter().filter(|(_, markers)| markers.len() > 1);
     let several: Vec<_> = several.map(|(name, markers)| format!("{name} ({})", markers.len())).collect();
     let what = "the middle of markers, where all of them are seen, is the place of";
@@ -80,10 +96,10 @@ pub(super) fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
 }
 
 /// Opens a table with these columns.
-pub(super) fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
+fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.metres() != 1.0 {
         let problem = format!("it says its unit of length, and --scale {} another", options.metres());
-        return Err(Fault::coded("recording/contradicts-option", problem, "leave --scale away").into());
+        return refuse("recording/contradicts-option", problem, "leave --scale away");
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
     let (said, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
@@ -121,11 +137,7 @@ impl Table {
             When::Frames(rate) => {
                 if let Some(part) = number(cells, 1)?.filter(|part| *part != 0.0) {
                     let problem = format!("it is part {part} of a frame");
-                    return Err(Fault::coded(
-                        "recording/frame-rate",
-                        problem,
-                        "export trajectories at the rate of the cameras",
-                    ));
+                    return refuse("recording/frame-rate", problem, "export trajectories at the rate of the cameras");
                 }
                 Ok(Stamp::Real(needed(0)? / rate))
             }
@@ -154,11 +166,11 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
 fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
         let problem = format!("it has {} fields, and field {} belongs to a vehicle", cells.len(), column + 1);
-        return Err(Fault::coded(
+        return refuse(
             "recording/field-count",
             problem,
             "every line needs a field for each column; a marker that is lost has empty ones",
-        ));
+        );
     };
     let text = str::from_utf8(cell).map_err(|_| Fault::NotUtf8)?;
     match text.parse::<f64>() {
@@ -167,11 +179,7 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
         Ok(_) => Err(Fault::not_finite(&(column + 1).to_string(), text, UNSEEN)),
         Err(_) => {
             let problem = format!("column `{}` holds {}, which is not a number", column + 1, quoted(text));
-            Err(Fault::coded(
-                "recording/not-a-number",
-                problem,
-                "export it again, with numbers that have a decimal point",
-            ))
+            refuse("recording/not-a-number", problem, "export it again, with numbers that have a decimal point")
         }
     }
 }
@@ -197,5 +205,299 @@ impl Rows for Table {
 
     fn place(&self, number: u64) -> Place {
         Place::Line(number)
+    }
+}
+
+pub(super) const MOTIVE: Reader = Reader {
+    name: "motive",
+    title: "a take of OptiTrack Motive",
+    extensions: &["csv"],
+    docs: "Take of OptiTrack Motive as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
+    open: open_motive,
+    takes: &[Takes::Rows],
+    packing: Packing::Any,
+};
+
+/// Lines among which those that name the columns are.
+const HEAD_LINES: u64 = 20;
+
+const EXPORT: &str = "export the take again as CSV, with header information and positions";
+
+/// The lines that name the columns.
+#[derive(Default)]
+struct MotiveHead {
+    /// What the first line says: names and values by turns.
+    said: Vec<String>,
+    types: Vec<String>,
+    names: Vec<String>,
+    measures: Vec<String>,
+    axes: Vec<String>,
+    first_line: u64,
+}
+
+/// Opens a take.
+fn open_motive(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let head = MotiveHead::read(source)?;
+    let capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
+    open(source, capture, options)
+}
+
+impl MotiveHead {
+    fn read(source: &Source) -> Result<Self, ReadError> {
+        let mut head = Self::default();
+        let mut lines = Lines::new(source)?;
+        let mut before = Vec::new();
+        while lines.number() < HEAD_LINES && lines.advance()? {
+            let text = std::str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(Place::Line(lines.number())))?;
+            let cells: Vec<String> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
+            match (lines.number(), cells.first().map(String::as_str), cells.get(1).map(String::as_str)) {
+                (1, ..) => head.said = cells,
+                (_, Some("Frame"), _) => {
+                    (head.axes, head.measures, head.first_line) = (cells, before, lines.number() + 1);
+                    return Ok(head);
+                }
+                (_, _, Some("Type")) => head.types = cells,
+                (_, _, Some("Name")) => head.names = cells,
+                _ => before = cells,
+            }
+        }
+        Err(Fault::Truncated("the lines that name the columns are missing".to_owned()).into())
+    }
+
+    /// What the first line says of something.
+    fn said(&self, what: &str) -> Option<&str> {
+        self.said.iter().position(|said| said == what).and_then(|at| self.said.get(at + 1)).map(String::as_str)
+    }
+
+    fn capture(&self) -> Result<Capture, Fault> {
+        let unit = self.said("Length Units").unwrap_or_default();
+        let metres = heading::size_of(unit, false).ok_or_else(|| {
+            Fault::coded(
+                "recording/unknown-unit",
+                format!("its unit of length is not known: {}", quoted(unit)),
+                "export it in metres",
+            )
+        })?;
+        if let Some(space) = self.said("Coordinate Space").filter(|space| *space != "Global") {
+            let problem = format!("its places are given in the space {}", quoted(space));
+            return refuse("recording/unusable-frame", problem, "export it in global coordinates");
+        }
+        let time = self.axes.iter().position(|name| name.starts_with("Time"));
+        let time =
+            time.ok_or_else(|| Fault::coded("recording/no-time-column", "there is no column of time", EXPORT))?;
+        let bodies = self.positions("Rigid Body");
+        let has_bodies = !bodies.is_empty();
+        let vehicles = if has_bodies {
+            bodies.into_iter().map(|(name, columns)| (name, vec![columns])).collect()
+        } else {
+            by_subject(self.positions("Marker"))?
+        };
+        if vehicles.is_empty() {
+            return refuse(
+                "recording/no-positions",
+                "it has neither the position of a rigid body nor of a labelled marker",
+                EXPORT,
+            );
+        }
+        let mut known = BTreeSet::new();
+        if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
+            let problem = format!("two rigid bodies are called {}", quoted(name));
+            return refuse(
+                "recording/vehicle-twice",
+                problem,
+                "give each a name of its own, and export the take again",
+            );
+        }
+        let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
+        notes.extend(note_of_markers(&vehicles));
+        let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
+        let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));
+        let why = if has_bodies { "being no rigid bodies" } else { "being no labelled markers" };
+        notes.extend(note_of_others(why, others));
+        Ok(Capture { first_line: self.first_line, when: When::Column(time), vehicles, metres, y_up: true, notes })
+    }
+
+    /// The columns of the positions of things of a type.
+    fn positions(&self, wanted: &str) -> Vec<(String, [usize; 3])> {
+        let is = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
+        let starts = (2..self.axes.len()).filter(|&column| {
+            is(&self.types, column, wanted)
+                && ["X", "Y", "Z"].iter().enumerate().all(|(axis, name)| {
+                    is(&self.measures, column + axis, "Position") && is(&self.axes, column + axis, name)
+                })
+        });
+        let named =
+            starts.filter_map(|column| Some((self.names.get(column)?.clone(), [column, column + 1, column + 2])));
+        named.filter(|(name, _)| !name.is_empty() && !name.starts_with("Unlabeled")).collect()
+    }
+}
+
+pub(super) const VICON: Reader = Reader {
+    name: "vicon",
+    title: "an export of Vicon",
+    extensions: &["csv"],
+    docs: "Export of Vicon Nexus or Tracker as CSV",
+    magic: &[],
+    sniff: |head| head.is_text(is_export),
+    open: open_vicon,
+    takes: &[Takes::Rows, Takes::Axes],
+    packing: Packing::Any,
+};
+
+/// Names that a first section has.
+const SECTIONS: [&str; 9] =
+    ["Trajectories", "Objects", "Object", "Segments", "Model Outputs", "Devices", "Events", "Joints", "Global Angle"];
+
+/// The section of markers.
+const MARKERS: &str = "Trajectories";
+
+/// Whether a text begins as an export does: a section, and its rate.
+fn is_export(text: &[u8]) -> bool {
+    let mut lines = text.split(|&byte| byte == b'\n').map(cells);
+    let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
+    let rate = second.first().and_then(|rate| rate.parse::<f64>().ok());
+    first.first().is_some_and(|name| SECTIONS.contains(&name.as_str())) && rate.is_some()
+}
+
+/// The cells of a line without empty ones at its end.
+fn cells(line: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(line);
+    let mut cells: Vec<_> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
+    while cells.pop_if(|cell| cell.is_empty()).is_some() {}
+    cells
+}
+
+/// The lines above the rows of a section.
+struct ViconSection {
+    section: String,
+    rate: String,
+    names: Vec<String>,
+    axes: Vec<String>,
+    units: Vec<String>,
+    first_line: u64,
+}
+
+/// Opens an export.
+fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let heads = heads(source)?;
+    let objects = heads.iter().find(|head| head.axes.iter().any(|axis| axis == "TX"));
+    let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
+        let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
+        let problem = format!("it has neither objects nor trajectories, but {}", sections.join(", "));
+        return refuse(
+            "recording/no-positions",
+            problem,
+            "export the trajectories of markers, or the objects of Tracker",
+        );
+    };
+    let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
+    let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
+    let others = heads.iter().filter(|other| other.first_line != head.first_line).flat_map(|other| &other.names);
+    let others =
+        others.map(|name| subject(name)).filter(|name| !name.is_empty() && !name.starts_with('*') && !read(name));
+    let note = note_of_others(&format!("beside those of the section {}", head.section), others);
+    capture.notes.extend(note);
+    open(source, capture, options)
+}
+
+/// Returns the vehicle of a marker.
+fn subject(name: &str) -> &str {
+    name.split(':').next().unwrap_or_default()
+}
+
+/// The heads of all sections: behind a blank line, or at the begin.
+fn heads(source: &Source) -> Result<Vec<ViconSection>, ReadError> {
+    let mut lines = Lines::new(source)?;
+    let (mut heads, mut blank) = (Vec::new(), true);
+    while lines.advance()? {
+        let is_first =
+            std::mem::replace(&mut blank, lines.line().iter().all(|byte| matches!(byte, b',' | b' ' | b'\t')));
+        let section = if is_first && !blank { cells(lines.line()) } else { continue };
+        if section.len() != 1 {
+            continue;
+        }
+        let mut head = Vec::new();
+        while head.len() < 4 && !blank && lines.advance()? {
+            head.push(cells(lines.line()));
+            blank = head.last().is_some_and(Vec::is_empty);
+        }
+        let Ok([rate, names, axes, units]) = <[Vec<String>; 4]>::try_from(head) else { continue };
+        if axes.first().is_some_and(|cell| cell == "Frame") {
+            let [section, rate] = [section, rate].map(|cells| cells.into_iter().next().unwrap_or_default());
+            heads.push(ViconSection { section, rate, names, axes, units, first_line: lines.number() + 1 });
+        }
+    }
+    if heads.is_empty() {
+        return Err(Fault::Truncated("the lines that name the columns are missing".to_owned()).into());
+    }
+    Ok(heads)
+}
+
+impl ViconSection {
+    fn capture(&self) -> Result<Capture, Fault> {
+        let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+        let rate = rate.ok_or_else(|| {
+            let problem = format!("the rate of {} is {}", self.section, quoted(&self.rate));
+            Fault::coded(
+                "recording/frame-rate",
+                problem,
+                "export it again: the second line of a section says how many frames a second has",
+            )
+        })?;
+        let is_objects = self.axes.iter().any(|axis| axis == "TX");
+        let markers = self.markers(if is_objects { ["TX", "TY", "TZ"] } else { ["X", "Y", "Z"] });
+        let metres = self.metres(&markers)?;
+        let parts = markers.len();
+        let vehicles = by_subject(markers)?;
+        if vehicles.is_empty() {
+            return refuse(
+                "recording/no-positions",
+                "it names no marker and no object",
+                "export it again, with labelled trajectories",
+            );
+        }
+        if is_objects && vehicles.len() < parts {
+            let several = vehicles.iter().find(|(_, of)| of.len() > 1).map_or("", |(name, _)| name);
+            let problem = format!("{} has several segments", quoted(several));
+            return refuse(
+                "recording/ambiguous-column",
+                problem,
+                "export objects of one segment each, or the trajectories of markers",
+            );
+        }
+        let notes = note_of_markers(&vehicles).into_iter().collect();
+        let when = When::Frames(rate);
+        Ok(Capture { first_line: self.first_line, when, vehicles, metres, y_up: false, notes })
+    }
+
+    /// The columns of each name that has these axes.
+    fn markers(&self, axes: [&str; 3]) -> Vec<(String, [usize; 3])> {
+        let named: Vec<_> = (2..self.names.len()).filter(|&column| !self.names[column].is_empty()).collect();
+        let ends = named.iter().skip(1).copied().chain([self.axes.len()]);
+        let columns = |(&from, to): (&usize, usize)| {
+            let of = |axis: &str| (from..to.min(self.axes.len())).find(|&column| self.axes[column] == axis);
+            Some((self.names[from].clone(), [of(axes[0])?, of(axes[1])?, of(axes[2])?]))
+        };
+        named.iter().zip(ends).filter_map(columns).filter(|(name, _)| !name.starts_with('*')).collect()
+    }
+
+    /// The length of the unit that all columns of places have.
+    fn metres(&self, markers: &[(String, [usize; 3])]) -> Result<f64, Fault> {
+        let mut units = markers.iter().flat_map(|(_, columns)| columns).map(|&column| self.units.get(column));
+        let first = units.next().flatten().map_or("", String::as_str);
+        if let Some(other) = units.find(|unit| unit.map_or("", |unit| unit.as_str()) != first) {
+            let problem =
+                format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
+            return refuse("recording/unit-conflict", problem, "export all in millimetres");
+        }
+        heading::size_of(first, false).ok_or_else(|| {
+            Fault::coded(
+                "recording/unknown-unit",
+                format!("its unit of length is not known: {}", quoted(first)),
+                "export it in millimetres",
+            )
+        })
     }
 }

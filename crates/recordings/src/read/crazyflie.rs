@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use super::csv::Text;
 use super::curves::{Curves, piece};
-use super::error::{Fault, ReadError, quoted};
+use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
@@ -51,12 +51,7 @@ pub(super) fn open(
     let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("it has no vehicle {}, whose start is given", quoted(name));
-        return Err(Fault::coded(
-            "recording/unknown-vehicle",
-            problem,
-            "name vehicles in --start as their files are called",
-        )
-        .into());
+        return refuse("recording/unknown-vehicle", problem, "name vehicles in --start as their files are called");
     }
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
@@ -144,7 +139,7 @@ impl Curve {
         let to_s = self.time_s + duration_s;
         if duration_s <= 0.0 || to_s <= self.time_s {
             let problem = format!("the piece lasts {duration_s} s");
-            return Err(Fault::coded("recording/duration", problem, "take pieces without a duration out"));
+            return refuse("recording/duration", problem, "take pieces without a duration out");
         }
         let mut coefficients = Vec::with_capacity(columns.powers.len());
         for &[x, y, z] in &columns.powers {

@@ -10,17 +10,14 @@ use std::str;
 use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
-use super::columns::Body;
-use super::conventions::Convention;
-use super::error::{Fault, Place, ReadError, quoted};
-use super::identity::Slots;
-use super::layout::Layout;
+use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::layout::{Body, Layout};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
 use super::source::{Lines, Source};
 use super::table::Cells;
-use super::{columns, heading, table};
+use super::{clock, heading, table};
 
 /// A table in CSV, or text without a row.
 pub(super) const CSV: Reader = Reader {
@@ -128,7 +125,7 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
                                whole";
                 let remedy = "give --format trajnet, or --dimensions 3 for a time and a position";
-                return Err(Fault::coded("recording/ambiguous-layout", problem, remedy).into());
+                return refuse("recording/ambiguous-layout", problem, remedy);
             }
             Likeness::None => {}
         }
@@ -142,11 +139,11 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
-        _ if options.dimensions.is_some() => Err(Fault::coded(
+        _ if options.dimensions.is_some() => refuse(
             "recording/contradicts-option",
             "its header says which numbers are a vehicle's",
             "leave --dimensions away",
-        )),
+        ),
         // What stands above numbers may be a remark.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
@@ -190,15 +187,15 @@ impl Text {
         let line = self.lines.line();
         if line.contains(&b'\r') {
             let remedy = "save it with the line ends of Unix or Windows";
-            return Err(Fault::coded(
+            return refuse(
                 "recording/line-ends",
                 "its lines end with carriage returns alone, as those of old Macintoshes",
                 remedy,
-            ));
+            );
         }
         if let Some(value) = decimal_comma(line) {
             let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
-            return Err(Fault::coded("recording/decimal-comma", problem, "write numbers with a decimal point"));
+            return refuse("recording/decimal-comma", problem, "write numbers with a decimal point");
         }
         self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
@@ -213,7 +210,7 @@ impl Text {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
             let remedy =
                 "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
-            return Err(Fault::coded("recording/wrong-format", problem, remedy));
+            return refuse("recording/wrong-format", problem, remedy);
         }
         if numeric {
             self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
@@ -231,18 +228,14 @@ impl Text {
         } else {
             let remedy = "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with \
                           a row for each time";
-            return Err(Fault::coded(
-                "recording/no-header",
-                "the first line holds numbers and no names of columns",
-                remedy,
-            ));
+            return refuse("recording/no-header", "the first line holds numbers and no names of columns", remedy);
         }
         Ok(())
     }
 
     /// Takes a row of units below the header for what it says: each into the name of its column.
     fn take_units(&mut self) -> Result<(), ReadError> {
-        let found = columns::find(&self.header, &ReadOptions::default()).ok().flatten();
+        let found = clock::time_columns(&self.header, &ReadOptions::default()).ok().flatten();
         let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
         if !next_line(&mut self.lines, self.comments)? {
             return Ok(());
@@ -503,11 +496,7 @@ impl Fields {
         let (result, read, _, count) = reader.read_record(&text, &mut unquoted, &mut ends);
         if result != ReadRecordResult::Record || read < text.len() {
             let remedy = "close the quotes on the line where they begin";
-            return Err(Fault::coded(
-                "recording/unclosed-quotes",
-                "its quotes are not closed on the same line",
-                remedy,
-            ));
+            return refuse("recording/unclosed-quotes", "its quotes are not closed on the same line", remedy);
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         self.ends.clear();
@@ -536,20 +525,12 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         let note = format!("there is no header: the numbers are taken as {words}");
         Layout {
             time,
-            rest: None,
-            unit: None,
-            id: None,
-            is_id_given: false,
-            rivals: Vec::new(),
-            suspects: Vec::new(),
             names,
             metres: vec![1.0; count],
-            on_earth: false,
-            convention: Convention::default(),
             is_planar: bodies.iter().any(|body| body.position[2].is_none()),
             bodies,
-            slots: Slots::default(),
             notes: vec![note],
+            ..Layout::default()
         }
     };
     let one = |time, position: [usize; 3], words| {
@@ -572,7 +553,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
                 "say it with --dimensions {}: x and y, x, y and z, and +2 or +3 with their velocities",
                 ways.join(" or ")
             );
-            return Err(Fault::coded("recording/ambiguous-layout", problem, remedy));
+            return refuse("recording/ambiguous-layout", problem, remedy);
         }
         (None, []) if count == 12 => {
             if options.times_per_second.is_none() {
@@ -583,11 +564,11 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         (given, _) => {
             let each = given.map_or(3, |given| given.counts().1);
             let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/field-count",
                 problem,
                 "write t x y z x y z ..., a line for each time, or give other --dimensions",
-            ));
+            );
         }
     };
     let (axes, each) = dimensions.counts();

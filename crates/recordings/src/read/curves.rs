@@ -3,20 +3,20 @@
 use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
+use serde::de::DeserializeOwned;
 
-use super::error::ReadError;
+use super::error::{Fault, Place, ReadError};
 use super::order::{BATCH, Recording};
-use tautline_core::track::{Clock, Item, Piece, Tracks};
+use tautline_core::track::{Item, Metadata, Piece, Tracks};
 
-/// A curve that jumps further than this between two pieces is worth a word \[m\]: files round to micrometres.
+/// Jump between two pieces of a curve from which on the user is told \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 
 /// Pieces of curves in order of time.
 pub(super) struct Curves {
     vehicles: Vec<String>,
     items: std::vec::IntoIter<Item>,
-    clock: Clock,
-    notes: Vec<String>,
+    metadata: Metadata,
 }
 
 impl Curves {
@@ -27,8 +27,7 @@ impl Curves {
         let mut items: Vec<_> = items.into_iter().flatten().collect();
         // Stable: at the same time, in the order of the vehicles.
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        let clock = Clock { unit: "s", ..Clock::default() };
-        Box::new(Self { vehicles, items: items.into_iter(), clock, notes })
+        Box::new(Self { vehicles, items: items.into_iter(), metadata: Metadata::in_seconds(notes) })
     }
 }
 
@@ -45,13 +44,22 @@ impl Tracks for Curves {
         Ok(items.len() > before)
     }
 
-    fn clock(&self) -> &Clock {
-        &self.clock
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
+}
 
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
+/// Reads the JSON of `a_show`; `remedy` helps where it is malformed.
+pub(super) fn from_json<T: DeserializeOwned>(bytes: &[u8], a_show: &str, remedy: &str) -> Result<T, ReadError> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    serde_json::from_slice(text).map_err(|error| {
+        let fault = if error.is_eof() {
+            Fault::Truncated("the JSON ends before it is complete".to_owned())
+        } else {
+            Fault::coded("recording/malformed", format!("it is not the JSON of {a_show}: {error}"), remedy)
+        };
+        fault.at(Place::Line(u64::try_from(error.line()).unwrap_or(0)))
+    })
 }
 
 /// Names that tell all vehicles apart: those given, or numbers where two are the same.

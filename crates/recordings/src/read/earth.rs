@@ -3,14 +3,11 @@
 //! The way is exact and not that of a flat map: to coordinates around the centre of the Earth, and from there into the
 //! frame of the origin. A double resolves 1 nm at that distance, and so do the places.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::axes;
-use super::conventions::GLOBAL;
-use super::error::{Fault, ReadError, quoted};
-use super::heading::{DEPTH, HEIGHT, Heading, POSITION, Role};
+use super::axes::GLOBAL;
+use super::error::{Fault, ReadError, quoted, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Row;
@@ -66,7 +63,7 @@ impl Local {
         // Another file would begin somewhere else.
         let problem = "nothing says what its places on the Earth are measured from, the same for all files";
         let remedy = format!("say it with --origin, such as --origin {}", local.origin());
-        Err(Fault::coded("recording/no-origin", problem, remedy))
+        refuse("recording/no-origin", problem, remedy)
     }
 
     /// A place that is given east, north and up of another origin \[m\].
@@ -130,13 +127,13 @@ fn angles(place: Geodetic) -> [(f64, f64); 2] {
 
 /// A place in the frame of the Earth's centre \[m\].
 fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
-    let range = |what: &str, value: f64, most: f64| {
+    let range = |what: &str, value: f64, most: f64| -> Result<(), Fault> {
         if value.abs() <= most {
             return Ok(());
         }
         let problem = format!("{} is no {what}: it is not within {most} degrees", quoted(&format!("{value:?}")));
         let remedy = "write degrees with decimals; whole numbers of 1e-7 degrees are to be divided by 1e7";
-        Err(Fault::coded("recording/not-on-earth", problem, remedy))
+        refuse("recording/not-on-earth", problem, remedy)
     };
     range("latitude", place.x, 90.0)?;
     range("longitude", place.y, 360.0)?;
@@ -177,16 +174,11 @@ pub(super) fn origin<C: Cells>(
     }
     if reference.is_some() {
         let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
-        return Err(Fault::coded("recording/no-fix", problem, GLOBAL).into());
+        return refuse("recording/no-fix", problem, GLOBAL);
     }
     if unfixed {
         let problem = "no row has a fix: every latitude and longitude is exactly 0";
-        return Err(Fault::coded(
-            "recording/no-fix",
-            problem,
-            "record again once the receiver has a fix, or give another file",
-        )
-        .into());
+        return refuse("recording/no-fix", problem, "record again once the receiver has a fix, or give another file");
     }
     Ok(None)
 }
@@ -241,67 +233,6 @@ pub(super) fn bring(
     row.position = local.place_from(&there, row.position);
     row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
     Ok(true)
-}
-
-/// Columns of a table that are read because their names are those of heights or depths.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Heights {
-    named: BTreeSet<usize>,
-    /// Those that count downwards.
-    downward: BTreeSet<usize>,
-}
-
-impl Heights {
-    /// Gives headings of heights and depths the role of the third axis of positions, whose first axis is `place`, where their
-    /// vehicle has the other two axes and no third of its own. All others are dropped. `found` are the columns that the user
-    /// names.
-    pub(super) fn place(
-        place: Role,
-        header: &[String],
-        found: &mut BTreeMap<(String, Role), usize>,
-        headings: &mut Vec<(usize, Heading<'_>)>,
-    ) -> Self {
-        let (third, mut heights) = (place + 2, Self::default());
-        // The user may call the third axis by either name; `z` means the numbers as they are.
-        let [z, alt] = [POSITION + 2, HEIGHT].map(|role| found.remove(&(String::new(), role)));
-        let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
-        found.extend(given.map(|column| ((String::new(), third), column)));
-        if let Some(column) = alt.filter(|column| given == Some(*column)) {
-            let is_depth = Heading::of(&header[column]).is_some_and(|heading| heading.role == DEPTH);
-            heights.add(column, is_depth);
-        }
-        let all = headings.clone();
-        let has = |vehicle: &str, role: Role| {
-            all.iter().any(|(_, heading)| (heading.vehicle, heading.role) == (vehicle, role))
-                || found.contains_key(&(vehicle.to_owned(), role))
-        };
-        let is_height = |role: Role| matches!(role, HEIGHT | DEPTH);
-        headings.retain(|(_, Heading { vehicle, role, .. })| {
-            let has = |axis: Role| has(vehicle, place + axis);
-            !is_height(*role) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
-        });
-        for (column, heading) in headings.iter_mut().filter(|(_, heading)| is_height(heading.role)) {
-            heights.add(*column, heading.role == DEPTH);
-            heading.role = third;
-        }
-        heights
-    }
-
-    fn add(&mut self, column: usize, is_depth: bool) {
-        self.named.insert(column);
-        self.downward.extend(is_depth.then_some(column));
-    }
-
-    /// Columns that count downwards.
-    pub(super) fn downward(&self) -> impl Iterator<Item = usize> {
-        self.downward.iter().copied()
-    }
-
-    /// Which of these columns are read as heights because of their names, and whether the sign is turned.
-    pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> Vec<(usize, bool)> {
-        let columns: BTreeSet<_> = columns.filter(|column| self.named.contains(column)).collect();
-        columns.into_iter().map(|column| (column, self.downward.contains(&column))).collect()
-    }
 }
 
 #[cfg(test)]

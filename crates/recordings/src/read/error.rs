@@ -206,7 +206,7 @@ impl Fault {
         Self::coded("recording/time-backwards", problem, remedy)
     }
 
-    /// Times are numbers of frames, and nobody says how long one lasts.
+    /// Times are numbers of frames, and the duration of a frame is not given.
     pub(super) fn frames(problem: impl Into<String>) -> Self {
         let remedy = "say how many there are in a second with --fps, such as --fps 30, or how many seconds each lasts \
                       with --time-scale";
@@ -255,6 +255,15 @@ impl Fault {
             Self::Content { remedy, .. } => remedy,
         }
     }
+}
+
+/// Fails with a fault of the content.
+pub(super) fn refuse<T, E: From<Fault>>(
+    code: &'static str,
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> Result<T, E> {
+    Err(Fault::coded(code, problem, remedy).into())
 }
 
 /// A value between backticks, shortened, and without what would steer a terminal.

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use super::error::{Fault, ReadError, quoted};
 use super::identity::spelling;
 use super::order::Recording;
-use super::recognise::is_prose;
+use super::readers::is_prose;
 use super::source::{Archive, Source};
-use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Clock, Item, Metadata, Tracks};
 
 /// Longest number in a file's name that is put in order by its value \[digits\].
 const LONGEST_NUMBER: usize = 20;
@@ -225,10 +225,8 @@ struct Part {
 struct Joined {
     vehicles: Vec<String>,
     parts: Vec<Part>,
-    clock: Clock,
-    notes: Vec<String>,
-    /// Whether some file has no height: then the heights of the others are not used.
-    is_planar: bool,
+    /// Planar where some file has no height: then the heights of the others are not used.
+    metadata: Metadata,
 }
 
 /// One recording out of several with a vehicle each, which is called as its file; `left_out` says what else there is.
@@ -292,7 +290,10 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let waiting = Vec::new().into_iter().peekable();
         joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
-    Ok(Box::new(Joined { vehicles, parts: joined, clock, notes, is_planar }))
+    let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
+    let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).cloned();
+    let metadata = Metadata { clock, notes, assumed, is_planar, earth_origin, ..Metadata::default() };
+    Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }
 
 /// Refuses two files whose rows name the same vehicle, and a file whose rows name the vehicle of another file.
@@ -331,7 +332,10 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
 
 /// Refuses files in different frames: on the Earth and in plain metres, or with and without directions of the axes.
 fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
-    let frame = |tracks: &Recording| (tracks.earth_origin().is_some(), tracks.has_directions());
+    let frame = |tracks: &Recording| {
+        let on_earth = tracks.earth_origin().is_some();
+        (on_earth, on_earth || tracks.metadata().has_directions)
+    };
     let words = |(on_earth, has_directions): (bool, bool)| match (on_earth, has_directions) {
         (true, _) => "are latitudes and longitudes",
         (false, true) => "are east, north and up by the names of its columns",
@@ -401,7 +405,7 @@ impl Tracks for Joined {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
-            part.fill(vehicle, self.is_planar)?;
+            part.fill(vehicle, self.metadata.is_planar)?;
         }
         // Unread items of any part are not earlier than this.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
@@ -412,30 +416,14 @@ impl Tracks for Joined {
         if items.len() == before {
             // Some of what a person should know shows at the end.
             for part in &self.parts {
-                note_new(&mut self.notes, part.tracks.notes());
+                note_new(&mut self.metadata.notes, part.tracks.notes());
             }
         }
         Ok(items.len() > before)
     }
 
-    fn clock(&self) -> &Clock {
-        &self.clock
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn assumed(&self) -> Option<&str> {
-        self.parts.iter().find_map(|part| part.tracks.assumed())
-    }
-
-    fn is_planar(&self) -> bool {
-        self.is_planar
-    }
-
-    fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.parts.iter().find_map(|part| part.tracks.earth_origin())
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 }
 

@@ -1,7 +1,23 @@
 //! Names of columns: a quantity, perhaps of one vehicle, perhaps with a unit; and the units.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted};
+use super::error::{Fault, quoted, refuse};
+
+/// A list of words with blanks between them.
+#[derive(Clone, Copy)]
+pub(super) struct Words(pub(super) &'static str);
+
+impl Words {
+    fn iter(self) -> impl Iterator<Item = &'static str> {
+        self.0.split(' ')
+    }
+
+    pub(super) fn contains(self, word: &str) -> bool {
+        self.iter().any(|known| known == word)
+    }
+}
 
 /// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
 /// other.
@@ -23,9 +39,9 @@ pub(super) fn is_angle(role: Role) -> bool {
     (EARTH..EARTH + 2).contains(&role)
 }
 
-pub(super) const HEIGHT: Role = EARTH + 2;
+const HEIGHT: Role = EARTH + 2;
 /// A height that counts downwards: no role of its own, but one of a heading.
-pub(super) const DEPTH: Role = EARTH + 3;
+const DEPTH: Role = EARTH + 3;
 
 /// What latitude and longitude are called.
 const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long", "longitude"]];
@@ -34,109 +50,24 @@ const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long",
 const EARTH_STARTS: [&str; 4] = ["", "gps_", "gnss_", "global_"];
 
 /// What heights and depths are called.
-const HEIGHT_NAMES: [&str; 13] =
-    ["alt", "altitude", "height", "hgt", "elevation", "elev", "ele", "agl", "msl", "amsl", "asl", "hae", "up"];
+const HEIGHT_NAMES: Words = Words("alt altitude height hgt elevation elev ele agl msl amsl asl hae up");
 const DEPTH_NAMES: [&str; 2] = ["depth", "down"];
 
 /// What may stand in front of these, and behind them: how the height is measured, and from where.
-const HEIGHT_STARTS: [&str; 24] = [
-    "gps",
-    "gnss",
-    "global",
-    "geo",
-    "geometric",
-    "geodetic",
-    "ellipsoidal",
-    "wgs84",
-    "baro",
-    "barometric",
-    "barometer",
-    "pressure",
-    "rel",
-    "relative",
-    "abs",
-    "absolute",
-    "local",
-    "pos",
-    "position",
-    "est",
-    "estimated",
-    "true",
-    "raw",
-    "filtered",
-];
-const HEIGHT_ENDS: [&str; 11] = [
-    "agl",
-    "msl",
-    "amsl",
-    "asl",
-    "hae",
-    "rel",
-    "relative",
-    "above_ground",
-    "above_ground_level",
-    "above_sea_level",
-    "above_takeoff",
-];
+const HEIGHT_STARTS: Words = Words(
+    "gps gnss global geo geometric geodetic ellipsoidal wgs84 baro barometric barometer pressure rel relative \
+     abs absolute local pos position est estimated true raw filtered",
+);
+const HEIGHT_ENDS: Words =
+    Words("agl msl amsl asl hae rel relative above_ground above_ground_level above_sea_level above_takeoff");
 
 /// Words that name a quantity with axes, and no vehicle.
-const QUANTITIES: [&str; 55] = [
-    "vel",
-    "velocity",
-    "speed",
-    "acc",
-    "accel",
-    "acceleration",
-    "gyro",
-    "gyr",
-    "gyroscope",
-    "imu",
-    "mag",
-    "magnetometer",
-    "magnetic",
-    "omega",
-    "angular",
-    "linear",
-    "rate",
-    "rates",
-    "angvel",
-    "angle",
-    "angles",
-    "attitude",
-    "orientation",
-    "quat",
-    "quaternion",
-    "rot",
-    "rotation",
-    "euler",
-    "rpy",
-    "twist",
-    "wrench",
-    "force",
-    "torque",
-    "moment",
-    "thrust",
-    "wind",
-    "gravity",
-    "bias",
-    "noise",
-    "std",
-    "sigma",
-    "var",
-    "cov",
-    "covariance",
-    "err",
-    "error",
-    "sp",
-    "setpoint",
-    "ref",
-    "reference",
-    "des",
-    "desired",
-    "cmd",
-    "command",
-    "jerk",
-];
+const QUANTITIES: Words = Words(
+    "vel velocity speed acc accel acceleration gyro gyr gyroscope imu mag magnetometer magnetic omega angular \
+     linear rate rates angvel angle angles attitude orientation quat quaternion rot rotation euler rpy twist \
+     wrench force torque moment thrust wind gravity bias noise std sigma var cov covariance err error sp \
+     setpoint ref reference des desired cmd command jerk",
+);
 
 /// Letters of quantities with axes, which may be vehicles too.
 pub(super) const LETTERS: [&str; 8] = ["a", "f", "g", "j", "q", "u", "v", "w"];
@@ -231,8 +162,7 @@ fn quantity(name: &str) -> Option<Role> {
 /// Whether a name in lower case is that of a height, such as `geoaltitude`, `rel_alt`, `height_above_ground`, or of a depth.
 fn height(name: &str) -> Option<Role> {
     let role = |name: &str| {
-        let is = |names: &[&str]| names.contains(&name);
-        if is(&HEIGHT_NAMES) { Some(HEIGHT) } else { is(&DEPTH_NAMES).then_some(DEPTH) }
+        if HEIGHT_NAMES.contains(name) { Some(HEIGHT) } else { DEPTH_NAMES.contains(&name).then_some(DEPTH) }
     };
     let behind = |name: &str| {
         let starts = HEIGHT_STARTS.iter().filter_map(|start| name.strip_prefix(start));
@@ -247,7 +177,7 @@ pub(super) fn says_a_quantity(name: &str) -> bool {
     let name = name.to_lowercase();
     let words = name.split(|c: char| !c.is_alphanumeric());
     let mut words = words.map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
-    words.rfind(|word| !word.is_empty()).is_some_and(|word| QUANTITIES.contains(&word))
+    words.rfind(|word| !word.is_empty()).is_some_and(|word| QUANTITIES.contains(word))
 }
 
 /// Whether a column that is not read cannot be what tells the vehicles of the rows apart: attitudes, rates, sensors.
@@ -318,57 +248,11 @@ pub(super) fn said_unit(name: &str) -> Option<String> {
 }
 
 /// Words that name the vehicle of a row, with `id`, `name`, `no` or the like behind them or without.
-const VEHICLES: [&str; 49] = [
-    "vehicle",
-    "drone",
-    "uav",
-    "uas",
-    "quad",
-    "quadrotor",
-    "copter",
-    "agent",
-    "robot",
-    "rover",
-    "aircraft",
-    "plane",
-    "airplane",
-    "ship",
-    "vessel",
-    "boat",
-    "usv",
-    "auv",
-    "car",
-    "truck",
-    "object",
-    "obj",
-    "track",
-    "target",
-    "body",
-    "rigidbody",
-    "model",
-    "entity",
-    "actor",
-    "person",
-    "pedestrian",
-    "ped",
-    "player",
-    "unit",
-    "node",
-    "tag",
-    "device",
-    "callsign",
-    "flight",
-    "tail",
-    "registration",
-    "icao",
-    "icao24",
-    "hex",
-    "hexident",
-    "mmsi",
-    "imo",
-    "childframe",
-    "sys",
-];
+const VEHICLES: Words = Words(
+    "vehicle drone uav uas quad quadrotor copter agent robot rover aircraft plane airplane ship vessel boat \
+     usv auv car truck object obj track target body rigidbody model entity actor person pedestrian ped player \
+     unit node tag device callsign flight tail registration icao icao24 hex hexident mmsi imo childframe sys",
+);
 
 /// What may stand behind these.
 const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num", "index", "code"];
@@ -376,7 +260,7 @@ const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num
 /// Whether a column names the vehicle of a row.
 pub(super) fn is_id(name: &str) -> bool {
     let name = joined(name);
-    let is = |stem: &str| VEHICLES.contains(&stem);
+    let is = |stem: &str| VEHICLES.contains(stem);
     let behind = VEHICLE_ENDS.iter().filter_map(|end| name.strip_suffix(end));
     matches!(name.as_str(), "id" | "name" | "uid" | "uuid" | "sysid" | "systemid")
         || is(&name)
@@ -401,7 +285,7 @@ fn joined(name: &str) -> String {
 /// Names of columns with the units that a row below them says. A name that says the same keeps it, and so does one that is
 /// nothing but the unit of a part of a time.
 pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String>, Fault> {
-    let with_unit = |(name, unit): (&String, &&str)| {
+    let with_unit = |(name, unit): (&String, &&str)| -> Result<String, Fault> {
         let is_time = is_time(name);
         let is_part =
             !is_time && TimeUnit::from_name(name.rsplit(['.', '/', '_', ' ']).next().unwrap_or_default()).is_some();
@@ -424,7 +308,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         }
         let problem =
             format!("column {} says the unit {}, and the row of units {}", quoted(name), quoted(&said), quoted(unit));
-        Err(Fault::coded("recording/unit-conflict", problem, "take one of the two units out"))
+        refuse("recording/unit-conflict", problem, "take one of the two units out")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());
@@ -500,4 +384,65 @@ pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
         let (stem, end) = name.split_at_checked(name.len().checked_sub(unit.len())?)?;
         Some((stem.strip_suffix('_')?, end, velocity)).filter(|_| end.eq_ignore_ascii_case(unit))
     })
+}
+
+/// Columns of a table that are read because their names are those of heights or depths.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Heights {
+    named: BTreeSet<usize>,
+    /// Those that count downwards.
+    downward: BTreeSet<usize>,
+}
+
+impl Heights {
+    /// Gives headings of heights and depths the role of the third axis of positions, whose first axis is `place`, where their
+    /// vehicle has the other two axes and no third of its own. All others are dropped. `found` are the columns that the user
+    /// names.
+    pub(super) fn place(
+        place: Role,
+        header: &[String],
+        found: &mut BTreeMap<(String, Role), usize>,
+        headings: &mut Vec<(usize, Heading<'_>)>,
+    ) -> Self {
+        let (third, mut heights) = (place + 2, Self::default());
+        // The user may call the third axis by either name; `z` means the numbers as they are.
+        let [z, alt] = [POSITION + 2, HEIGHT].map(|role| found.remove(&(String::new(), role)));
+        let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
+        found.extend(given.map(|column| ((String::new(), third), column)));
+        if let Some(column) = alt.filter(|column| given == Some(*column)) {
+            let is_depth = Heading::of(&header[column]).is_some_and(|heading| heading.role == DEPTH);
+            heights.add(column, is_depth);
+        }
+        let all = headings.clone();
+        let has = |vehicle: &str, role: Role| {
+            all.iter().any(|(_, heading)| (heading.vehicle, heading.role) == (vehicle, role))
+                || found.contains_key(&(vehicle.to_owned(), role))
+        };
+        let is_height = |role: Role| matches!(role, HEIGHT | DEPTH);
+        headings.retain(|(_, Heading { vehicle, role, .. })| {
+            let has = |axis: Role| has(vehicle, place + axis);
+            !is_height(*role) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
+        });
+        for (column, heading) in headings.iter_mut().filter(|(_, heading)| is_height(heading.role)) {
+            heights.add(*column, heading.role == DEPTH);
+            heading.role = third;
+        }
+        heights
+    }
+
+    fn add(&mut self, column: usize, is_depth: bool) {
+        self.named.insert(column);
+        self.downward.extend(is_depth.then_some(column));
+    }
+
+    /// Columns that count downwards.
+    pub(super) fn downward(&self) -> impl Iterator<Item = usize> {
+        self.downward.iter().copied()
+    }
+
+    /// Which of these columns are read as heights because of their names, and whether the sign is turned.
+    pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> Vec<(usize, bool)> {
+        let columns: BTreeSet<_> = columns.filter(|column| self.named.contains(column)).collect();
+        columns.into_iter().map(|column| (column, self.downward.contains(&column))).collect()
+    }
 }

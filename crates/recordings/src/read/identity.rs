@@ -1,11 +1,11 @@
-//! Whether the rows of a table say which vehicle they are of: columns that could name vehicles, by their names and by their
+//! Names of vehicles, and columns that could name the vehicles of the rows of a table, by their headings and by their
 //! values.
 
 use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, quoted};
+use super::error::{Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
 
@@ -49,13 +49,90 @@ pub(super) fn spelling(name: &str) -> String {
 }
 
 /// That two names are those of one vehicle, or nearly.
-pub(super) fn alike(first: &str, second: &str) -> Fault {
+fn alike(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
     Fault::coded(
         "recording/vehicle-twice",
         problem,
         "write one name for one vehicle, and names for two that differ in more than that",
     )
+}
+
+/// Names in the order of their indices, and the way back.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    in_order: Vec<String>,
+    indices: HashMap<Box<str>, usize>,
+    /// Indices by what names are but for their spelling.
+    spellings: HashMap<String, usize>,
+}
+
+impl Names {
+    /// Names in this order.
+    ///
+    /// # Errors
+    /// Where two differ only in how they are spelled.
+    pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
+        let mut all = Self::default();
+        for name in names {
+            all.add(name)?;
+        }
+        Ok(all)
+    }
+
+    /// `1`, `2`, ... up to `count`.
+    pub(super) fn numbered(count: usize) -> Self {
+        Self::ordered((1..=count).map(|number| number.to_string()).collect())
+    }
+
+    /// Names that are known to differ.
+    fn ordered(names: Vec<String>) -> Self {
+        let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
+        let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
+        Self { in_order: names, indices, spellings }
+    }
+
+    /// Adds a name and gives its index.
+    fn add(&mut self, name: String) -> Result<usize, Fault> {
+        let index = self.in_order.len();
+        if let Some(&first) = self.spellings.get(&spelling(&name)) {
+            return Err(alike(&self.in_order[first], &name));
+        }
+        self.spellings.insert(spelling(&name), index);
+        self.indices.insert(name.as_str().into(), index);
+        self.in_order.push(name);
+        Ok(index)
+    }
+
+    pub(super) fn all(&self) -> &[String] {
+        &self.in_order
+    }
+
+    /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
+    /// after the last: most files go round.
+    ///
+    /// # Errors
+    /// Where a new name differs from another only in how it is spelled.
+    #[inline]
+    pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
+        let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
+        if self.in_order.get(next).is_some_and(|known| known == name) {
+            return Ok(next);
+        }
+        if let Some(&index) = self.indices.get(name) {
+            return Ok(index);
+        }
+        self.add(name.to_owned())
+    }
+
+    /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
+    pub(super) fn settle(&mut self) {
+        let numbers: Option<Vec<u64>> = self.in_order.iter().map(|name| name.parse().ok()).collect();
+        let Some(numbers) = numbers else { return };
+        let mut order: Vec<usize> = (0..self.in_order.len()).collect();
+        order.sort_by_key(|&index| numbers[index]);
+        *self = Self::ordered(order.iter().map(|&index| self.in_order[index].clone()).collect());
+    }
 }
 
 /// A second column that could name the vehicles of the rows, beside the one that does.
@@ -280,7 +357,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
                 let problem = format!("column {called} gives a time of vehicle {vehicle} alone");
                 let remedy =
                     "write one row for each vehicle and time, or remove the column if it repeats the time of the row";
-                return Err(Fault::coded("recording/several-clocks", problem, remedy));
+                return refuse("recording/several-clocks", problem, remedy);
             }
             let Some(last) = rest.rsplit(['.', '/']).next().filter(|last| heading::is_id(last)) else { continue };
             quantities.entry(rest).or_default().push(column);
@@ -294,16 +371,16 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     if let Some((first, vehicle)) = ids.clone().next().zip((0..vehicles.len()).find(|of| !names.contains_key(of))) {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
-        return Err(Fault::coded(
+        return refuse(
             "recording/ambiguous-vehicle",
             problem,
             "add such a column for each vehicle, or remove these columns",
-        ));
+        );
     }
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
         let remedy = "rename these columns like those of the other vehicles, or remove them";
-        return Err(Fault::coded("recording/ambiguous-column", problem, remedy));
+        return refuse("recording/ambiguous-column", problem, remedy);
     }
     let ids: Vec<_> = ids.collect();
     let is_watched = |columns: &Vec<usize>| columns.len() > 1 && !columns.iter().all(|column| ids.contains(column));
@@ -312,12 +389,12 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
 
 /// Values of one quantity of all vehicles in the last row.
 #[derive(Clone, Debug)]
-pub(super) struct Watch {
+pub(super) struct SwapMonitor {
     pub(super) columns: Vec<usize>,
     last: Vec<String>,
 }
 
-impl Watch {
+impl SwapMonitor {
     pub(super) fn new(columns: Vec<usize>) -> Self {
         Self { columns, last: Vec::new() }
     }
@@ -338,7 +415,7 @@ impl Watch {
                 let problem =
                     format!("the values of column {called} and of its like change places, as names of vehicles do");
                 let remedy = "name these columns like `a.id`, or remove them if their values are no names";
-                return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+                return refuse("recording/ambiguous-vehicle", problem, remedy);
             }
         }
         self.last = now;

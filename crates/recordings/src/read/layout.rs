@@ -1,26 +1,24 @@
-//! What the columns of a table mean, going by their names.
+//! Columns of a table by their roles, as the header gives them.
 //!
 //! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
 //! regard to case. A unit that a name says is honoured, and one that is not known is refused.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::clock::TimeUnit;
-use super::columns::{Body, Columns, Rest, missing};
-use super::conventions::Convention;
-use super::earth::Heights;
-use super::error::{Fault, list, quoted};
-use super::heading::{EARTH, Heading, ID, POSITION, RADIUS, Role, TIME, is_angle};
+use super::axes::Convention;
+use super::clock::{Rest, TimeUnit};
+use super::error::{Fault, list, quoted, refuse};
+use super::heading::{EARTH, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::identity::Slots;
-use super::options::ReadOptions;
+use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
-use super::{axes, columns, heading, identity};
+use super::{axes, clock, heading, identity};
 
 /// Names of places that are no vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
 
 /// The columns of a table.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Layout {
     /// The column of time; none where the number of the row is the time.
     pub(super) time: Option<usize>,
@@ -46,16 +44,16 @@ pub(super) struct Layout {
     pub(super) metres: Vec<f64>,
     /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
-    /// What the names of the columns say of frames and of programs.
+    /// Frames and programs that the names of the columns tell.
     pub(super) convention: Convention,
     /// Whether some vehicle has no column of its height: then no vehicle has one.
     pub(super) is_planar: bool,
-    /// What a person should know about the columns.
+    /// Notes for the user about the columns.
     pub(super) notes: Vec<String>,
 }
 
 impl Layout {
-    /// What the columns of this header mean. A table whose rows name no vehicle is of the vehicle `alone`.
+    /// Returns the layout of a table with this header. A table whose rows name no vehicle is of the vehicle `alone`.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions() {
@@ -64,14 +62,13 @@ impl Layout {
         let mut columns = Columns::given(header, options)?;
         let found = match columns.get("", TIME) {
             Some(given) => Some((given, None)),
-            None => columns::find(header, options)?,
+            None => clock::time_columns(header, options)?,
         };
         let (time, rest) = found.ok_or_else(|| missing(header, TIME, ""))?;
         let unit = match rest {
             Some(rest) => Some(rest.unit),
-            None => {
-                unit_of_time(&header[time], options)?.or(convention.counts_from_boot.then_some(TimeUnit::Microseconds))
-            }
+            None => clock::unit_of_time(&header[time], options)?
+                .or(convention.counts_from_boot.then_some(TimeUnit::Microseconds)),
         };
         let (id, rivals) = naming_columns(header, time, columns.get("", ID));
         let is_id_given = columns.get("", ID).is_some();
@@ -127,15 +124,11 @@ impl Layout {
             id,
             is_id_given,
             rivals,
-            suspects: Vec::new(),
             names,
             bodies,
-            slots: Slots::default(),
-            metres: Vec::new(),
             on_earth,
-            convention: Convention::default(),
             is_planar,
-            notes: Vec::new(),
+            ..Self::default()
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
         let used = layout.columns();
@@ -178,11 +171,11 @@ impl Layout {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
-                Err(Fault::coded(
+                refuse(
                     "recording/several-frames",
                     problem,
                     "name the axes of all positions in the same way, as in `x_ned` or `north`",
-                ))
+                )
             }
             _ => Ok(()),
         }
@@ -194,24 +187,25 @@ impl Layout {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
             let problem = format!("its positions are in metres, and --scale {} says another unit", options.metres());
-            return Err(Fault::coded("recording/contradicts-option", problem, "leave --scale away"));
+            return refuse("recording/contradicts-option", problem, "leave --scale away");
         }
         let several = self
             .id
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/contradicts-option",
                 format!("{namer} names the vehicles"),
                 "leave --one-vehicle away",
-            ));
+            );
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        // A user who says which column names the vehicles, or that all rows are of one vehicle, knows.
+        // The user names the column of the vehicle, or says that all rows are of one vehicle.
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
-            let may_name = |column: &usize| heading::may_name(&header[*column]) && !columns::is_part(&header[*column]);
+            let may_name =
+                |column: &usize| heading::may_name(&header[*column]) && !clock::is_part_of_time(&header[*column]);
             let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
             self.suspects = suspects.collect();
         }
@@ -224,11 +218,11 @@ impl Layout {
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/ambiguous-column",
                 problem,
                 "give the columns of each vehicle a name of their own, or take these out",
-            ));
+            );
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_told = is_one_vehicle || convention.is_one_vehicle;
@@ -323,23 +317,240 @@ fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Opti
     if given.is_some() { (given, Vec::new()) } else { (named.next(), named.collect()) }
 }
 
-/// The unit that the name of a column of time says, where the user says nothing of it.
-fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
-    if options.time_unit.is_some() || options.times_per_second.is_some() {
-        return Ok(None);
+/// The columns of a position, and of what else is known of a vehicle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Body {
+    /// x, y and z, if there is one; or latitude, longitude and height.
+    pub(super) position: [Option<usize>; 3],
+    pub(super) velocity: Option<[Option<usize>; 3]>,
+    pub(super) radius: Option<usize>,
+}
+
+impl Body {
+    /// The same without a height.
+    pub(super) fn flattened(mut self) -> Self {
+        self.position[2] = None;
+        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        self
     }
-    if heading::is_frame(name) {
-        return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
+}
+
+const WORDS: [&str; 12] = [
+    "time",
+    "the vehicle",
+    "the position along x",
+    "the position along y",
+    "the position along z",
+    "the velocity along x",
+    "the velocity along y",
+    "the velocity along z",
+    "the radius",
+    "the latitude",
+    "the longitude",
+    "the height",
+];
+
+/// The fault that there is no column of a role.
+pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
+    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header, 12));
+    let option = ColumnNames::ROLES[role];
+    let remedy = format!("name the column with --column {option}=NAME, or put it into the header");
+    Fault::coded(code_of_missing(role), problem, remedy)
+}
+
+fn code_of_missing(role: Role) -> &'static str {
+    match role {
+        TIME => "recording/no-time-column",
+        ID => "recording/no-vehicle-column",
+        _ if is_velocity(role) || role == RADIUS => "recording/missing-column",
+        _ => "recording/no-position-column",
     }
-    // `time (utc)` says a zone.
-    let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
-    let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
-    TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
-        let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
-        let remedy =
-            "say how many seconds it lasts with --time-scale, such as 60 for minutes, or what it is with --time-unit";
-        Fault::coded("recording/unknown-unit", problem, remedy)
-    })
+}
+
+/// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
+pub(super) struct Columns<'a> {
+    pub(super) header: &'a [String],
+    pub(super) found: BTreeMap<(String, Role), usize>,
+    /// The unit that the name of a column says.
+    pub(super) units: BTreeMap<usize, &'a str>,
+    pub(super) heights: Heights,
+    /// The role of the first axis of positions.
+    pub(super) place: Role,
+}
+
+impl<'a> Columns<'a> {
+    /// Returns the columns that the user names.
+    pub(super) fn given(header: &'a [String], options: &'a ReadOptions) -> Result<Self, Fault> {
+        let (heights, place) = (Heights::default(), POSITION);
+        let mut columns = Self { header, found: BTreeMap::new(), units: BTreeMap::new(), heights, place };
+        for (role, name) in options.columns.given() {
+            let column = header.iter().position(|column| column == name);
+            let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
+            columns.found.insert((String::new(), role), column);
+            // An unknown unit in the name of a column that the user gives is ignored.
+            let ending = || heading::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
+            let unit = heading::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
+            let unit = unit.filter(|unit| is_angle(role) || heading::size_of(unit, is_velocity(role)).is_some());
+            columns.units.extend(unit.map(|unit| (column, unit)));
+        }
+        Ok(columns)
+    }
+
+    pub(super) fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
+        self.found.get(&(vehicle.to_owned(), role)).copied()
+    }
+
+    /// What a person should know of columns that are read because their names are those of heights, which are up whatever
+    /// the user says of the other axes.
+    pub(super) fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
+        let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
+        let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        if self.place != EARTH {
+            axes::refuse_turned_height(options, &self.header[first])?;
+        }
+        let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
+        let turned = if is_turned { ", with the sign turned" } else { "" };
+        let scale = options.metres();
+        let unit = match self.units.get(&first) {
+            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
+            None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),
+            _ => String::new(),
+        };
+        let columns = if used.len() > 1 { "columns" } else { "column" };
+        Ok(Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12))))
+    }
+
+    pub(super) fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
+        let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
+        self.units.extend(heading.unit.map(|unit| (column, unit)));
+        let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
+        let (first, second) = (&self.header[first], &self.header[column]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
+        refuse("recording/ambiguous-column", problem, "name the one that is meant with --column, or take the other out")
+    }
+
+    /// Finds the vehicles of a wide table, and gives their names in order of appearance.
+    pub(super) fn claim_wide(&mut self, headings: &[(usize, Heading<'a>)]) -> Result<Vec<String>, Fault> {
+        let named: Vec<_> = headings.iter().filter(|(_, heading)| !heading.vehicle.is_empty()).collect();
+        let vehicles: BTreeSet<_> = named.iter().map(|(_, heading)| heading.vehicle).collect();
+        // Where all vehicles are called by letters, `a` is one of them; beside none or numbers `a_x` is an acceleration.
+        let sure = |heading: &Heading<'_>| !heading.ambiguous && !heading.is_numbered();
+        let letters = named.iter().any(|(_, heading)| sure(heading));
+        let words = named.iter().find(|(_, heading)| sure(heading) && heading.vehicle.len() > 1);
+        let odd = named.iter().find(|(_, heading)| heading.ambiguous);
+        if let (Some((odd, _)), Some((word, _))) = (odd, words) {
+            let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
+            let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
+            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or take it out");
+        }
+        let mut names: Vec<String> = Vec::new();
+        // `cf1_v_x` is a velocity where there is a `cf1_x`.
+        let of_another = |vehicle: &str| {
+            let split = vehicle.rsplit_once(['.', '/', '_']).filter(|(_, letter)| heading::LETTERS.contains(letter));
+            split.is_some_and(|(other, _)| vehicles.contains(other))
+        };
+        let is_vehicle = |heading: &Heading<'_>| (letters || !heading.ambiguous) && !of_another(heading.vehicle);
+        for (column, heading) in named.into_iter().filter(|(_, heading)| is_vehicle(heading)) {
+            let known = self.found.range((heading.vehicle.to_owned(), 0)..).next();
+            if known.is_none_or(|((known, _), _)| known != heading.vehicle) {
+                names.push(heading.vehicle.to_owned());
+            }
+            self.claim(heading.vehicle, heading, *column)?;
+        }
+        if names.is_empty() {
+            let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
+            return Err(missing(self.header, ID, of));
+        }
+        Ok(names)
+    }
+
+    /// The columns of a vehicle: at least x and y of its position, and its velocity along each axis of its position where
+    /// it has one along some axis.
+    pub(super) fn body(&self, vehicle: &str) -> Result<Body, Fault> {
+        let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
+        let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
+        let (position, velocity) = (axes(self.place), axes(VELOCITY));
+        let moves = velocity.iter().any(Option::is_some);
+        for axis in 0..3 {
+            let lacks = match (position[axis], velocity[axis]) {
+                (None, moving) if axis < 2 || moving.is_some() => self.place,
+                (Some(_), None) if moves => VELOCITY,
+                _ => continue,
+            };
+            return Err(missing(self.header, lacks + axis, &of));
+        }
+        Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
+    }
+
+    /// What the numbers of each column are multiplied by, going by the units that names say: all names or none, and
+    /// nothing beside them.
+    pub(super) fn metres(&self, used: &[usize], scale: f64) -> Result<Vec<f64>, Fault> {
+        let mut metres = vec![1.0; self.header.len()];
+        let (mut other, mut silent) = (None, None);
+        let lengths =
+            self.found.iter().filter(|((_, role), column)| *role >= POSITION && used.binary_search(column).is_ok());
+        for (&(_, role), &column) in lengths {
+            let name = quoted(&self.header[column]);
+            if is_angle(role) {
+                let unit = self.units.get(&column).map_or("deg", |unit| *unit);
+                metres[column] = heading::degrees(unit).ok_or_else(|| {
+                    let problem = format!("column {name} says a unit of angle that is not known, {}", quoted(unit));
+                    Fault::coded(
+                        "recording/unknown-unit",
+                        problem,
+                        "write it in degrees, and name the column without a unit",
+                    )
+                })?;
+                continue;
+            }
+            let Some(unit) = self.units.get(&column) else {
+                silent = Some(name);
+                continue;
+            };
+            let what = if is_velocity(role) { "velocity" } else { "length" };
+            let size = heading::size_of(unit, is_velocity(role)).ok_or_else(|| {
+                let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
+                let remedy =
+                    "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
+                Fault::coded("recording/unknown-unit", problem, remedy)
+            })?;
+            metres[column] = size;
+            if size != 1.0 {
+                other = Some(name);
+            }
+        }
+        for column in self.heights.downward() {
+            metres[column] = -metres[column];
+        }
+        let Some(other) = other else {
+            if self.place == EARTH {
+                let is_length = |(_, role): &&(String, Role)| !is_angle(*role) && *role >= POSITION;
+                let lengths: BTreeSet<_> =
+                    self.found.iter().filter(|(key, _)| is_length(key)).map(|(_, column)| *column).collect();
+                for column in lengths {
+                    metres[column] *= scale;
+                }
+            }
+            return Ok(metres);
+        };
+        if let Some(silent) = silent {
+            let problem = format!("column {other} says its unit, and column {silent} none");
+            return refuse(
+                "recording/unit-conflict",
+                problem,
+                "write the unit of each column into its name, as in `x [mm]`",
+            );
+        }
+        if scale != 1.0 {
+            let problem = format!("column {other} says its unit, and --scale {scale} another");
+            return refuse(
+                "recording/contradicts-option",
+                problem,
+                "leave --scale away, or take the units out of the header",
+            );
+        }
+        Ok(metres)
+    }
 }
 
 #[cfg(test)]

@@ -13,11 +13,8 @@
 //! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
 
 mod axes;
-mod bag;
 mod capture;
 mod clock;
-mod columns;
-mod conventions;
 mod crazyflie;
 mod csv;
 mod curves;
@@ -28,7 +25,6 @@ mod heading;
 mod identity;
 mod layout;
 pub(crate) mod mcap;
-mod motive;
 mod npy;
 mod npz;
 mod objects;
@@ -36,12 +32,10 @@ mod options;
 mod order;
 pub(crate) mod parquet;
 mod readers;
-mod recognise;
 mod skybrush;
 mod source;
 mod table;
 mod ulog;
-mod vicon;
 mod vviz;
 
 pub use self::parquet::is_guarded;
@@ -58,8 +52,10 @@ use std::fs;
 use std::path::Path;
 
 use crate::mcap::McapRecording;
+use error::refuse;
 use folder::{ARCHIVE, Folder};
-use recognise::recognise;
+use mcap::bag;
+use readers::recognise;
 use source::Source;
 
 /// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with a file for each vehicle.
@@ -136,12 +132,7 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     if data.is_dir() {
         if bag::is_bag(path) {
             let remedy = "give it alone, without --join: its topics are its vehicles";
-            return Err(Fault::coded(
-                "recording/several-vehicles",
-                "it is a ROS 2 bag, and no file of one vehicle",
-                remedy,
-            )
-            .into());
+            return refuse("recording/several-vehicles", "it is a ROS 2 bag, and no file of one vehicle", remedy);
         }
         let folder = Folder::open(path)?;
         let remedy =
@@ -150,9 +141,9 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, and a recording is read more than once";
-        return Err(Fault::coded("recording/not-a-file", problem, "save it to a file first, and give the file").into());
+        return refuse("recording/not-a-file", problem, "save it to a file first, and give the file");
     }
-    if !recognise::is_archive(path)? {
+    if !readers::is_archive(path)? {
         return Ok(None);
     }
     let folder = Folder::of_archive(path)?;

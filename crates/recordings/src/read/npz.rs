@@ -19,10 +19,11 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, refuse};
+use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, BATCH, Names, Ordered, PLANAR, Recording, Row, Rows};
+use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
 
@@ -64,11 +65,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut times = Vec::new();
     for k in 0..stamps.count() {
         let stamp = stamps.next_stamp().and_then(|stamp| match stamp {
-            Stamp::Real(time) if !time.is_finite() => Err(Fault::coded(
-                "recording/not-finite",
-                format!("it is {time}"),
-                "times are finite: take the instant out",
-            )),
+            Stamp::Real(time) if !time.is_finite() => {
+                refuse("recording/not-finite", format!("it is {time}"), "times are finite: take the instant out")
+            }
             stamp => Ok(stamp),
         });
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
@@ -94,7 +93,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
     let mut about = About::new(source, options, unit, notes, none);
-    about.frame.is_planar = is_planar;
+    about.metadata.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
         about.epoch_ns = epoch;
     }
@@ -130,16 +129,12 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
         [] => {
             let remedy = "save as many instants as times, and two or three axes: T x N x 3, or say what the axes are \
                           with --layout, such as --layout time,vehicle,axis";
-            Err(Fault::coded("recording/array-shape", problem(""), remedy))
+            refuse("recording/array-shape", problem(""), remedy)
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
             let remedy = format!("say what its axes are with --layout {}", ways.join(" or "));
-            Err(Fault::coded(
-                "recording/ambiguous-layout",
-                problem(": its shape does not say which axis is which"),
-                remedy,
-            ))
+            refuse("recording/ambiguous-layout", problem(": its shape does not say which axis is which"), remedy)
         }
     }
 }
@@ -168,11 +163,11 @@ impl Arrays {
         match (found.next(), found.next()) {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                Err(Fault::coded(
+                refuse(
                     "recording/ambiguous-column",
                     problem,
                     format!("name the one that is meant with --column {option}=NAME"),
-                ))
+                )
             }
             (first, _) => Ok(first),
         }
@@ -321,7 +316,7 @@ fn next(numbers: &mut Numbers) -> Result<f64, Fault> {
     numbers.next().unwrap_or(Ok(f64::NAN))
 }
 
-/// The next vector of so many axes; what is missing is 0.
+/// Returns the next vector of `axes` axes. The other axes are 0.
 fn next_vector(numbers: &mut Numbers, axes: usize) -> Result<Vector3<f64>, Fault> {
     let mut vector = Vector3::zeros();
     for x in vector.iter_mut().take(axes) {
@@ -336,11 +331,11 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
-    Err(Fault::coded(
+    refuse(
         "recording/radius",
         format!("the radius is {radius}"),
         "radii are finite and 0 or more, or NaN where unknown",
-    ))
+    )
 }
 
 /// The rows of an archive.
@@ -369,16 +364,16 @@ impl Instants {
         }
         if let Some(odd) = position.iter().find(|x| !x.is_finite()) {
             let remedy = "save an array `seen` of T x N booleans that is false where a vehicle was not seen";
-            return Err(Fault::coded("recording/not-finite", format!("the position holds {odd}"), remedy));
+            return refuse("recording/not-finite", format!("the position holds {odd}"), remedy);
         }
         // A vehicle without a velocity has NaN among those with one.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/not-finite",
                 "the velocity is not finite",
                 "velocities are finite, or all NaN where unknown",
-            ));
+            );
         }
         let place = (self.at * self.table.vehicles() + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))

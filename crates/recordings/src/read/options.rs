@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::axes::Axes;
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted};
+use super::error::{Fault, quoted, refuse};
 use super::readers::{Format, Takes};
 
 /// What an axis of an array of positions counts.
@@ -264,44 +264,44 @@ impl ReadOptions {
         let metres = self.metres();
         if !(metres.is_finite() && metres > 0.0) {
             let problem = format!("its lengths cannot be scaled by {metres}");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/option-out-of-range",
                 problem,
                 "give a positive number of metres per unit of length with --scale",
-            ));
+            );
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("its times cannot be counted with {rate} in a second");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/option-out-of-range",
                 problem,
                 "give a positive number with --fps or --time-scale",
-            ));
+            );
         }
         if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
             let problem = format!("its times are in {} and in parts of a second of your own", unit.name());
             let remedy = "leave --time-unit out, or --fps and --time-scale";
-            return Err(Fault::coded("recording/two-time-units", problem, remedy));
+            return refuse("recording/two-time-units", problem, remedy);
         }
         if let Some([latitude, longitude, height_m]) = self.origin {
             let is_on_earth = latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && height_m.is_finite();
             if !is_on_earth {
                 let problem = format!("no place on the Earth is at {latitude}, {longitude}, {height_m} m");
                 let remedy = "a latitude is within 90 degrees, and a longitude within 360";
-                return Err(Fault::coded("recording/option-out-of-range", problem, remedy));
+                return refuse("recording/option-out-of-range", problem, remedy);
             }
         }
         if let Some((name, _)) = self.starts.iter().find(|(_, start)| !start.iter().all(|x| x.is_finite())) {
             let problem = format!("the start of {} is not finite", quoted(name));
-            return Err(Fault::coded("recording/option-out-of-range", problem, "give three finite numbers of metres"));
+            return refuse("recording/option-out-of-range", problem, "give three finite numbers of metres");
         }
         if !self.turn().are_finite() {
             let problem = "the lengths of its axes cannot be multiplied by 0, nor by what is not finite";
-            return Err(Fault::coded(
+            return refuse(
                 "recording/option-out-of-range",
                 problem,
                 "give three numbers with --scale that are not 0, such as 1,1,-1",
-            ));
+            );
         }
         Ok(())
     }
@@ -332,11 +332,9 @@ impl ReadOptions {
             (self.allow_unfinished, Takes::Unfinished, "--allow-unfinished", "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.takes.contains(of)) {
-            Some((.., option, why)) => Err(Fault::coded(
-                "recording/unused-option",
-                format!("{} {why}", format.title),
-                format!("leave {option} away"),
-            )),
+            Some((.., option, why)) => {
+                refuse("recording/unused-option", format!("{} {why}", format.title), format!("leave {option} away"))
+            }
             None => Ok(()),
         }
     }

@@ -1,17 +1,14 @@
-//! Rows of a recording, names of its vehicles, and their order: rows in the order of the file are given out in the order of
-//! time.
+//! Rows of a recording. They are read in the order of the file and given out in the order of time.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
-use super::identity::{alike, spelling};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source;
-use tautline_core::track::{Clock, EarthOrigin, Item, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].
 const LONGEST_JUMP_M: f64 = 1000.0;
@@ -23,17 +20,6 @@ pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y
 
 /// A recording being read.
 pub type Recording = Box<dyn Tracks<Error = ReadError>>;
-
-/// The frame of the positions of a recording.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Frame {
-    /// Whether positions have no height.
-    pub(super) is_planar: bool,
-    /// Whether the recording gives the directions of its axes.
-    pub(super) has_directions: bool,
-    /// Origin from which positions on the Earth are measured.
-    pub(super) earth_origin: Option<EarthOrigin>,
-}
 
 /// What is known of a recording beside its rows.
 pub(super) struct About {
@@ -50,8 +36,8 @@ pub(super) struct About {
     pub(super) sort: bool,
     /// Which of several rows of a vehicle at one time is read.
     pub(super) duplicates: Option<Duplicates>,
-    pub(super) frame: Frame,
-    pub(super) notes: Vec<String>,
+    /// Properties of the recording; the clock and the assumption are found while the rows are looked at.
+    pub(super) metadata: Metadata,
     /// The fault of a recording without rows.
     pub(super) none: Fault,
 }
@@ -74,8 +60,7 @@ impl About {
             scale: options.metres(),
             sort: options.sort,
             duplicates: options.duplicates,
-            frame: Frame::default(),
-            notes,
+            metadata: Metadata { notes, ..Metadata::default() },
             none,
         }
     }
@@ -88,13 +73,9 @@ impl About {
 /// vehicle must not go back in time: that is a clock that was set, or two vehicles under one name. A user who knows better
 /// has them sorted.
 pub(super) struct Ordered<R> {
-    path: PathBuf,
+    about: About,
     rows: R,
     timing: Timing,
-    notes: Vec<String>,
-    assumed: Option<String>,
-    frame: Frame,
-    scale: f64,
     /// Rows read that have not been given out.
     batch: std::vec::IntoIter<Row>,
     /// All rows have been read.
@@ -107,16 +88,14 @@ pub(super) struct Ordered<R> {
     last: Vec<Option<(f64, Row)>>,
     /// Place of each vehicle's last row among the items of the current call, where a later row may replace it.
     given: Vec<usize>,
-    duplicates: Option<Duplicates>,
     /// Rows left out because an earlier or a later one of the vehicle is of the same time.
     left_out: u64,
 }
 
 impl<R: Rows> Ordered<R> {
-    /// Looks at the recording as far as its order and its clock need.
-    pub(super) fn open(mut rows: R, about: About) -> Result<Self, ReadError> {
-        let About { path, unit, times_per_second, epoch_ns, scale, sort, duplicates, mut notes, none, .. } = about;
-        let frame = about.frame;
+    /// Reads as much of the recording as its order and its clock need.
+    pub(super) fn open(mut rows: R, mut about: About) -> Result<Self, ReadError> {
+        let (sort, metadata) = (about.sort, &mut about.metadata);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -134,14 +113,14 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(none.into()) };
-        let settled = || Timing::settle(&probe, unit);
-        let (mut timing, note) = times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
-        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(epoch_ns);
-        notes.extend(note);
+        let Some(probe) = probe else { return Err(about.none.into()) };
+        let settled = || Timing::settle(&probe, about.unit);
+        let (mut timing, note) = about.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
+        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(about.epoch_ns);
+        metadata.notes.extend(note);
         // What is known by now of all rows, where they were surveyed.
-        let assumed = rows.assumed();
-        notes.extend(rows.notes());
+        metadata.assumed = rows.assumed();
+        metadata.notes.extend(rows.notes());
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
@@ -154,24 +133,20 @@ impl<R: Rows> Ordered<R> {
             // Stable: rows of one time stay in the order of the file.
             first.sort_by(|a, b| a.stamp.compare(b.stamp));
             ended = true;
-            notes.push("rows are not in order of time and were sorted".to_owned());
+            metadata.notes.push("rows are not in order of time and were sorted".to_owned());
         }
+        metadata.clock = timing.clock.clone();
         let batch = first.into_iter();
         Ok(Self {
-            path,
+            about,
             rows,
             timing,
-            notes,
-            assumed,
-            frame,
-            scale,
             batch,
             ended,
             finished: false,
             now: None,
             last: Vec::new(),
             given: Vec::new(),
-            duplicates,
             left_out: 0,
         })
     }
@@ -210,7 +185,8 @@ impl<R: Rows> Ordered<R> {
             }
         }
         let sample = self.sample(row, time_s)?;
-        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.frame.earth_origin.is_some()) {
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.about.metadata.earth_origin.is_some())
+        {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
                 return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
@@ -227,7 +203,7 @@ impl<R: Rows> Ordered<R> {
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
         let says_the_same =
             (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+        match self.about.duplicates.or(says_the_same.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
@@ -245,9 +221,9 @@ impl<R: Rows> Ordered<R> {
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,
-            position_m: row.position * self.scale,
-            velocity_m_s: row.velocity.map(|velocity| velocity * self.scale),
-            radius_m: row.radius.map(|radius| radius * self.scale),
+            position_m: row.position * self.about.scale,
+            velocity_m_s: row.velocity.map(|velocity| velocity * self.about.scale),
+            radius_m: row.radius.map(|radius| radius * self.about.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         if time_s.is_finite()
@@ -312,7 +288,7 @@ impl<R: Rows> Ordered<R> {
 
     fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        let waits = self.duplicates == Some(Duplicates::Last);
+        let waits = self.about.duplicates == Some(Duplicates::Last);
         while items.len() < before + BATCH || (waits && self.goes_on_at_once()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
@@ -321,11 +297,14 @@ impl<R: Rows> Ordered<R> {
         if items.len() == before && self.left_out > 0 {
             let rows = std::mem::take(&mut self.left_out);
             let which = if waits { "a later" } else { "an earlier" };
-            self.notes.push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
+            self.about
+                .metadata
+                .notes
+                .push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            self.notes.extend(self.rows.late_notes());
+            self.about.metadata.notes.extend(self.rows.late_notes());
         }
         Ok(items.len() > before)
     }
@@ -339,31 +318,11 @@ impl<R: Rows> Tracks for Ordered<R> {
     }
 
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        self.try_read(items).map_err(|fault| fault.of(&self.path))
+        self.try_read(items).map_err(|fault| fault.of(&self.about.path))
     }
 
-    fn clock(&self) -> &Clock {
-        &self.timing.clock
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn assumed(&self) -> Option<&str> {
-        self.assumed.as_deref()
-    }
-
-    fn is_planar(&self) -> bool {
-        self.frame.is_planar
-    }
-
-    fn has_directions(&self) -> bool {
-        self.frame.has_directions || self.frame.earth_origin.is_some()
-    }
-
-    fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.frame.earth_origin.as_ref()
+    fn metadata(&self) -> &Metadata {
+        &self.about.metadata
     }
 }
 
@@ -476,81 +435,4 @@ pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -
         }
     }
     Ok(())
-}
-
-/// Names in the order of their indices, and the way back.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Names {
-    in_order: Vec<String>,
-    indices: HashMap<Box<str>, usize>,
-    /// Indices by what names are but for their spelling.
-    spellings: HashMap<String, usize>,
-}
-
-impl Names {
-    /// Names in this order.
-    ///
-    /// # Errors
-    /// Where two differ only in how they are spelled.
-    pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
-        let mut all = Self::default();
-        for name in names {
-            all.add(name)?;
-        }
-        Ok(all)
-    }
-
-    /// `1`, `2`, ... up to `count`.
-    pub(super) fn numbered(count: usize) -> Self {
-        Self::ordered((1..=count).map(|number| number.to_string()).collect())
-    }
-
-    /// Names that are known to differ.
-    fn ordered(names: Vec<String>) -> Self {
-        let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
-        let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
-        Self { in_order: names, indices, spellings }
-    }
-
-    /// Adds a name and gives its index.
-    fn add(&mut self, name: String) -> Result<usize, Fault> {
-        let index = self.in_order.len();
-        if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            return Err(alike(&self.in_order[first], &name));
-        }
-        self.spellings.insert(spelling(&name), index);
-        self.indices.insert(name.as_str().into(), index);
-        self.in_order.push(name);
-        Ok(index)
-    }
-
-    pub(super) fn all(&self) -> &[String] {
-        &self.in_order
-    }
-
-    /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
-    /// after the last: most files go round.
-    ///
-    /// # Errors
-    /// Where a new name differs from another only in how it is spelled.
-    #[inline]
-    pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
-        let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
-        if self.in_order.get(next).is_some_and(|known| known == name) {
-            return Ok(next);
-        }
-        if let Some(&index) = self.indices.get(name) {
-            return Ok(index);
-        }
-        self.add(name.to_owned())
-    }
-
-    /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
-    pub(super) fn settle(&mut self) {
-        let numbers: Option<Vec<u64>> = self.in_order.iter().map(|name| name.parse().ok()).collect();
-        let Some(numbers) = numbers else { return };
-        let mut order: Vec<usize> = (0..self.in_order.len()).collect();
-        order.sort_by_key(|&index| numbers[index]);
-        *self = Self::ordered(order.iter().map(|&index| self.in_order[index].clone()).collect());
-    }
 }

@@ -16,7 +16,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
@@ -71,7 +71,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
         if let Some((code, what, remedy)) = unreadable(&reader, column) {
-            return Err(Fault::coded(code, format!("column `{}` {what}", header[column]), remedy).into());
+            return refuse(code, format!("column `{}` {what}", header[column]), remedy);
         }
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
@@ -184,11 +184,11 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
             Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
         }),
         ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
-        _ => Err(Fault::coded(
+        _ => refuse(
             "recording/element-type",
             format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
             "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
-        )),
+        ),
     }
 }
 
@@ -345,7 +345,7 @@ impl Cells for Groups {
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         if let Cell::Real(_) = self.cell(column) {
             let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
-            return Err(Fault::coded("recording/element-type", problem, "save vehicles as text or as whole numbers"));
+            return refuse("recording/element-type", problem, "save vehicles as text or as whole numbers");
         }
         self.text(column)
     }

@@ -1,15 +1,18 @@
-//! Table of the readers, with a row for each format.
+//! Table of the readers, with a row for each format, and recognition of a format by the content of a file.
 
-use std::fmt;
+use std::io::Read;
 use std::ops::Deref;
+use std::path::Path;
+use std::{fmt, str};
 
-use super::error::ReadError;
+use super::error::{Fault, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::source::Source;
-use super::{crazyflie, csv, mcap, motive, npz, objects, parquet, skybrush, ulog, vicon, vviz};
+use super::skybrush::SHOW;
+use super::source::{Archive, GZIP_MAGIC, Source};
+use super::{capture, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
 
-/// Reader of a format. Each reader is a file of this module and a row of [`READERS`].
+/// Reader of a format: a row of [`READERS`].
 pub struct Reader {
     /// Name for `--format`.
     pub name: &'static str,
@@ -38,8 +41,8 @@ pub static READERS: &[Reader] = &[
     objects::READER,
     vviz::READER,
     skybrush::READER,
-    motive::READER,
-    vicon::READER,
+    capture::MOTIVE,
+    capture::VICON,
     crazyflie::READER,
     csv::CSV,
     csv::TRAJNET,
@@ -161,4 +164,155 @@ impl fmt::Debug for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)
     }
+}
+
+/// Bytes that are looked at.
+const HEAD_BYTES: u64 = 64 * 1024;
+
+/// Recognises a file, and finds out whether it is packed by gzip.
+pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
+    source.gzip = false;
+    let mut head = head_of(source)?;
+    source.gzip = head.starts_with(&GZIP_MAGIC);
+    if source.gzip {
+        head = head_of(source)?;
+    }
+    let format = match forced {
+        Some(format) if !format.magic.is_empty() && !Head::new(&head).begins_with_any(format.magic) => {
+            return Err(Fault::WrongFormat(format).into());
+        }
+        Some(format) => format,
+        None => format_of(&head)?,
+    };
+    let packed = source.entry.is_some();
+    let unpacks = match format.packing {
+        Packing::Any => true,
+        Packing::Archive => packed,
+        Packing::None => false,
+    };
+    if (source.gzip || packed) && !unpacks {
+        let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
+        let problem = format!("it is {} inside {within}", format.title);
+        return refuse("recording/unsupported-compression", problem, format!("unpack it first, with {remedy}"));
+    }
+    Ok(format)
+}
+
+/// Whether a file is a zip archive that holds neither `NumPy` arrays nor a show.
+pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
+    let head = head_of(&Source::file(path))?;
+    Ok(Head::new(&head).begins_with_any(Format::NPZ.magic)
+        && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
+}
+
+/// Whether a file is text with neither a row of numbers nor the name of a column of time: a note beside tables.
+pub(super) fn is_prose(source: &Source) -> bool {
+    let Ok(head) = head_of(source) else { return false };
+    // What is looked at may end within a letter.
+    let text = match str::from_utf8(&head) {
+        Ok(text) => text,
+        Err(error) if error.error_len().is_none() => str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
+        Err(_) => return false,
+    };
+    let between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '(' | ')' | '#');
+    let is_of_a_table = |line: &str| {
+        let words: Vec<_> = line.split(between).filter(|word| !word.is_empty()).collect();
+        let numbers = words.iter().filter(|word| word.parse::<f64>().is_ok()).count();
+        (numbers > 1 && 2 * numbers > words.len()) || words.iter().any(|word| heading::is_clock(word))
+    };
+    !text.contains('\0') && !text.lines().any(is_of_a_table)
+}
+
+fn is_recording(entry: &str) -> bool {
+    entry == SHOW || entry.rsplit('.').next() == Some("npy")
+}
+
+/// The first bytes, unpacked.
+fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
+    let mut head = Vec::new();
+    source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
+    if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
+}
+
+fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
+    if let Some(fault) = unsupported_bytes(bytes) {
+        return Err(fault);
+    }
+    let head = Head::new(bytes);
+    if let Some(fault) = head.text.and_then(unsupported_text) {
+        return Err(fault);
+    }
+    Format::all().find(|format| (format.sniff)(&head)).ok_or(Fault::UnknownFormat)
+}
+
+/// Beginnings of files, what they are, and what helps.
+const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
+    (b"#ROSBAG V", "a ROS 1 bag", BAG),
+    (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
+    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
+    (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
+    (b"FMT ", "a DataFlash log of ArduPilot", DATAFLASH),
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file",
+        "save its arrays with numpy.savez(\"flight.npz\", t=t, positions=positions)",
+    ),
+    (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
+    (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
+    (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
+    (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
+];
+
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip install \
+                              rosbags`), and give the folder `flight`";
+const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table t,id,lat,lon,alt \
+                         in degrees and metres";
+const UNPACK: &str = "unpack it, and give the folder";
+pub(super) const TABLE: &str =
+    "give positions over time, such as a table t,id,x,y,z, or an object of JSON in each line";
+const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
+
+/// Returns what a file is and the remedy, where the format is known and not read.
+fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
+    if head.starts_with(b"\x93NUMPY") {
+        let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
+        let problem = "it is a single NumPy array, which tells no times";
+        return Some(Fault::coded("recording/no-time-column", problem, remedy));
+    }
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Some(Fault::NotUtf8);
+    }
+    // Each message of telemetry has the microseconds since 1970 in front.
+    if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
+        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
+                      t,id,lat,lon,alt in degrees and metres";
+        return Some(Fault::coded(
+            "recording/unsupported-format",
+            "it is a MAVLink telemetry log, which is not read",
+            remedy,
+        ));
+    }
+    if head.get(257..262) == Some(b"ustar") {
+        return Some(Fault::coded("recording/unsupported-format", "it is a tar archive, which is not read", UNPACK));
+    }
+    let known = UNSUPPORTED.iter().find(|(begin, ..)| head.starts_with(begin));
+    known.map(|(_, what, remedy)| {
+        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), *remedy)
+    })
+}
+
+/// The same of text, which has no blanks in front.
+fn unsupported_text(text: &[u8]) -> Option<Fault> {
+    let holds = |word: &str| memchr::memmem::find(text, word.as_bytes()).is_some();
+    let (what, remedy) = match text.first()? {
+        b'<' if holds("<gpx") => ("a GPX track", EARTH),
+        b'<' if holds("<kml") => ("a KML file", EARTH),
+        b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
+        b'<' => ("an XML file", TABLE),
+        b'[' => ("JSON, but no Skybrush show", TABLE),
+        _ => return None,
+    };
+    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), remedy))
 }

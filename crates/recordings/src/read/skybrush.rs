@@ -10,13 +10,13 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::curves::{Curves, distinct, piece};
-use super::error::{Fault, Place, ReadError};
+use super::curves::{Curves, distinct, from_json, piece};
+use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
 use super::source::{Archive, Source};
-use super::{npz, recognise};
+use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
 
 pub(super) const READER: Reader = Reader {
@@ -98,12 +98,11 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
         Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
         Some(_) => {
             let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays nor tables");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/unknown-format",
                 problem,
                 "give a .skyc or .npz file, or pack a table for each vehicle",
-            )
-            .into());
+            );
         }
         None => {
             let mut bytes = Vec::new();
@@ -124,12 +123,11 @@ pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> 
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let (show, mut archive) = show(source)?;
     let Some(swarm) = show.swarm else {
-        return Err(Fault::coded(
+        return refuse(
             "recording/unsupported-format",
             "it is JSON, but no Skybrush show: it has no `swarm`",
-            recognise::TABLE,
-        )
-        .into());
+            readers::TABLE,
+        );
     };
     let mut names = Vec::new();
     let mut curves = Vec::new();
@@ -153,7 +151,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     stand_throughout(&mut curves);
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
-        return Err(Fault::coded("recording/no-positions", "the show has no drone with a trajectory", remedy).into());
+        return refuse("recording/no-positions", "the show has no drone with a trajectory", remedy);
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
 }
@@ -178,28 +176,18 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
     let name = name.trim_start_matches("./");
     let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
         let problem = format!("it refers to `{reference}`, which is not there");
-        return Err(Fault::coded(
-            "recording/archive-entry",
-            problem,
-            "give the .skyc file that holds all parts of the show",
-        )
-        .into());
+        return refuse("recording/archive-entry", problem, "give the .skyc file that holds all parts of the show");
     };
     parse(&archive.whole(name)?, Some(name))
 }
 
 fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    serde_json::from_slice(text).map_err(|error| {
-        let line = u64::try_from(error.line()).unwrap_or(0);
-        let place = entry.map_or(Place::Line(line), |entry| Place::Part(format!("entry `{entry}`, line {line}")));
-        let fault = if error.is_eof() {
-            Fault::Truncated("the JSON ends before it is complete".to_owned())
-        } else {
-            let remedy = "give a show as Skybrush exports it";
-            Fault::coded("recording/malformed", format!("it is not the JSON of a Skybrush show: {error}"), remedy)
-        };
-        fault.at(place)
+    from_json(bytes, "a Skybrush show", "give a show as Skybrush exports it").map_err(|error| match entry {
+        Some(entry) => {
+            let line = error.place.as_ref().map_or_else(String::new, Place::to_string);
+            ReadError { place: Some(Place::Part(format!("entry `{entry}`, {line}"))), ..error }
+        }
+        None => error,
     })
 }
 
@@ -237,24 +225,20 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
 fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Vec<Vector3<f64>>, Fault> {
     if to_s == from_s {
         let problem = format!("two points are at the same time, {to_s} s");
-        return Err(Fault::coded(
-            "recording/duplicate-row",
-            problem,
-            "a drone is in one place at a time: take one out",
-        ));
+        return refuse("recording/duplicate-row", problem, "a drone is in one place at a time: take one out");
     }
     if to_s < from_s {
         let problem = format!("time runs backwards: {to_s} s comes after {from_s} s");
-        return Err(Fault::coded(
+        return refuse(
             "recording/time-backwards",
             problem,
             "look at the order of the points, and export the show again",
-        ));
+        );
     }
     let degree = point.2.len() + 1;
     if degree > HIGHEST_DEGREE {
         let problem = format!("the segment is of degree {degree}");
-        return Err(Fault::coded("recording/degree", problem, format!("degrees up to {HIGHEST_DEGREE} are read")));
+        return refuse("recording/degree", problem, format!("degrees up to {HIGHEST_DEGREE} are read"));
     }
     let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
     Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))

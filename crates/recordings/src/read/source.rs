@@ -13,7 +13,7 @@ use tempfile::TempPath;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 
 /// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
@@ -168,11 +168,11 @@ impl Archive {
             && let Some(name) = repeated(path, zip.central_directory_start())?
         {
             let remedy = "unpack it, look which of the two is meant, and make the archive again with that one";
-            return Err(Fault::coded(
+            return refuse(
                 "recording/archive-entry",
                 format!("two of its entries are called {}", quoted(&name)),
                 remedy,
-            ));
+            );
         }
         Ok(Self { path: path.to_owned(), zip })
     }
@@ -198,11 +198,11 @@ impl Archive {
         let (method, start, crc) = (entry.compression(), entry.data_start(), entry.crc32());
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
-            return Err(Fault::coded(
+            return refuse(
                 "recording/unsupported-compression",
                 "it is encrypted",
                 "give an archive without a password",
-            ));
+            );
         }
         let start = start.ok_or_else(|| Fault::damaged("the entry has no place in the archive"))?;
         let mut file = File::open(&self.path)?;
@@ -218,11 +218,7 @@ impl Archive {
             }
             other => {
                 let remedy = "make the archive with deflate or unpacked, as numpy.savez does";
-                return Err(Fault::coded(
-                    "recording/unsupported-compression",
-                    format!("it is packed by {other}"),
-                    remedy,
-                ));
+                return refuse("recording/unsupported-compression", format!("it is packed by {other}"), remedy);
             }
         })
     }

@@ -6,16 +6,15 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::clock::{Date, Probe, Stamp, TimeUnit};
-use super::columns::Body;
 use super::earth::{Local, bring, is_no_fix, no_fixes, origin};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted};
-use super::identity::{Rival, Suspect, Watch};
-use super::layout::Layout;
+use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::identity::{Names, Rival, Suspect, SwapMonitor};
+use super::layout::{Body, Layout};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::source::Source;
 
-/// Vehicles, the first of a table, whose rows are looked at for several vehicles of one name.
+/// Number of vehicles, from the first, whose rows are examined for several vehicles under one name.
 const MOST_SUSPECTED: usize = 256;
 
 /// A table, long or wide.
@@ -31,12 +30,12 @@ struct Table<C> {
     has_own_clock: bool,
     /// The first time, where times are written as dates.
     dates: Option<Date>,
-    /// Columns that may say otherwise whose rows they are.
+    /// Other columns that may name the vehicles.
     rivals: Vec<Rival>,
     /// Columns that may name several vehicles among the rows of one, for each vehicle.
     suspects: Vec<Vec<Suspect>>,
     /// Columns of a wide table that may name vehicles.
-    watches: Vec<Watch>,
+    watches: Vec<SwapMonitor>,
     /// Positions of a wide table whose vehicle a column names.
     named: usize,
     /// How many rows of each vehicle have no fix.
@@ -58,31 +57,26 @@ pub(super) fn open<C: Cells + 'static>(
 ) -> Result<Recording, ReadError> {
     if let (Some(rest), Some(_)) = (layout.rest, unit) {
         let problem = format!("it has a column of time stamps, and {} as well", quoted(&cells.header()[rest.column]));
-        return Err(Fault::coded(
-            "recording/ambiguous-column",
-            problem,
-            "name the one that is meant with --column t=NAME",
-        )
-        .into());
+        return refuse("recording/ambiguous-column", problem, "name the one that is meant with --column t=NAME");
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
     let mut about = About::new(source, options, unit, layout.notes.clone(), Fault::header_only());
     if dates.is_some_and(|first| !first.has_zone) {
-        about.notes.push("times are dates without a zone and are taken as UTC".to_owned());
+        about.metadata.notes.push("times are dates without a zone and are taken as UTC".to_owned());
     }
-    about.frame.has_directions = layout.convention.has_directions();
-    about.frame.is_planar = layout.is_planar;
+    about.metadata.has_directions = layout.convention.has_directions();
+    about.metadata.is_planar = layout.is_planar;
     let names = Names::from_list(layout.names.clone())?;
     let local = origin(&mut cells, &layout, options)?;
-    about.notes.extend(local.map(|local| local.note()));
-    about.frame.earth_origin = local.map(|local| local.measured_from(options.origin));
+    about.metadata.notes.extend(local.map(|local| local.note()));
+    about.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
     // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
     about.scale = if layout.on_earth { 1.0 } else { about.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
     let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
-    let watches = layout.slots.watched.iter().cloned().map(Watch::new).collect();
+    let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let table = Table {
         cells,
         layout,
@@ -109,12 +103,7 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
     let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
-        return Err(Fault::coded(
-            "recording/contradicts-option",
-            problem,
-            "leave --time-unit, --fps and --time-scale away",
-        )
-        .into());
+        return refuse("recording/contradicts-option", problem, "leave --time-unit, --fps and --time-scale away");
     }
     Ok(first)
 }
@@ -148,12 +137,12 @@ impl<C: Cells> Table<C> {
         if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
             let what = if Date::parse(&of_day).is_some() { "a date below numbers" } else { "a time of day" };
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
-            return Err(Fault::coded(
+            return refuse(
                 "recording/time-format",
                 problem,
                 "write all times as numbers, in seconds or in s, ms, us or ns since 1970, or all as dates with a time \
                  like 2023-11-14T22:13:20.5Z",
-            ));
+            );
         }
         let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
         number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
@@ -244,7 +233,7 @@ impl<C: Cells> Table<C> {
         Ok(())
     }
 
-    /// The fault of a vehicle whose rows look like those of several.
+    /// Returns the fault of a vehicle whose rows look like rows of several vehicles.
     fn suspicion(&self) -> Option<Fault> {
         let header = self.cells.header();
         if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)
@@ -280,14 +269,14 @@ impl<C: Cells> Table<C> {
             let problem =
                 format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
             let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
-            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+            return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
             let (first, other) = (called(id), called(rival.column));
             let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
             let [first, other] = [&header[id], &header[rival.column]];
             let remedy = format!("say which one does with --column id={first} or --column id={other}");
-            return Err(Fault::coded("recording/ambiguous-vehicle", problem, remedy));
+            return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         Ok(())
     }
@@ -304,7 +293,7 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[
     };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
-        return Err(Fault::coded("recording/radius", problem, "write 0 or more"));
+        return refuse("recording/radius", problem, "write 0 or more");
     }
     Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
@@ -436,7 +425,7 @@ pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Res
     let text = text.trim();
     let holds = |code, what: &str, remedy| {
         let problem = format!("column `{column}` holds {}, {what}", quoted(text));
-        Err(Fault::coded(code, problem, remedy))
+        refuse(code, problem, remedy)
     };
     match text.parse::<f64>() {
         _ if text.is_empty() => Ok(None),

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{Local, is_no_fix, no_fixes};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::readers::{Packing, Reader, Takes};
@@ -58,12 +58,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
             let problem = format!("{} is no topic that one vehicle's position is read from", quoted(topic));
-            return Err(Fault::coded(
-                "recording/unknown-topic",
-                problem,
-                format!("give --topic {GLOBAL} or --topic {LOCAL}"),
-            )
-            .into());
+            return refuse("recording/unknown-topic", problem, format!("give --topic {GLOBAL} or --topic {LOCAL}"));
         }
     };
     let mut log = Log::default();
@@ -74,7 +69,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(first) = fixes.first() else {
         let problem = format!("it has no {} whose place on the Earth is known", asked.unwrap_or("position"));
         let remedy = "log vehicle_global_position, or give the positions of a common frame as a table t,id,x,y,z";
-        return Err(Fault::coded("recording/no-fix", problem, remedy).into());
+        return refuse("recording/no-fix", problem, remedy);
     };
     let local = Local::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
@@ -88,7 +83,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
     let none = Fault::coded("recording/empty", "it holds no position", "record again");
     let mut about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
-    about.frame.earth_origin = Some(local.measured_from(options.origin));
+    about.metadata.earth_origin = Some(local.measured_from(options.origin));
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
     Ok(Box::new(Ordered::open(rows, about)?))
@@ -383,11 +378,11 @@ fn flags(body: &[u8]) -> Result<u64, Fault> {
     let needed: [u8; 8] = take(body, 8)?;
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
         let problem = "it is of a version of ULog that is not known";
-        return Err(Fault::coded(
+        return refuse(
             "recording/unsupported-format",
             problem,
             "write its vehicle_global_position with `ulog2csv`, and give that",
-        ));
+        );
     }
     let appended = u64::from_le_bytes(take(body, 16)?);
     Ok(if needed[0] & APPENDED == 0 || appended == 0 { u64::MAX } else { appended })

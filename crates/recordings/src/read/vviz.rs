@@ -10,8 +10,8 @@ use std::io::Read as _;
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-use super::curves::Curves;
-use super::error::{Fault, Place, ReadError, quoted};
+use super::curves::{Curves, from_json};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Packing, Reader, Takes};
@@ -79,15 +79,10 @@ struct Step {
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut bytes = Vec::new();
     source.bytes()?.read_to_end(&mut bytes)?;
-    let show = parse(&bytes)?;
+    let show: Show = from_json(&bytes, "a VVIZ show", "export the show as VVIZ 1.0")?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
         let problem = format!("its axes are those of {}, which are not known", quoted(frame));
-        return Err(Fault::coded(
-            "recording/unusable-frame",
-            problem,
-            "export it with the axes `ogl`: x right, y up, z forward",
-        )
-        .into());
+        return refuse("recording/unusable-frame", problem, "export it with the axes `ogl`: x right, y up, z forward");
     }
     let (mut vehicles, mut names) = (Vec::new(), BTreeSet::new());
     for performance in &show.performances {
@@ -109,12 +104,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         vehicles.push((name, items));
     }
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
-        return Err(Fault::coded(
+        return refuse(
             "recording/no-positions",
             "it has no drone with a sample of its way",
             "export it with the ways of its drones",
-        )
-        .into());
+        );
     }
     let mut notes = vec!["axes of graphics are turned: x right, y forward, z up".to_owned()];
     let still: Vec<_> = vehicles.iter().filter(|(_, items)| items.is_empty()).map(|(name, _)| quoted(name)).collect();
@@ -122,22 +116,6 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         notes.push(format!("not judged, for the show does not say when they are at their homes: {}", still.join(", ")));
     }
     Ok(Curves::recording(vehicles, notes))
-}
-
-fn parse(bytes: &[u8]) -> Result<Show, ReadError> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    serde_json::from_slice(text).map_err(|error| {
-        let fault = if error.is_eof() {
-            Fault::Truncated("the JSON ends before it is complete".to_owned())
-        } else {
-            Fault::coded(
-                "recording/malformed",
-                format!("it is not the JSON of a VVIZ show: {error}"),
-                "export the show as VVIZ 1.0",
-            )
-        };
-        fault.at(Place::Line(u64::try_from(error.line()).unwrap_or(0)))
-    })
 }
 
 /// The samples of a drone, or the number of the step that is wrong.
@@ -182,10 +160,10 @@ fn duration(step: &Step, show: &Show) -> Result<f64, Fault> {
     match (step.dt, show.default_position_rate) {
         (Some(duration_s), _) => Ok(duration_s),
         (None, Some(rate)) if rate > 0.0 => Ok(rate.recip()),
-        _ => Err(Fault::coded(
+        _ => refuse(
             "recording/frame-rate",
             "neither `dt` nor a positive `defaultPositionRate` says when it is",
             "export the show again",
-        )),
+        ),
     }
 }

@@ -1,6 +1,5 @@
 //! Recordings of any origin read, written and exported.
 
-mod readers;
 mod recording;
 
 mod any_bytes;

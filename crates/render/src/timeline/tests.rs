@@ -6,10 +6,10 @@ use super::*;
 use crate::error::FARTHEST_M;
 use tautline_audit::Violation;
 use tautline_core::swarm::{ClosestApproach, Pair};
-use tautline_core::track::{Clock, Item, Tracks};
+use tautline_core::track::{Item, Metadata, Tracks};
 
 /// Recorded motion: vehicle, time and place of every sample; names; a radius of all.
-struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>, Option<f64>);
+struct Seen(Vec<(usize, f64, f64, f64)>, Vec<String>, Option<f64>, Metadata);
 
 impl Tracks for Seen {
     type Error = Infallible;
@@ -28,13 +28,8 @@ impl Tracks for Seen {
         Ok(false)
     }
 
-    fn clock(&self) -> &Clock {
-        const CLOCK: Clock = Clock { unit: "s", inferred: false, by_steps: false, epoch_ns: 0 };
-        &CLOCK
-    }
-
-    fn notes(&self) -> &[String] {
-        &[]
+    fn metadata(&self) -> &Metadata {
+        &self.3
     }
 }
 
@@ -43,7 +38,12 @@ fn violations(timeline: &Timeline) -> Vec<Violation> {
 }
 
 fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Timeline {
-    let mut tracks = Seen(samples.to_vec(), ["a", "b", "c", "d"].map(str::to_owned).to_vec(), None);
+    let mut tracks = Seen(
+        samples.to_vec(),
+        ["a", "b", "c", "d"].map(str::to_owned).to_vec(),
+        None,
+        Metadata::in_seconds(Vec::new()),
+    );
     Timeline::from_tracks("seen", &mut tracks, Some(delta_m)).expect("it can be drawn")
 }
 
@@ -51,7 +51,8 @@ fn seen(samples: &[(usize, f64, f64, f64)], delta_m: f64) -> Timeline {
 fn radii_of_the_recording_are_judged_by_where_there_is_no_delta() {
     let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 5.0, 0.0), (0, 1.0, 0.0, 0.0), (1, 1.0, 1.5, 0.0)];
     let drawn = |radius_m| {
-        let mut tracks = Seen(samples.clone(), ["a", "b"].map(str::to_owned).to_vec(), radius_m);
+        let mut tracks =
+            Seen(samples.clone(), ["a", "b"].map(str::to_owned).to_vec(), radius_m, Metadata::in_seconds(Vec::new()));
         Timeline::from_tracks("seen", &mut tracks, None).expect("it can be drawn")
     };
     let [touching, apart, unknown] = [Some(1.0), Some(0.5), None].map(drawn);
@@ -65,7 +66,7 @@ fn what_single_precision_cannot_draw_is_refused_with_vehicle_value_and_time() {
     let near = seen(&[(0, 0.0, -FARTHEST_M, 0.0), (1, 0.0, FARTHEST_M, 0.0)], 1.0);
     assert_eq!(near.log.closest().map(|closest| closest.separation_m), Some(2.0 * FARTHEST_M));
     let samples = vec![(0, 0.0, 0.0, 0.0), (1, 0.0, 1.0, 0.0), (1, 0.5, 1.0, -1e300)];
-    let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec(), None);
+    let mut tracks = Seen(samples, ["a", "b"].map(str::to_owned).to_vec(), None, Metadata::in_seconds(Vec::new()));
     let error = Timeline::from_tracks("far", &mut tracks, None).expect_err("too far");
     assert_eq!(
         error.to_string(),

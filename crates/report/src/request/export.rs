@@ -9,7 +9,7 @@ use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
 use crate::report::write_atomically_with;
 use tautline_core::text::counted;
-use tautline_core::track::{Clock, EarthOrigin, Item, Tracks};
+use tautline_core::track::{Item, Metadata, Tracks};
 use tautline_recordings::export::{self, ExportOptions, WRITTEN};
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Recording};
 
@@ -51,24 +51,8 @@ impl Tracks for Interruptible {
         self.tracks.read(items)
     }
 
-    fn clock(&self) -> &Clock {
-        self.tracks.clock()
-    }
-
-    fn notes(&self) -> &[String] {
-        self.tracks.notes()
-    }
-
-    fn assumed(&self) -> Option<&str> {
-        self.tracks.assumed()
-    }
-
-    fn is_planar(&self) -> bool {
-        self.tracks.is_planar()
-    }
-
-    fn earth_origin(&self) -> Option<&EarthOrigin> {
-        self.tracks.earth_origin()
+    fn metadata(&self) -> &Metadata {
+        self.tracks.metadata()
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Settings};
-use tautline_core::track::{Clock, Item, Sample, Tracks};
+use tautline_core::track::{Item, Metadata, Sample, Tracks};
 use tautline_recordings::read::{ReadError, ReadOptions};
 use tautline_report::request::audit::Open;
 use tautline_report::request::{
@@ -18,14 +18,14 @@ use tautline_report::request::{
 /// Two that pass each other in a second, 1 m apart in between.
 struct Passing {
     names: [String; 2],
-    clock: Clock,
+    metadata: Metadata,
     is_read: bool,
 }
 
 impl Passing {
     fn new() -> Self {
-        let clock = Clock { unit: "s", ..Clock::default() };
-        Self { names: ["alpha", "bravo"].map(str::to_owned), clock, is_read: false }
+        let metadata = Metadata::in_seconds(Vec::new());
+        Self { names: ["alpha", "bravo"].map(str::to_owned), metadata, is_read: false }
     }
 }
 
@@ -52,12 +52,8 @@ impl Tracks for Passing {
         Ok(!std::mem::replace(&mut self.is_read, true))
     }
 
-    fn clock(&self) -> &Clock {
-        &self.clock
-    }
-
-    fn notes(&self) -> &[String] {
-        &[]
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
     }
 }
 

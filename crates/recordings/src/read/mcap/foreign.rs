@@ -4,9 +4,10 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
-use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted};
+use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::super::identity::Names;
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use super::messages::{EARTH, Seen, What, Who, is_list, reader_of_topic};
 use super::outline::{is_static, place, space};
@@ -19,7 +20,7 @@ pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) ->
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
     let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    about.frame.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
+    about.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Messages that are there twice are those of a bag that is.
     about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
     let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
@@ -188,7 +189,7 @@ impl Splits {
             let problem =
                 format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
-                return Err(Fault::coded("recording/bag-index", problem, "copy the whole folder again").into());
+                return refuse("recording/bag-index", problem, "copy the whole folder again");
             }
             self.note(problem);
         }
@@ -270,11 +271,11 @@ impl Poses {
         };
         if wanted == EARTH {
             let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
-            return Err(Fault::coded(
+            return refuse(
                 "recording/unusable-frame",
                 problem,
                 "leave --frame out, or name a frame of poses; --topic says which topics are read",
-            ));
+            );
         }
         if *wanted == seen.frame {
             return Ok(Some(seen.position));
@@ -335,7 +336,7 @@ impl Poses {
                 let problem =
                     format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
                 let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
-                return Err(Fault::coded("recording/several-frames", problem, remedy));
+                return refuse("recording/several-frames", problem, remedy);
             }
         }
         Ok(())

@@ -1,9 +1,11 @@
-//! Positions of a message, and the schemas whose messages hold positions.
+//! Positions of a message, and the schemas whose messages hold positions: those of ROS 2 in CDR, and those of Foxglove in
+//! protobuf and JSON.
 
 use nalgebra::Vector3;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
-use super::{foxglove_poses, ros};
-use crate::mcap::topic::{CDR, Declared};
+use crate::mcap::topic::{CDR, Declared, decode};
 
 /// Reads a message in an encoding; the error says what is wrong with it.
 pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;
@@ -56,7 +58,51 @@ pub(super) fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
 
 /// What reads the messages of a schema, where they hold positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
-    foxglove_poses::reader_of(schema).or_else(|| ros::reader_of(schema))
+    let reader: Reader = match schema {
+        "foxglove.PoseInFrame" => {
+            |encoding, bytes| decode_foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.seen()])
+        }
+        "foxglove.PosesInFrame" => |encoding, bytes| decode_foxglove(encoding, bytes).map(PosesInFrame::seen),
+        "foxglove.FrameTransform" => {
+            |encoding, bytes| decode_foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.seen()])
+        }
+        "foxglove.FrameTransforms" => |encoding, bytes| {
+            let transforms = decode_foxglove(encoding, bytes).map(|message: FrameTransforms| message.transforms);
+            Ok(transforms?.into_iter().map(FrameTransform::seen).collect())
+        },
+        "geometry_msgs/msg/PoseStamped" | "geometry_msgs/msg/PoseWithCovarianceStamped" => |encoding, bytes| {
+            // The covariance is behind the pose.
+            let (header, pose): (Header, CdrPose) = decode_ros(encoding, bytes)?;
+            Ok(vec![header.seen(Who::Topic, pose)])
+        },
+        "geometry_msgs/msg/PointStamped" => |encoding, bytes| {
+            let (header, point): (Header, [f64; 3]) = decode_ros(encoding, bytes)?;
+            Ok(vec![header.seen(Who::Topic, CdrPose(point, [0.0; 4]))])
+        },
+        "geometry_msgs/msg/PoseArray" => |encoding, bytes| {
+            let (header, poses): (Header, Vec<CdrPose>) = decode_ros(encoding, bytes)?;
+            Ok((1..).zip(poses).map(|(number, pose)| header.seen(Who::Listed(number), pose)).collect())
+        },
+        "motion_capture_tracking_interfaces/msg/NamedPoseArray" => |encoding, bytes| {
+            let (header, poses): (Header, Vec<(String, CdrPose)>) = decode_ros(encoding, bytes)?;
+            Ok(poses.into_iter().map(|(name, pose)| header.seen(Who::Named(name), pose)).collect())
+        },
+        // The velocity behind the pose is not read: publishers differ on the frame that it is given in.
+        "nav_msgs/msg/Odometry" => |encoding, bytes| {
+            let (header, child, pose): (Header, String, CdrPose) = decode_ros(encoding, bytes)?;
+            Ok(vec![Seen { what: What::Odometry(child), ..header.seen(Who::Topic, pose) }])
+        },
+        FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::seen),
+        "geometry_msgs/msg/TransformStamped" => {
+            |encoding, bytes| decode_ros(encoding, bytes).map(|transform: Transform| vec![transform.seen()])
+        }
+        "tf2_msgs/msg/TFMessage" => |encoding, bytes| {
+            let (transforms,): (Vec<Transform>,) = decode_ros(encoding, bytes)?;
+            Ok(transforms.into_iter().map(Transform::seen).collect())
+        },
+        _ => return None,
+    };
+    Some(reader)
 }
 
 /// The same of a topic, where it is in an encoding that is read.
@@ -78,4 +124,175 @@ pub(super) fn is_of_transforms(schema: &str) -> bool {
             | "geometry_msgs/msg/TransformStamped"
             | "tf2_msgs/msg/TFMessage"
     )
+}
+
+fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
+    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
+}
+
+/// Seconds and nanoseconds, and the frame.
+#[derive(Deserialize)]
+struct Header((i32, u32), String);
+
+impl Header {
+    fn seen(&self, who: Who, CdrPose(position, _): CdrPose) -> Seen {
+        let Self((sec, nanosec), frame) = self;
+        let stamp_ns = nanoseconds((*sec).into(), (*nanosec).into());
+        Seen { who, frame: frame.clone(), stamp_ns, position: position.into(), what: What::Pose }
+    }
+}
+
+/// A position and a quaternion, of poses and transforms alike.
+#[derive(Deserialize)]
+struct CdrPose([f64; 3], [f64; 4]);
+
+/// The name is that of the child frame.
+#[derive(Deserialize)]
+struct Transform(Header, String, CdrPose);
+
+impl Transform {
+    fn seen(self) -> Seen {
+        let Self(header, child, pose) = self;
+        Seen { what: What::Transform(pose.1), ..header.seen(Who::Named(child), pose) }
+    }
+}
+
+/// Whether there is a fix, by which satellites, and latitude, longitude and height.
+#[derive(Deserialize)]
+struct Fix(Header, (i8, u16), [f64; 3]);
+
+impl Fix {
+    /// Where there is no fix, or none with a height, nothing was seen.
+    fn seen(self) -> Vec<Seen> {
+        let Self(header, (status, _), place) = self;
+        if status < 0 || place[2].is_nan() {
+            return Vec::new();
+        }
+        vec![Seen { frame: EARTH.to_owned(), ..header.seen(Who::Topic, CdrPose(place, [0.0; 4])) }]
+    }
+}
+
+fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
+    match encoding {
+        "protobuf" => T::decode(bytes).map_err(|error| error.to_string()),
+        "json" => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
+        _ => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Timestamp {
+    #[prost(int64, tag = "1")]
+    #[serde(alias = "sec")]
+    seconds: i64,
+    #[prost(int32, tag = "2")]
+    #[serde(alias = "nsec")]
+    nanos: i32,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Vec3 {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Quaternion {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+    #[prost(double, tag = "4")]
+    w: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct Pose {
+    #[prost(message, optional, tag = "1")]
+    position: Option<Vec3>,
+}
+
+/// What a Foxglove message does not say is 0.
+fn foxglove_seen(who: Who, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Seen {
+    let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
+    let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));
+    Seen { who, frame, stamp_ns, position, what: What::Pose }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct PoseInFrame {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    frame_id: String,
+    #[prost(message, optional, tag = "3")]
+    pose: Option<Pose>,
+}
+
+impl PoseInFrame {
+    fn seen(self) -> Seen {
+        foxglove_seen(Who::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct PosesInFrame {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    frame_id: String,
+    #[prost(message, repeated, tag = "3")]
+    poses: Vec<Pose>,
+}
+
+impl PosesInFrame {
+    fn seen(self) -> Vec<Seen> {
+        let one = |(number, pose): (usize, &Pose)| {
+            foxglove_seen(Who::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
+        };
+        (1..).zip(&self.poses).map(one).collect()
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct FrameTransform {
+    #[prost(message, optional, tag = "1")]
+    timestamp: Option<Timestamp>,
+    #[prost(string, tag = "2")]
+    parent_frame_id: String,
+    #[prost(string, tag = "3")]
+    child_frame_id: String,
+    #[prost(message, optional, tag = "4")]
+    translation: Option<Vec3>,
+    #[prost(message, optional, tag = "5")]
+    rotation: Option<Quaternion>,
+}
+
+impl FrameTransform {
+    fn seen(self) -> Seen {
+        let turn = self.rotation.map_or(NO_TURN, |q| [q.x, q.y, q.z, q.w]);
+        let seen =
+            foxglove_seen(Who::Named(self.child_frame_id), self.parent_frame_id, self.timestamp, self.translation);
+        Seen { what: What::Transform(turn), ..seen }
+    }
+}
+
+#[derive(Clone, PartialEq, prost::Message, Deserialize)]
+#[serde(default)]
+struct FrameTransforms {
+    #[prost(message, repeated, tag = "1")]
+    transforms: Vec<FrameTransform>,
 }

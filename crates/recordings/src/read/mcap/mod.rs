@@ -13,20 +13,19 @@
 //! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
 //! what it holds.
 
+pub(super) mod bag;
 mod foreign;
-mod foxglove_poses;
 mod messages;
 mod outline;
 pub(crate) mod own;
 mod plan;
-mod ros;
 mod tree;
 
 pub use own::Channels;
 
 use std::path::Path;
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, Packing, Reader, Takes};
@@ -35,16 +34,6 @@ use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
 use foreign::Splits;
 use tautline_core::record::{ReadFault, RecordError};
-
-/// Opens the files of a ROS 2 bag, which follow each other and have at least so many messages.
-pub(super) fn open_bag(
-    folder: &Source,
-    files: Vec<Source>,
-    messages: u64,
-    options: &ReadOptions,
-) -> Result<Recording, ReadError> {
-    foreign::open(folder, Splits::new(files, messages, options), options)
-}
 
 pub(in crate::read) const READER: Reader = Reader {
     name: "mcap",
@@ -104,7 +93,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
                   geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, sensor_msgs/msg/NavSatFix, \
                   motion_capture_tracking_interfaces/msg/NamedPoseArray or tf2_msgs/msg/TFMessage are read";
-    Err(Fault::coded("recording/no-positions", "it has no topic with positions", remedy).into())
+    refuse("recording/no-positions", "it has no topic with positions", remedy)
 }
 
 impl From<RecordError> for ReadError {

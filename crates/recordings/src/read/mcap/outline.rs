@@ -6,7 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::super::earth::is_no_fix;
-use super::super::error::{Fault, Place, ReadError, quoted};
+use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::heading::Words;
 use super::foreign::Splits;
 use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
 use super::tree::{Body, Placed, Tree};
@@ -92,8 +93,8 @@ impl Outline {
         reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
     }
 
-    /// Takes note of how many poses a list has. One that is shorter or longer than those before does not say whose pose came or
-    /// went; an empty one says that nobody is seen.
+    /// Records the number of poses of a list. A list of another length does not tell which vehicle appeared or left. In an
+    /// empty list no vehicle is seen.
     fn count(&mut self, message: &Message<'_>, listed: usize) -> Result<(), Fault> {
         if listed == 0 {
             return Ok(());
@@ -104,12 +105,12 @@ impl Outline {
                 "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
                 told.listed
             );
-            return Err(Fault::coded(
+            return refuse(
                 "recording/list-length",
                 problem,
                 "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
                  --topic if the list is of no vehicles",
-            ));
+            );
         }
         told.listed = listed;
         Ok(())
@@ -130,7 +131,7 @@ impl Outline {
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
-            return Err(Fault::coded("recording/unusable-frame", problem, "give the frame another name"));
+            return refuse("recording/unusable-frame", problem, "give the frame another name");
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
@@ -148,7 +149,7 @@ impl Outline {
         let What::Odometry(child) = seen.what else { return Ok(()) };
         if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
             let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
-            return Err(Fault::coded("recording/several-vehicles", problem, "record each robot on a topic of its own"));
+            return refuse("recording/several-vehicles", problem, "record each robot on a topic of its own");
         }
         told.child = Some(child);
         Ok(())
@@ -204,8 +205,8 @@ impl Outline {
         Ok(())
     }
 
-    /// Refuses topics that tell by their names where somebody is asked to be beside topics that do not, unless the user names
-    /// those that are read: a vehicle is never judged against what it was asked to do, nor that in its place.
+    /// Refuses topics of setpoints beside topics of measured positions, unless the user names the topics that are read. A
+    /// setpoint is never judged in place of a measured position.
     pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
         let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
         let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
@@ -213,10 +214,10 @@ impl Outline {
         let problem = format!(
             "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
         );
-        Err(Fault::coded("recording/ambiguous-topics", problem, CHOOSE))
+        refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
-    /// Topics that tell by their names where somebody is asked to be, unless the user names those that are read.
+    /// Topics of setpoints by their names, unless the user names the topics that are read.
     pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
         let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
         guessed.map(String::as_str).filter(|topic| is_wish(topic))
@@ -242,7 +243,7 @@ impl Outline {
     }
 }
 
-/// Whom topics of poses tell of.
+/// Vehicles that topics of poses describe.
 #[derive(Default)]
 pub(super) struct Cover<'a> {
     /// Names in messages and of the namespaces of topics.
@@ -278,7 +279,7 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
             "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
         );
         let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
-        return Err(Fault::coded("recording/several-frames", problem, remedy));
+        return refuse("recording/several-frames", problem, remedy);
     }
     Ok(())
 }
@@ -286,28 +287,10 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
 /// Words in topics of setpoints, which hold commanded instead of measured positions: of MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
 /// (`motion_reference/pose`), planners, and what is clicked in a viewer.
-const WISHES: [&str; 20] = [
-    "clicked",
-    "cmd",
-    "command",
-    "commanded",
-    "des",
-    "desired",
-    "goal",
-    "initialpose",
-    "plan",
-    "planned",
-    "planner",
-    "planning",
-    "predicted",
-    "ref",
-    "reference",
-    "setpoint",
-    "sp",
-    "target",
-    "waypoint",
-    "wp",
-];
+const WISHES: Words = Words(
+    "clicked cmd command commanded des desired goal initialpose plan planned planner planning predicted ref \
+     reference setpoint sp target waypoint wp",
+);
 
 /// Whether a topic holds transforms that never change.
 pub(super) fn is_static(topic: &str) -> bool {
@@ -331,7 +314,7 @@ pub(super) fn space(topic: &str) -> &str {
 
 /// Returns whether a name contains a word for setpoints, in the singular or the plural.
 pub(super) fn is_wish(name: &str) -> bool {
-    let is_one = |word: &str| WISHES.contains(&word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(&one));
+    let is_one = |word: &str| WISHES.contains(word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(one));
     words(name).split(' ').any(is_one)
 }
 

@@ -16,8 +16,9 @@ use serde::{Deserialize, Serialize};
 use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
+use super::super::identity::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, BATCH, Names, Ordered, Recording, Row, Rows};
+use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
@@ -56,7 +57,7 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     let is_planar = exported.instants.axes == Some(2);
     let none = Fault::coded("recording/empty", "it holds no instant", "export again");
     let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    (about.epoch_ns, about.frame.is_planar) = (exported.instants.epoch_ns, is_planar);
+    (about.epoch_ns, about.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
     Ok(Box::new(Ordered::open(exported, about)?))
 }
@@ -101,7 +102,7 @@ impl Instants {
     }
 }
 
-/// Appends the rows of an instant of this number, whose positions have so many axes; the error says what is wrong with it.
+/// Appends the rows of an instant with this number and number of axes; the error is the fault of the message.
 fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &mut Vec<Row>)) -> Result<(), String> {
     let count = instant.vehicles.len();
     let fits = |length: usize, each: usize| length == each * count;
@@ -180,7 +181,7 @@ impl Channels {
         Ok(has_some.then_some(channels))
     }
 
-    /// The channels of the next instant, which is of so many vehicles, a row for each in the order of the instant; none
+    /// The channels of the next instant, which is of `vehicles` vehicles, a row for each in the order of the instant; none
     /// behind the last one.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::super::axes;
 use super::super::earth::Local;
-use super::super::error::{Fault, ReadError, quoted};
+use super::super::error::{Fault, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::foreign::Splits;
 use super::messages::{EARTH, What, Who};
@@ -62,9 +62,7 @@ impl Plan {
             axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return Err(
-                Fault::coded("recording/unused-option", "it has no place on the Earth", "leave --origin away").into()
-            );
+            return refuse("recording/unused-option", "it has no place on the Earth", "leave --origin away");
         }
         plan.check()?;
         plan.find_bodies()?;
@@ -85,7 +83,7 @@ impl Plan {
         if let Some(name) = self.outline.named.iter().find(|topic| !known.contains(topic)) {
             let problem =
                 format!("it has no topic {} with positions; those that it has are {}", quoted(name), known.join(", "));
-            return Err(Fault::coded("recording/unknown-topic", problem, "name one of these with --topic"));
+            return refuse("recording/unknown-topic", problem, "name one of these with --topic");
         }
         self.outline.refuse_twice()?;
         self.outline.refuse_wishes()
@@ -120,7 +118,7 @@ impl Plan {
             let problem = format!("transforms tell of {}, and topics of poses tell of other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
             let remedy = format!("say which topics are read with --topic NAME, once for each; it has {known}");
-            return Err(Fault::coded("recording/ambiguous-topics", problem, remedy));
+            return refuse("recording/ambiguous-topics", problem, remedy);
         }
         if !covered.is_empty() {
             let covered = covered.join(", ");

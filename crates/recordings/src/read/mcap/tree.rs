@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::super::error::{Fault, UNSEEN, quoted};
+use super::super::error::{Fault, UNSEEN, quoted, refuse};
 
 /// Longest way from a frame to its root \[frames\].
 const DEEPEST: usize = 64;
@@ -98,7 +98,7 @@ impl Tree {
             return Ok(());
         }
         let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
-        Err(Fault::coded("recording/transforms", problem, "record again, with one publisher of each transform"))
+        refuse("recording/transforms", problem, "record again, with one publisher of each transform")
     }
 
     /// Frames that stand still in their parents.
@@ -119,11 +119,11 @@ impl Tree {
                 let problem =
                     format!("frame {} is given in {} and in {}", quoted(child), quoted(&edge.parent), quoted(stray));
                 let remedy = "a frame has one parent: record robots under namespaces of their own, or name topics of poses with --topic";
-                return Err(Fault::coded("recording/transforms", problem, remedy));
+                return refuse("recording/transforms", problem, remedy);
             }
             if way.len() > DEEPEST {
                 let problem = format!("transforms lead from {} through more than {DEEPEST} frames", quoted(frame));
-                return Err(Fault::coded("recording/transforms", problem, "look whether they go round in a circle"));
+                return refuse("recording/transforms", problem, "look whether they go round in a circle");
             }
             way.push(&edge.parent);
         }
@@ -187,11 +187,7 @@ impl Tree {
             edge.samples.dedup();
             if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
                 let problem = format!("frame {} is in two places of its parent at {time_ns} ns", quoted(frame));
-                return Err(Fault::coded(
-                    "recording/transforms",
-                    problem,
-                    "record again, with one publisher of each transform",
-                ));
+                return refuse("recording/transforms", problem, "record again, with one publisher of each transform");
             }
         }
         Ok(())
@@ -274,7 +270,7 @@ impl Placed {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
             let problem = format!("the quaternion {x}, {y}, {z}, {w} is no rotation: its length is not 1");
-            return Err(Fault::coded("recording/transforms", problem, "record again, or leave --frame away"));
+            return refuse("recording/transforms", problem, "record again, or leave --frame away");
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }

@@ -2,13 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::extremum::{Enclosure, Goal, WIDTH, derivative, largest, largest_of};
+use super::extremum::{Enclosure, Found, Goal, MeanAcceleration, Velocity, WIDTH, derivative, largest, largest_of};
 use super::fence::Fence;
-use super::followed::{Followed, Found};
-use super::limit::{Envelope, Limit, Quantity};
-use super::mean_acceleration::{MeanAcceleration, Velocity};
-use super::outcome::EnvelopeOutcome;
-use crate::error::Interruption;
+use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
+use crate::findings::{Finding, LISTED, Shortlist, Tally};
+use crate::ledger::Interruption;
+use crate::outcome::Status;
 use crate::polynomial::{rescale, stray_across, value};
 use crate::sweep::Interval;
 use tautline_core::track::{Item, Piece, Sample};
@@ -18,7 +17,7 @@ use tautline_core::track::{Item, Piece, Sample};
 const SMOOTH: f64 = 1e-3;
 /// Pieces whose times are within this \[s\] meet.
 const SAME_INSTANT_S: f64 = 1e-6;
-/// Part of the room that is left to a fence to which a curve's least room is told.
+/// Resolution of the smallest clearance margin of a curve, as a part of the margin that is left.
 const COARSE: f64 = 1e-3;
 /// What is taken of accelerations between samples where nothing bounds them.
 const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
@@ -28,7 +27,7 @@ fn by_windows(length_s: f64) -> String {
     format!("accelerations are means over {length_s:?} s")
 }
 
-/// What is known of an item beside itself.
+/// Context of an item.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Seen {
     /// Added to its times \[s\].
@@ -41,30 +40,30 @@ pub(crate) struct Seen {
 
 /// Follows every limit, vehicle by vehicle.
 #[derive(Clone, Debug)]
-pub(crate) struct Watch {
-    fence: Option<WatchedFence>,
+pub(crate) struct LimitMonitor {
+    fence: Option<MonitoredFence>,
     window: Interval,
-    of: Vec<Followed>,
+    of: Vec<LimitRecord>,
     vehicles: Vec<Last>,
     /// Length of the averaging window of accelerations \[s\], and the recent velocities of each vehicle.
     accel_window_s: Option<f64>,
     means: Vec<MeanAcceleration>,
 }
 
-/// A fence, and what ends the search for the room to it.
+/// A fence, and the flag that ends the search for the clearance margin.
 #[derive(Clone, Debug)]
-struct WatchedFence {
+struct MonitoredFence {
     fence: Fence,
     interruption: Interruption,
 }
 
-impl WatchedFence {
-    fn room_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
-        self.fence.room_until(from, to, &self.interruption)
+impl MonitoredFence {
+    fn clearance_margin_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+        self.fence.margin_until(from, to, &self.interruption)
     }
 }
 
-/// What was seen of a vehicle last.
+/// Last state of a vehicle.
 #[derive(Clone, Copy, Debug, Default)]
 struct Last {
     sample: Option<Sample>,
@@ -74,10 +73,10 @@ struct Last {
     interval: Option<(Vector3<f64>, f64)>,
 }
 
-impl Watch {
+impl LimitMonitor {
     pub(crate) fn new(envelope: &Envelope, window: Interval, accel_window_s: Option<f64>) -> Self {
-        let of = envelope.all().into_iter().map(Followed::new).collect();
-        let fence = envelope.fence.clone().map(|fence| WatchedFence { fence, interruption: Interruption::default() });
+        let of = envelope.all().into_iter().map(LimitRecord::new).collect();
+        let fence = envelope.fence.clone().map(|fence| MonitoredFence { fence, interruption: Interruption::default() });
         Self { fence, window, of, vehicles: Vec::new(), accel_window_s, means: Vec::new() }
     }
 
@@ -87,7 +86,7 @@ impl Watch {
         }
     }
 
-    /// Takes what is said of a vehicle next.
+    /// Takes the next item of a vehicle.
     pub(crate) fn take(&mut self, item: &Item, seen: Seen) {
         let vehicle = item.vehicle();
         if self.vehicles.len() <= vehicle {
@@ -179,13 +178,13 @@ impl Watch {
         }
     }
 
-    /// A vehicle of which nothing is known before.
+    /// Judges the first sample of a vehicle, or the first sample after a gap.
     fn instant(&mut self, seen: &Sample) {
         let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
         self.each(seen.vehicle, |limit, fence, window, _| {
             let is_asked = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
             let exact = match (limit.quantity, limit.quantity.derivative()) {
-                (Quantity::Fence, _) => -fence?.room_m(seen.position_m, seen.position_m),
+                (Quantity::Fence, _) => -fence?.clearance_margin_m(seen.position_m, seen.position_m),
                 (quantity, 0) => quantity.of(seen.position_m),
                 (quantity, 1) => quantity.of(seen.velocity_m_s?),
                 _ => return None,
@@ -247,7 +246,7 @@ impl Watch {
         let is_in = |window: Interval| window.from_s <= from_s && from_s <= window.to_s;
         self.each(vehicle, |limit, fence, window, _| {
             let lower = match limit.quantity.derivative() {
-                0 if limit.quantity == Quantity::Fence => -fence?.room_m(before.position_m, start),
+                0 if limit.quantity == Quantity::Fence => -fence?.clearance_margin_m(before.position_m, start),
                 0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
                 _ if jumps => f64::NEG_INFINITY,
                 2 if is_parted && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
@@ -271,7 +270,7 @@ impl Watch {
     fn each(
         &mut self,
         vehicle: usize,
-        mut find: impl FnMut(Limit, Option<&WatchedFence>, Interval, f64) -> Option<Found>,
+        mut find: impl FnMut(Limit, Option<&MonitoredFence>, Interval, f64) -> Option<Found>,
     ) {
         let Self { fence, window, of, .. } = self;
         for of in of {
@@ -290,7 +289,7 @@ impl Watch {
 /// Heights and the room to a fence between two samples: those of the straight line, and of whatever is within A h^2 / 8 of it.
 fn place_between(
     limit: Limit,
-    fence: Option<&WatchedFence>,
+    fence: Option<&MonitoredFence>,
     window: Interval,
     (before, seen): (&Sample, &Sample),
     (bound_m_s2, known): (f64, f64),
@@ -307,12 +306,12 @@ fn place_between(
             (ends[0], ends[1], ends[0].max(ends[1]))
         }
         Some(fence) => {
-            let drawn = -fence.room_m(from, to);
-            // Where it is no worse than what is known, nobody asks at which end.
+            let drawn = -fence.clearance_margin_m(from, to);
+            // The end matters only where the value is worse than the worst known value.
             let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
                 [drawn; 2]
             } else {
-                [from, to].map(|here| -fence.room_m(here, here))
+                [from, to].map(|here| -fence.clearance_margin_m(here, here))
             };
             (first, second, drawn)
         }
@@ -359,9 +358,160 @@ fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
 }
 
 /// How far outside of a fence a curve gets.
-fn outside(fence: &WatchedFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
     largest(part, goal, |part, _| {
         let (from, to) = (part[0], value(part, 1.0));
-        [-fence.room_m(from, from), -fence.room_m(to, to), stray_across(part) - fence.room_m(from, to)]
+        [
+            -fence.clearance_margin_m(from, from),
+            -fence.clearance_margin_m(to, to),
+            stray_across(part) - fence.clearance_margin_m(from, to),
+        ]
     })
+}
+
+/// A limit as far as the recording was read.
+#[derive(Clone, Debug)]
+pub(super) struct LimitRecord {
+    pub(super) limit: Limit,
+    extreme: Option<Exceeding>,
+    violations: Times,
+    undecided: Times,
+    /// Which vehicles something was told of.
+    told: Vec<bool>,
+    /// What was taken for granted to tell it.
+    pub(super) assumes: Option<String>,
+    /// Corners at which a velocity jumps; nothing is held against a limit there.
+    corners: Option<Corners>,
+}
+
+impl LimitRecord {
+    pub(super) fn new(limit: Limit) -> Self {
+        let (violations, undecided) = (Times::default(), Times::default());
+        Self { limit, extreme: None, violations, undecided, told: Vec::new(), assumes: None, corners: None }
+    }
+
+    /// The worst value that is known.
+    pub(super) fn known(&self) -> f64 {
+        self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
+    }
+
+    pub(super) fn note(&mut self, vehicle: usize, found: Option<Found>) {
+        let Some((over, Enclosure { lower, upper, at })) = found else { return };
+        if self.told.len() <= vehicle {
+            self.told.resize(vehicle + 1, false);
+        }
+        self.told[vehicle] = true;
+        let at_s = over.from_s + at * (over.to_s - over.from_s);
+        let found = Exceeding { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
+        let bound = self.limit.bound();
+        if lower > bound {
+            self.violations.add(found);
+        } else if upper > bound {
+            self.undecided.add(found);
+        }
+        let extreme = self.extreme.get_or_insert(found);
+        if found.lower > extreme.lower {
+            *extreme = Exceeding { upper: extreme.upper.max(upper), ..found };
+        } else {
+            extreme.upper = extreme.upper.max(upper);
+        }
+    }
+
+    /// Takes note of a corner at which the velocity jumps \[m/s\].
+    pub(super) fn note_corner(&mut self, vehicle: usize, at_s: f64, by_m_s: f64) {
+        let corner = Corner { vehicle, at_s, by_m_s };
+        let corners = self.corners.get_or_insert(Corners { count: 0, largest: corner });
+        corners.count += 1;
+        if by_m_s > corners.largest.by_m_s {
+            corners.largest = corner;
+        }
+    }
+
+    pub(super) fn finish(self, judged: &[bool], is_whole: bool) -> LimitOutcome {
+        let Self { limit, extreme, violations, undecided, told, assumes, corners } = self;
+        let is_told = |vehicle: usize| told.get(vehicle).copied().unwrap_or(false);
+        let unknown: Vec<_> =
+            judged.iter().enumerate().filter(|&(vehicle, &asked)| asked && !is_told(vehicle)).map(|(k, _)| k).collect();
+        let turned = |of: Exceeding| {
+            let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
+            Exceeding { lower, upper, ..of }
+        };
+        let listed = |times: Times| {
+            let (list, tally) = times.finish();
+            (list.into_iter().map(turned).collect::<Vec<_>>(), tally)
+        };
+        let ((violations, violations_tally), (undecided, undecided_tally)) = (listed(violations), listed(undecided));
+        let decided = is_whole && undecided.is_empty() && unknown.is_empty() && extreme.is_some();
+        LimitOutcome {
+            status: Status::new(!violations.is_empty(), decided),
+            extreme: extreme.map(turned),
+            violations,
+            undecided,
+            violations_tally,
+            undecided_tally,
+            unknown,
+            assumes,
+            corners,
+            limit,
+        }
+    }
+}
+
+/// Times of vehicles, those of one that go on as one. All are counted; the worst and the first of each vehicle are kept.
+#[derive(Clone, Debug)]
+struct Times {
+    /// The last one of each vehicle, which may go on.
+    open: Vec<Option<Exceeding>>,
+    ended: Shortlist<Exceeding>,
+    count: u64,
+}
+
+impl Times {
+    fn add(&mut self, found: Exceeding) {
+        if self.open.len() <= found.vehicle {
+            self.open.resize(found.vehicle + 1, None);
+        }
+        let last = &mut self.open[found.vehicle];
+        if let Some(of) = last.as_mut().filter(|of| of.to_s >= found.from_s) {
+            of.to_s = of.to_s.max(found.to_s);
+            of.upper = of.upper.max(found.upper);
+            if found.lower > of.lower {
+                (of.lower, of.at_s) = (found.lower, found.at_s);
+            }
+        } else {
+            self.count += 1;
+            self.ended.extend(last.replace(found));
+        }
+    }
+
+    /// Those that are kept, in order of time, and how many there are.
+    fn finish(mut self) -> (Vec<Exceeding>, Tally) {
+        self.ended.extend(self.open.into_iter().flatten());
+        let list = self.ended.into_list();
+        let tally = Tally { count: self.count, listed: list.len(), is_exact: true };
+        (list, tally)
+    }
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { open: Vec::new(), ended: Shortlist::new(LISTED), count: 0 }
+    }
+}
+
+impl Finding for Exceeding {
+    type On = usize;
+
+    fn on(&self) -> usize {
+        self.vehicle
+    }
+
+    fn span_s(&self) -> [f64; 2] {
+        [self.from_s, self.to_s]
+    }
+
+    /// What is certain, or else what is possible.
+    fn excess(&self) -> f64 {
+        if self.lower == f64::NEG_INFINITY { self.upper } else { self.lower }
+    }
 }

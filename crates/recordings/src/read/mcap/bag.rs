@@ -8,12 +8,12 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::error::{Fault, Place, ReadError, quoted};
-use super::mcap;
-use super::options::ReadOptions;
-use super::order::Recording;
-use super::recognise::BAG;
-use super::source::{Source, ZSTD_MAGIC};
+use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::options::ReadOptions;
+use super::super::order::Recording;
+use super::super::readers::BAG;
+use super::super::source::{Source, ZSTD_MAGIC};
+use super::foreign::{self, Splits};
 
 /// What a bag says of itself.
 const METADATA: &str = "metadata.yaml";
@@ -42,14 +42,14 @@ struct Bag {
 }
 
 /// Whether a folder is a bag.
-pub(super) fn is_bag(folder: &Path) -> bool {
+pub(in crate::read) fn is_bag(folder: &Path) -> bool {
     let path = folder.join(METADATA);
     path.is_file()
         && bytes_of(&path).is_ok_and(|bytes| memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some())
 }
 
 /// Opens a bag.
-pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let metadata = folder.join(METADATA);
     let bag = read(&metadata).map_err(|error| error.of(&metadata))?;
     let files = files_of(&bag, folder).map_err(|fault| ReadError::new(&metadata, fault))?;
@@ -71,18 +71,14 @@ pub(super) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, Re
         Ok(source)
     };
     let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
-    mcap::open_bag(&Source::file(folder), files, bag.message_count, options)
+    foreign::open(&Source::file(folder), Splits::new(files, bag.message_count, options), options)
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     File::open(path)?.take(METADATA_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > METADATA_LIMIT_BYTES {
-        return Err(Fault::coded(
-            "recording/bag-index",
-            format!("it is longer than {METADATA_LIMIT_BYTES} bytes"),
-            REINDEX,
-        ));
+        return refuse("recording/bag-index", format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX);
     }
     Ok(bytes)
 }
@@ -110,20 +106,20 @@ fn missing(error: std::io::Error) -> Fault {
 fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if bag.storage_identifier != "mcap" {
         let problem = format!("the bag is stored as {}, which is not read", quoted(&bag.storage_identifier));
-        return Err(Fault::coded("recording/unsupported-format", problem, BAG));
+        return refuse("recording/unsupported-format", problem, BAG);
     }
     let mode = bag.compression_mode.as_deref().unwrap_or_default().to_uppercase();
     let format = bag.compression_format.as_deref().unwrap_or_default();
     if mode == "MESSAGE" || !(format.is_empty() || format == "zstd") {
         let problem = format!("the bag is packed by {} in mode {}", quoted(format), quoted(&mode));
-        return Err(Fault::coded(
+        return refuse(
             "recording/unsupported-compression",
             problem,
             "have `ros2 bag convert` write it without compression, or with that of files",
-        ));
+        );
     }
     if bag.relative_file_paths.is_empty() {
-        return Err(Fault::coded("recording/bag-index", "the bag lists no file", REINDEX));
+        return refuse("recording/bag-index", "the bag lists no file", REINDEX);
     }
     let (mut files, mut known) = (Vec::new(), BTreeSet::new());
     for listed in &bag.relative_file_paths {
@@ -133,15 +129,11 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
         let name = path.file_name().filter(|_| !path.components().any(odd));
         let Some(name) = name else {
             let problem = format!("the bag lists {}, which is no file in its folder", quoted(listed));
-            return Err(Fault::coded("recording/bag-index", problem, REINDEX));
+            return refuse("recording/bag-index", problem, REINDEX);
         };
         let file = folder.join(name);
         if !known.insert(file.clone()) {
-            return Err(Fault::coded(
-                "recording/bag-index",
-                format!("the bag lists {} twice", quoted(listed)),
-                REINDEX,
-            ));
+            return refuse("recording/bag-index", format!("the bag lists {} twice", quoted(listed)), REINDEX);
         }
         files.push(file);
     }
@@ -166,7 +158,7 @@ fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
             let problem = format!("{other} lies beside the files of the bag, which does not list it");
             let remedy =
                 "take the file away if it is none of the bag; else have `ros2 bag reindex` write metadata.yaml anew";
-            Err(Fault::coded("recording/bag-index", problem, remedy).into())
+            refuse("recording/bag-index", problem, remedy)
         }
     }
 }

@@ -1,10 +1,13 @@
-//! Positions of vehicles at given times, and distances of one pair over time, while a recording is read again.
+//! A recording read again after it was judged: positions at given times, distances of one pair over time, and the proof of
+//! the smallest separation.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::outcome::{Gap, Outcome};
 use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
+use super::window::within;
 use crate::enclosure::Target;
 use crate::obstacle::Shape;
 use crate::outcome::ObjectPair;
@@ -13,6 +16,12 @@ use crate::segment::Segment;
 use crate::sweep::Interval;
 use tautline_core::swarm::{Rows, set_row};
 use tautline_core::track::Item;
+
+/// The vehicles of a recording that was audited by these settings with this outcome, before their first items.
+fn vehicles(settings: &Settings, outcome: &Outcome) -> Vec<Vehicle> {
+    let gaps_s = outcome.vehicles.iter().zip(&outcome.max_gaps_s);
+    gaps_s.map(|(name, &max_gap_s)| Vehicle::new(name, settings, max_gap_s)).collect()
+}
 
 /// Looks where vehicles are at given times, while a recording is read again: by the same clocks, in the same window and on the
 /// same motion as they were judged. Where nothing is known of one, such as in a gap, it is not there.
@@ -32,8 +41,7 @@ impl PositionLookup {
     /// At these times \[s\], in ascending order, of a recording that was audited by these settings with this outcome.
     #[must_use]
     pub fn new(settings: &Settings, outcome: &Outcome, times_s: Vec<f64>) -> Self {
-        let gaps_s = outcome.vehicles.iter().zip(&outcome.max_gaps_s);
-        let vehicles: Vec<_> = gaps_s.map(|(name, &max_gap_s)| Vehicle::new(name, settings, max_gap_s)).collect();
+        let vehicles = vehicles(settings, outcome);
         let nowhere = Rows::repeat(vehicles.len(), f64::NAN);
         Self {
             positions_m: vec![nowhere; times_s.len()],
@@ -135,10 +143,9 @@ impl PairSeries {
     /// # Errors
     /// [`RecordedError::Unnamed`] where there is no such vehicle or obstacle.
     pub fn new(settings: &Settings, outcome: &Outcome, pair: ObjectPair) -> Result<Self, RecordedError> {
+        let all = vehicles(settings, outcome);
         let vehicle = |index: usize| -> Result<_, RecordedError> {
-            let known = outcome.vehicles.get(index).zip(outcome.max_gaps_s.get(index));
-            let (name, max_gap_s) = known.ok_or(RecordedError::Unnamed { vehicle: index })?;
-            Ok((index, Vehicle::new(name, settings, *max_gap_s)))
+            Ok((index, all.get(index).cloned().ok_or(RecordedError::Unnamed { vehicle: index })?))
         };
         let (vehicles, obstacle) = match pair {
             ObjectPair::Vehicles(pair) => (vec![vehicle(pair.first())?, vehicle(pair.second())?], None),
@@ -260,6 +267,113 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
     times_s.sort_unstable_by(f64::total_cmp);
     times_s.dedup();
     found.extend(times_s.into_iter().map(at));
+}
+
+/// Segments of the vehicle that has most of them in a window.
+const SEGMENTS: usize = 8;
+
+/// The smallest separation of straight lines between samples, and boxes that show that no other pair comes closer.
+///
+/// `python/tautline/check_proof.py` shares no code with this crate and confirms a proof by exact arithmetic.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Proof {
+    /// The largest double that the separation of no pair falls below \[m\].
+    pub separation_m: f64,
+    /// Names of the two vehicles that come as close as that.
+    pub pair: [String; 2],
+    /// The largest double that the first time of it, between two samples, is not before \[s\].
+    pub time_s: f64,
+    /// Windows that cover the recording, in order of time.
+    #[serde(skip)]
+    pub windows: Vec<ProofWindow>,
+}
+
+/// Where vehicles are in a window of time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProofWindow {
+    /// From \[s\].
+    pub from_s: f64,
+    /// To \[s\].
+    pub to_s: f64,
+    /// For each vehicle that is there its index, and the least and greatest x, y and z \[m\] of all segments that meet the
+    /// window: index, least x, y, z, greatest x, y, z.
+    pub boxes: Vec<(usize, f64, f64, f64, f64, f64, f64)>,
+}
+
+/// Collects the motion of a recording that is read again after it was judged.
+#[derive(Clone, Debug)]
+pub struct ProofBuilder {
+    vehicles: Vec<Vehicle>,
+}
+
+impl ProofBuilder {
+    /// Of a recording that was audited by these settings with this outcome.
+    #[must_use]
+    pub fn new(settings: &Settings, outcome: &Outcome) -> Self {
+        Self { vehicles: vehicles(settings, outcome) }
+    }
+
+    /// Takes what the recording holds next.
+    ///
+    /// # Errors
+    /// [`RecordedError`] where an item is wrong.
+    pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
+        for item in items {
+            if let Some(vehicle) = self.vehicles.get_mut(item.vehicle()) {
+                vehicle.take(item)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The proof; `None` where there is none: no pair was judged, a limit is that of radii, or the motion is not straight
+    /// between samples.
+    #[must_use]
+    pub fn finish(self, outcome: &Outcome) -> Option<Proof> {
+        let closest = outcome.closest.first()?;
+        let (pair, separation_m) = (closest.pair.vehicles()?, closest.lower_m);
+        let [first, second] = [pair.first(), pair.second()].map(|of| self.vehicles.get(of));
+        let (first, second) = first.zip(second)?;
+        let is_sampled = |segment: &Segment| segment.whole.is_none();
+        let is_plain = |vehicle: &Vehicle| vehicle.radius_m.is_none() && vehicle.segments.iter().all(is_sampled);
+        if !self.vehicles.iter().all(is_plain) {
+            return None;
+        }
+        let mut time_s = None;
+        overlaps(&first.segments, &second.segments, |overlap| {
+            let motion = overlap.straight();
+            if time_s.is_none() && motion.closest().separation_m() - motion.resolution_m() <= separation_m {
+                let exact = overlap.exact();
+                time_s = exact.is_below(separation_m.next_up()).then(|| exact.closest_s());
+            }
+        });
+        let windows = self.windows();
+        Some(Proof { separation_m, pair: [first.name.clone(), second.name.clone()], time_s: time_s?, windows })
+    }
+
+    fn windows(&self) -> Vec<ProofWindow> {
+        let Some(densest) = self.vehicles.iter().max_by_key(|vehicle| vehicle.segments.len()) else {
+            return Vec::new();
+        };
+        let ends = |end: fn(&Vehicle) -> Option<f64>| self.vehicles.iter().filter_map(end);
+        let begin_s = ends(|vehicle| Some(vehicle.segments.first()?.from_s)).fold(f64::INFINITY, f64::min);
+        let end_s = ends(|vehicle| Some(vehicle.segments.last()?.to_s)).fold(f64::NEG_INFINITY, f64::max);
+        let inner = densest.segments.iter().skip(SEGMENTS).step_by(SEGMENTS).map(|segment| segment.to_s);
+        let mut times_s = vec![begin_s];
+        times_s.extend(inner.filter(|time_s| begin_s < *time_s && *time_s < end_s));
+        times_s.push(end_s);
+        times_s.windows(2).map(|two| self.window(Interval { from_s: two[0], to_s: two[1] })).collect()
+    }
+
+    fn window(&self, window: Interval) -> ProofWindow {
+        let boxes = self.vehicles.iter().enumerate().filter_map(|(index, vehicle)| {
+            let parts = &vehicle.segments[within(&vehicle.segments, window)];
+            let low = parts.iter().map(|part| part.from.inf(&part.to)).reduce(|a, b| a.inf(&b))?;
+            let high = parts.iter().map(|part| part.from.sup(&part.to)).reduce(|a, b| a.sup(&b))?;
+            Some((index, low.x, low.y, low.z, high.x, high.y, high.z))
+        });
+        ProofWindow { from_s: window.from_s, to_s: window.to_s, boxes: boxes.collect() }
+    }
 }
 
 #[cfg(test)]
