@@ -143,7 +143,7 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
 /// The space asked for, or else the plane if everything lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
-    let moved = document.leg.iter().filter_map(|leg| leg.move_m).chain(document.formation.move_m);
+    let moved = document.leg.iter().filter_map(|leg| leg.placement.move_m).chain(document.formation.placement.move_m);
     let shapes = document.leg.iter().filter_map(|leg| leg.shape.as_ref()).chain([&document.formation.shape]);
     let reference_is_flat = document.reference.as_ref().is_none_or(ReferenceTable::is_flat);
     let formation_is_flat =
