@@ -83,8 +83,7 @@ impl Scenario {
         ))
         .coded("scenario/unsupported-by-plant")
         .with_help("set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"")
-        .at(key)
-        .at("plant.kind"))
+        .at_keys([key, "plant.kind"]))
     }
 }
 

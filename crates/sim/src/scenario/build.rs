@@ -174,8 +174,7 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
             return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
                 .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
-                .at("start.shape")
-                .at("start.positions_m"));
+                .at_keys(["start.shape", "start.positions_m"]));
         }
         (None, None) => {
             return Err(ScenarioError::new("no start positions are given")

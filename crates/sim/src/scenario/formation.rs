@@ -58,8 +58,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
         return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
             .coded("scenario/out-of-range")
             .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
-            .at("formation.assignment")
-            .at("swarm.count"));
+            .at_keys(["formation.assignment", "swarm.count"]));
     }
     Ok(Some(freedom))
 }
@@ -82,8 +81,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
         .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
         .at_leg(leg, "formation.assignment")
-        .at("law.kind")
-        .at("breathing.mode"))
+        .at_keys(["law.kind", "breathing.mode"]))
 }
 
 /// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.
@@ -214,8 +212,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
             return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
                 .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
-                .at("formation.turns")
-                .at("formation.spacing_m"));
+                .at_keys(["formation.turns", "formation.spacing_m"]));
         }
         let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
         return Ok(Formation::helix(count, radius_m, pitch_m, step_rad));
@@ -225,8 +222,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
             .coded("scenario/shape")
             .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
-            .at("formation.radius_m")
-            .at("formation.spacing_m"));
+            .at_keys(["formation.radius_m", "formation.spacing_m"]));
     };
     let keeps = |pitch_m: f64, step_rad: f64| {
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
@@ -245,8 +241,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         ))
         .coded("scenario/shape")
         .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
-        .at("formation.pitch_m")
-        .at("formation.spacing_m"));
+        .at_keys(["formation.pitch_m", "formation.spacing_m"]));
     }
     Ok(Formation::helix(count, radius_m, pitch_m, step_rad))
 }
@@ -319,8 +314,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
             return Err(ScenarioError::new(said)
                 .coded(code)
                 .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
-                .at(PATH)
-                .at(files::KEY));
+                .at_keys([PATH, files::KEY]));
         }
     };
     sized(&drawing, size, count, delta_m, key)
@@ -348,8 +342,7 @@ fn sized(
         return Err(ScenarioError::new(format!("slots {pair} of what is drawn are the same point"))
             .coded("scenario/within-delta")
             .with_help("draw longer lines or larger areas, or fly fewer vehicles")
-            .at(key)
-            .at("swarm.count"));
+            .at_keys([key, "swarm.count"]));
     }
     let scale = match size {
         Size::Spacing(spacing_m) => spacing_m / nearest,
@@ -393,9 +386,7 @@ impl Dimension {
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
         ))
-        .at(key)
-        .at("swarm.count")
-        .at("law.delta_m"))
+        .at_keys([key, "swarm.count", "law.delta_m"]))
     }
 }
 

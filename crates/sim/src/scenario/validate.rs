@@ -90,8 +90,7 @@ impl Scenario {
             ))
             .coded("scenario/outside-flight")
             .with_help("enlarge time.duration_s or reduce arrival.hold_s")
-            .at("arrival.hold_s")
-            .at("time.duration_s"));
+            .at_keys(["arrival.hold_s", "time.duration_s"]));
         }
         Ok(())
     }
@@ -146,15 +145,13 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
-            .at("reference.kind")
-            .at("time.dt_s"));
+            .at_keys(["reference.kind", "time.dt_s"]));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
             return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
                 .coded("scenario/plane")
                 .with_help("set its z to 0, or swarm.dimensions to 3")
-                .at("reference.kind")
-                .at("swarm.dimensions"));
+                .at_keys(["reference.kind", "swarm.dimensions"]));
         }
         let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
         let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
@@ -348,8 +345,7 @@ impl Scenario {
             ))
             .coded("scenario/too-many-steps")
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
-            .at("time.duration_s")
-            .at("time.dt_s"));
+            .at_keys(["time.duration_s", "time.dt_s"]));
         }
         if self.a22_per_s.abs() * dt_s > 1.0 {
             return Err(ScenarioError::new(format!(
@@ -358,8 +354,7 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help("reduce time.dt_s or swarm.a22_per_s")
-            .at("swarm.a22_per_s")
-            .at("time.dt_s"));
+            .at_keys(["swarm.a22_per_s", "time.dt_s"]));
         }
         if let Some(control_hz) = control_hz
             && control_hz * dt_s > 1.0 + 1e-6
@@ -369,8 +364,7 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
-            .at("time.control_hz")
-            .at("time.dt_s"));
+            .at_keys(["time.control_hz", "time.dt_s"]));
         }
         Ok(())
     }
@@ -419,8 +413,7 @@ impl Scenario {
             ))
             .coded("scenario/outside-flight")
             .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
-            .at("breathing.hold_s")
-            .at("time.duration_s"));
+            .at_keys(["breathing.hold_s", "time.duration_s"]));
         }
         if self.breathing.mode == BreathingMode::Start
             && let Ok(law) = self.law()
@@ -429,8 +422,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
                 .coded("scenario/unsupported-by-law")
                 .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
-                .at("breathing.mode")
-                .at("law.kind"));
+                .at_keys(["breathing.mode", "law.kind"]));
         }
         Ok(())
     }
@@ -455,8 +447,7 @@ impl Scenario {
                 "a safety distance of {delta_m} m, and ellipsoids that touch side by side at {width_m} m"
             ))
             .with_help("leave law.delta_m out: it is twice the level half axes")
-            .at("law.delta_m")
-            .at(key));
+            .at_keys(["law.delta_m", key]));
         }
         let Ok(law) = self.law() else { return Ok(()) };
         if law.capabilities().uses_ellipsoid_metric {
@@ -465,8 +456,7 @@ impl Scenario {
         Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))
             .coded("scenario/unsupported-by-law")
             .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
-            .at("safety.shape")
-            .at("law.kind"))
+            .at_keys(["safety.shape", "law.kind"]))
     }
 }
 
@@ -485,15 +475,13 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help("reduce time.dt_s or vehicle.drag_per_s")
-            .at("vehicle.drag_per_s")
-            .at("time.dt_s"));
+            .at_keys(["vehicle.drag_per_s", "time.dt_s"]));
         }
         if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
             return Err(ScenarioError::new(format!("a drag of {drag_per_s} 1/s on vehicles that are no points"))
                 .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave it out: the drag of a quadrotor is that of its rotors and its body, in its model")
-                .at("vehicle.drag_per_s")
-                .at("vehicle.model"));
+                .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
         }
         if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
             return Err(ScenarioError::new(
@@ -503,8 +491,7 @@ impl Scenario {
             .with_help(
                 "set vehicle.drag_per_s to what a vehicle loses of its velocity through still air, for example 0.3",
             )
-            .at("wind")
-            .at("vehicle.drag_per_s"));
+            .at_keys(["wind", "vehicle.drag_per_s"]));
         }
         self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
         self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
@@ -519,8 +506,7 @@ impl Scenario {
             ))
             .coded("scenario/plane")
             .with_help("set its z to 0, or swarm.dimensions to 3")
-            .at(key)
-            .at("swarm.dimensions"));
+            .at_keys([key, "swarm.dimensions"]));
         }
         Ok(())
     }
@@ -537,8 +523,7 @@ impl Scenario {
                 ))
                 .coded("scenario/step-too-long")
                 .with_help(format!("give it at least {shortest_s} s, or reduce time.dt_s"))
-                .at("wind.gust")
-                .at("time.dt_s"));
+                .at_keys(["wind.gust", "time.dt_s"]));
             }
         }
         if at_s >= self.time.duration_s {
@@ -548,8 +533,7 @@ impl Scenario {
             ))
             .coded("scenario/outside-flight")
             .with_help("let it begin earlier, or enlarge time.duration_s")
-            .at("wind.gust")
-            .at("time.duration_s"));
+            .at_keys(["wind.gust", "time.duration_s"]));
         }
         match vehicles.as_deref() {
             Some([]) => Err(ScenarioError::new("a gust meets no vehicle")
