@@ -61,7 +61,7 @@ impl Default for FlockingKeys {
 /// ```
 ///
 /// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the centre of the
-/// slots, where the reference has reference_use it, and `v_r` is r'; the source does not feed r''. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
+/// slots, where the reference has carried it, and `v_r` is r'; the source does not feed r''. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
 /// asked for, and given slots are not reached but by chance.
 ///
 /// # Guarantee

@@ -38,7 +38,7 @@ impl HalfSpace {
 ///
 /// The order is the given one, so the same input gives the same bits; on average O(n) where the order is arbitrary, at
 /// worst O(n^3), and as much once more for each half-space that cannot be satisfied. Nothing is allocated once the lists have
-/// bounded. Where wish and normals lie in the plane z = 0, so does the answer, exactly.
+/// grown. Where wish and normals lie in the plane z = 0, so does the answer, exactly.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HalfSpaces {
     given: Vec<HalfSpace>,

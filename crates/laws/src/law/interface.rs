@@ -186,7 +186,7 @@ pub enum Controls {
     Distances,
     /// Differences of positions, in the directions of the common frame: a formation is reached up to translation.
     Displacements,
-    /// Places: slots are reached where the reference has reference_use them.
+    /// Places: slots are reached where the reference has carried them.
     Places,
 }
 
@@ -223,7 +223,7 @@ pub struct LawContext<'a> {
     pub formation: &'a Formation,
     /// The legs after it.
     pub later: &'a [Leg],
-    /// The motion that formations are reference_use along with, and who knows it.
+    /// The motion that formations are carried along with, and which vehicles know it.
     pub guidance: Option<&'a Guidance>,
     /// What stands in the way.
     pub obstacles: &'a [Obstacle],

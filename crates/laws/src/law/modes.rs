@@ -145,7 +145,7 @@ impl Mode {
     }
 }
 
-/// Over a period T: by how much a velocity has bounded, e^(a22 T), how far a unit of it has gone \[s\], and how far a unit of
+/// Over a period T: by how much a velocity has grown, e^(a22 T), how far a unit of it has gone \[s\], and how far a unit of
 /// acceleration \[s^2\].
 fn held(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
     let x = a22_per_s * period_s;

@@ -440,6 +440,7 @@ pub(super) struct HelixKeys {
 
 /// Size of a drawing: one of the keys, or none.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
 pub(super) struct DrawingSize {
     /// Height of everything that is drawn in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
