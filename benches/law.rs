@@ -11,7 +11,7 @@ use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterio
 use tautline::formation::Formation;
 use tautline::graph::Graph;
 use tautline::law::{
-    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, Setting,
+    DisplacementKeys, DisplacementLaw, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law, LawContext,
 };
 use tautline::observation::Observation;
 use tautline::space::KeptPairs;
@@ -27,8 +27,8 @@ fn swarm(count: usize) -> (Formation, Swarm) {
 }
 
 fn edge_tension(graph: &Graph, formation: &Formation) -> EdgeTensionLaw {
-    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 0.1, a22_per_s: 0.1 };
-    EdgeTensionLaw::new(graph, formation, parameters).expect("slots farther apart than delta")
+    let context = LawContext::new(graph, formation, 0.1, 0.1);
+    EdgeTensionLaw::new(&context, EdgeTensionKeys::default()).expect("slots farther apart than delta")
 }
 
 fn control(
@@ -63,7 +63,8 @@ fn laws(criterion: &mut Criterion) {
             if count == 1000 && graph.is_complete() {
                 control(&mut group, "edge-tension complete, 2 threads", &at, &mut law, 2);
             }
-            let mut law = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
+            let context = LawContext::new(&graph, &formation, 0.1, 0.1);
+            let mut law = LaplacianLaw::new(&context, LaplacianKeys::default()).expect("finite gains");
             control(&mut group, &format!("laplacian {graph_name}"), &at, &mut law, 1);
         }
         let complete = Graph::complete(count);
@@ -87,8 +88,8 @@ fn displacement(criterion: &mut Criterion) {
         let mut swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| grid[(i, axis)] + moved(i, axis)));
         swarm.velocities_m_s = &swarm.positions_m * 0.01;
         for (name, graph) in [("star", Graph::star(count)), ("complete", Graph::complete(count))] {
-            let setting = Setting::new(&graph, &formation, DELTA_M, 0.1);
-            let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+            let context = LawContext::new(&graph, &formation, DELTA_M, 0.1);
+            let mut law = DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law");
             let range_m = law.capabilities().sensing_range_m.expect("it senses");
             let (mut near, mut control) = (KeptPairs::default(), Rows::zeros(count));
             group.bench_function(name, |bencher| {

@@ -24,7 +24,7 @@ use differential_equations::ode::OrdinaryNumericalMethod as _;
 use flow::{Flow, FreeMotion, packed};
 use nalgebra::Vector3;
 
-use crate::feedback::Feedback;
+use crate::plant::Feedback;
 use crate::plant::{Air, Path, Plant, PlantError};
 use crate::scenario::Scenario;
 use tautline_core::record::Channel;

@@ -17,14 +17,12 @@
 //! | [`vehicle`] | bodies that are more than points: models, forces, rotors, the attitude loop |
 //! | [`link`] | imperfections between truth and law: radio, sensing, actuation |
 //! | [`continuous`] | the equations of motion solved, for points with the law inside |
-//! | [`feedback`] | commands of the closed loop as a function of the state |
 //! | [`metrics`] | numbers folded from recorded samples |
 //! | [`plan`] | formations of a flight, their placement over the swarm, and edge tensions |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod continuous;
-pub mod feedback;
 pub mod link;
 pub mod metrics;
 pub mod plan;

@@ -7,12 +7,16 @@ use tautline_core::swarm::{Rows, Swarm, mean_row, row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law as _};
+use tautline_laws::law::{
+    EdgeTension, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law as _, LawContext,
+};
 use tautline_laws::observation::Observation;
 
 /// Random states that each claim is tried on; every one with each kind of graph.
 const STATES: usize = 200;
 const SEED: u64 = 1;
+/// Scale of the edge tension \[m^2/s^2\].
+const ALPHA: f64 = 1.0;
 /// Values of a22 \[1/s\] that a state is tried with.
 const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
 
@@ -34,12 +38,13 @@ struct State {
     swarm: Swarm,
     graph: Graph,
     formation: Formation,
-    parameters: EdgeTensionParameters,
+    a22_per_s: f64,
 }
 
 impl State {
     fn law(&self) -> Result<EdgeTensionLaw, Untried> {
-        Ok(EdgeTensionLaw::new(&self.graph, &self.formation, self.parameters)?)
+        let context = LawContext::new(&self.graph, &self.formation, DELTA_M, self.a22_per_s);
+        Ok(EdgeTensionLaw::new(&context, EdgeTensionKeys { alpha: ALPHA })?)
     }
 
     fn control(&self) -> Result<Rows, Untried> {
@@ -53,12 +58,11 @@ impl State {
     fn energy_rate(&self) -> Result<(f64, f64), Untried> {
         let (swarm, count) = (&self.swarm, self.swarm.count() as f64);
         let control = self.control()?;
-        let accelerations = swarm.velocities_m_s.clone() * self.parameters.a22_per_s + control;
+        let accelerations = swarm.velocities_m_s.clone() * self.a22_per_s + control;
         let mut terms: Vec<f64> =
             relative_velocities(swarm).enumerate().map(|(i, v)| v.dot(&row(&accelerations, i))).collect();
         for (i, j) in self.graph.edges() {
-            let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
-            let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))?;
+            let tension = EdgeTension::new(ALPHA, DELTA_M, self.formation.desired_distance(i, j))?;
             let offset = row(&swarm.positions_m, i) - row(&swarm.positions_m, j);
             let closing = row(&swarm.velocities_m_s, i) - row(&swarm.velocities_m_s, j);
             let distance_m = offset.norm();
@@ -75,13 +79,11 @@ fn states() -> Result<Vec<State>, Untried> {
     for (k, scenario) in random_starts(SEED, STATES, 1.0)?.into_iter().enumerate() {
         let count = scenario.count();
         for graph in [Graph::complete(count), Graph::ring(count), Graph::star(count)] {
-            let parameters =
-                EdgeTensionParameters { alpha: 1.0, delta_m: DELTA_M, a22_per_s: A22_PER_S[k % A22_PER_S.len()] };
             states.push(State {
                 swarm: scenario.start.clone(),
                 graph,
                 formation: scenario.formation().clone(),
-                parameters,
+                a22_per_s: A22_PER_S[k % A22_PER_S.len()],
             });
         }
     }
@@ -140,7 +142,7 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
     let words = |bound: &str| format!("largest relative excess {bound} over {} states", states.len());
     within_rounding(states, "energy-rate-on-graphs", "largest_relative_excess", words, |state| {
         let (rate, scale) = state.energy_rate()?;
-        let (a22, connectivity) = (state.parameters.a22_per_s, state.graph.algebraic_connectivity());
+        let (a22, connectivity) = (state.a22_per_s, state.graph.algebraic_connectivity());
         let margin = (1.0 + a22) * connectivity / state.swarm.count() as f64 - a22;
         Ok(of_scale((rate + margin * relative_speed_squared(&state.swarm)).max(0.0), scale))
     })
@@ -154,7 +156,8 @@ fn literal_baseline() -> Result<Claim, Untried> {
     let (f1_per_s2, f2_per_s) = (1.0, 1.0 + A22_PER_S);
     let origin = Formation::points(Rows::zeros(count));
     let links = Graph::complete(count);
-    let mut law = LaplacianLaw::new(&links, &origin, f1_per_s2, f2_per_s)?;
+    let keys = LaplacianKeys { f1_per_s2, f2_per_s: Some(f2_per_s) };
+    let mut law = LaplacianLaw::new(&LawContext::new(&links, &origin, DELTA_M, A22_PER_S), keys)?;
     let mut control_at = |scale: f64| {
         let mut swarm = Swarm::at_rest(goal.slots_m.clone() * scale);
         for i in 0..count {

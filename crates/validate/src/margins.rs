@@ -197,7 +197,7 @@ fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], Untried> {
     let mut plain = disturbed("complete", 1.0)?;
     plain.time.duration_s = PUSHED_S;
     let linear = plain.law()?.linear(plain.formation()).ok_or("no modes")?;
-    let contact_s = linear.in_contact.map_or(f64::NAN, |mode| mode.delay_margin_s(0.0));
+    let contact_s = linear.stiffest_contact_mode.map_or(f64::NAN, |mode| mode.delay_margin_s(0.0));
     let free_s = linear.delay_margin_s(0.0);
     let grows = |latency_s: f64| -> Result<bool, Untried> {
         let mut scenario = plain.clone();

@@ -8,12 +8,12 @@ use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
+use super::interface::LawContext;
+use super::interface::ReferenceUse;
 use super::interface::{Capabilities, Law, RateQuery, Rates};
-use super::near_lists::NearLists;
-use super::setting::Carried;
-use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
+use crate::space::NearLists;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
 /// Clearance that a pair counts as having at least, as a part of delta: the barrier's slope is infinite where there is none.
@@ -43,12 +43,6 @@ pub struct CbfQpKeys {
 impl Default for CbfQpKeys {
     fn default() -> Self {
         Self { k_per_s2: 1.0, c_per_s: 2.0, max_speed_m_s: 2.0, max_accel_m_s2: 5.0, gamma_s_per_m2: 1.0 }
-    }
-}
-
-impl CbfQpKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<CbfQpLaw, ParameterError> {
-        CbfQpLaw::new(setting, self.clone())
     }
 }
 
@@ -86,7 +80,7 @@ impl CbfQpKeys {
 #[derive(Clone, Debug)]
 pub struct CbfQpLaw {
     keys: CbfQpKeys,
-    carried: Carried,
+    reference_use: ReferenceUse,
     count: usize,
     delta_m: f64,
     a22_per_s: f64,
@@ -101,8 +95,8 @@ impl CbfQpLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
     /// finite, or where there is a reference that some do not know.
-    pub fn new(setting: &Setting<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
+    pub fn new(context: &LawContext<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
             ("k_per_s2", keys.k_per_s2),
             ("c_per_s", keys.c_per_s),
@@ -114,7 +108,7 @@ impl CbfQpLaw {
         Ok(Self {
             range_m: range_m(&keys, delta_m, a22_per_s),
             keys,
-            carried: Carried::new(setting)?,
+            reference_use: ReferenceUse::new(context)?,
             count: links.count(),
             delta_m,
             a22_per_s,
@@ -130,7 +124,7 @@ impl CbfQpLaw {
         let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
         let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        self.carried.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
+        self.reference_use.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
     }
 
     /// What vehicle j leaves of vehicle i's accelerations; everything where it is out of range.
@@ -202,7 +196,7 @@ impl Law for CbfQpLaw {
         Capabilities {
             max_command_m_s2: Some(self.keys.max_accel_m_s2),
             sensing_range_m: Some(self.range_m),
-            ..self.carried.capabilities()
+            ..self.reference_use.capabilities()
         }
     }
 

@@ -1,11 +1,9 @@
 //! What a law promises about separation before the first step.
 
-use std::fmt;
-
 use super::error::LawError;
 
 /// The separation that a law guarantees from a given start, or why it guarantees none.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Certificate {
     /// No pair ever comes closer than this \[m\], under the assumptions of the law's proof.
     pub certified_m: Option<f64>,
@@ -37,57 +35,96 @@ pub struct LegBound {
 }
 
 /// Why a certificate is void.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Void {
     /// The law does not push vehicles apart.
+    #[error("The law has no barrier: it does not keep vehicles apart.")]
     NoBarrier,
     /// Some pair is not joined by an edge.
+    #[error("The graph is not complete: pairs without an edge are not kept apart.")]
     GraphNotComplete,
     /// Each vehicle is fed more than it is braked: the energy may grow.
+    #[error("The vehicles are fed more than the law brakes them: the energy may grow.")]
     VelocityUndamped,
     /// What a vehicle may command is limited, and what keeps two apart may be more.
+    #[error("The law limits what it commands: what keeps vehicles apart may be more than that.")]
     CommandLimited,
     /// The target changes while the swarm flies.
+    #[error("The target changes: what holds for the first leg need not for the next.")]
     TargetChanges,
     /// What the vehicles know is not the true present state, or what they command does not arrive as given.
+    #[error("The vehicles do not know the true present state.")]
     InexactLink,
     /// What vehicles know, their own state included, is some time old.
+    #[error(
+        "The vehicles know what is old: the swarm has moved on since it was measured (sensing.latency_s, sensing.rate_hz)."
+    )]
     KnownLate,
     /// What vehicles measure is off the truth.
+    #[error(
+        "The vehicles measure what is off the truth (sensing.position_noise_m, position_bias_m, velocity_noise_m_s)."
+    )]
     KnownWrongly,
     /// What vehicles hear of each other is some time old.
+    #[error(
+        "The vehicles hear of each other what is old when it arrives, and held until more comes (network.latency_s, network.rate_hz)."
+    )]
     HeardLate,
     /// Some of what vehicles send is not heard.
+    #[error(
+        "The network loses messages, and what was heard before stands for them (network.loss, network.failure, failure)."
+    )]
     MessagesLost,
     /// No vehicle is accelerated by more than a limit.
+    #[error(
+        "The vehicles are not accelerated by more than a limit, and what keeps two apart may be more (actuation.max_accel_m_s2)."
+    )]
     AccelerationLimited,
     /// Vehicles are accelerated as they were commanded some time before.
+    #[error("The acceleration follows the command with a lag (actuation.lag_s).")]
     AccelerationLate,
     /// A vehicle does not do what the law commands.
+    #[error("The flight goes on with a vehicle that fails and does not do what the law commands (failure).")]
     VehicleFails,
     /// Accelerations came from outside in the place of the law's.
+    #[error("The vehicles were commanded from outside.")]
     CommandsFromOutside,
     /// Each command is held for a period of its own.
+    #[error("The vehicles hold each command while the swarm moves on (time.control_hz).")]
     CommandsHeld,
     /// A wind blows, and the law's proof is of vehicles that nothing pushes.
+    #[error("The law's proof is of vehicles that nothing else pushes: the wind does.")]
     Windblown,
     /// The wind is turbulent, and turbulence has no bound.
+    #[error("The wind is turbulent (wind.dryden): what it adds to the energy has no bound.")]
     WindUnbounded,
     /// The wind pushes the leader off the reference that its followers are told.
+    #[error("The wind pushes the leader off the reference: its followers are told another motion.")]
     LeaderBlown,
     /// Vehicles are bodies that tilt and whose rotors lag: no command is carried out at once.
+    #[error("The vehicles are no points: a command is not carried out at once and as it is given (vehicle.model).")]
     NotAPoint,
     /// The vehicles are not told how the reference that they follow moves.
+    #[error("The vehicles are not told how their reference moves (reference.feed_forward).")]
     ReferenceNotFed,
     /// There are obstacles, and the law does not keep clear of them.
+    #[error("The law does not keep clear of obstacles: what hits one moves in another way than it says.")]
     ObstaclesUnknown,
     /// The swarm is carried past obstacles that stand.
+    #[error("The reference moves and obstacles stand: what the swarm is carried by may press it against them.")]
     CarriedPastObstacles,
     /// The law asked for shorter steps than the flight was allowed to take.
+    #[error(
+        "The law asked for shorter steps than could be flown: what was flown is not the motion that its proof is of."
+    )]
     StepsTooLong,
     /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
+    #[error(
+        "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy."
+    )]
     Unresolved,
     /// The law has no answer for the start, such as a pair at or inside its safety distance.
+    #[error("The law has no answer for the start: {0}.")]
     StartRefused(LawError),
 }
 
@@ -95,15 +132,7 @@ impl Certificate {
     /// A certificate that promises nothing, for one reason.
     #[must_use]
     pub fn void(reason: Void) -> Self {
-        Self {
-            certified_m: None,
-            certified_until_s: None,
-            certified_room_m: None,
-            energy_initial: None,
-            linked_m: None,
-            void: vec![reason],
-            legs: Vec::new(),
-        }
+        Self { void: vec![reason], ..Self::default() }
     }
 
     /// What holds of a flight for which this was promised first and another promise was made on a leg, from 0, after its
@@ -177,64 +206,6 @@ impl Void {
     }
 }
 
-impl fmt::Display for Void {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoBarrier => f.write_str("The law has no barrier: it does not keep vehicles apart."),
-            Self::GraphNotComplete => {
-                f.write_str("The graph is not complete: pairs without an edge are not kept apart.")
-            }
-            Self::VelocityUndamped => {
-                f.write_str("The vehicles are fed more than the law brakes them: the energy may grow.")
-            }
-            Self::CommandLimited => {
-                f.write_str("The law limits what it commands: what keeps vehicles apart may be more than that.")
-            }
-            Self::TargetChanges => {
-                f.write_str("The target changes: what holds for the first leg need not for the next.")
-            }
-            Self::InexactLink => f.write_str("The vehicles do not know the true present state."),
-            Self::KnownLate => f.write_str("The vehicles know what is old: the swarm has moved on since it was measured (sensing.latency_s, sensing.rate_hz)."),
-            Self::KnownWrongly => f.write_str("The vehicles measure what is off the truth (sensing.position_noise_m, position_bias_m, velocity_noise_m_s)."),
-            Self::HeardLate => f.write_str("The vehicles hear of each other what is old when it arrives, and held until more comes (network.latency_s, network.rate_hz)."),
-            Self::MessagesLost => f.write_str("The network loses messages, and what was heard before stands for them (network.loss, network.failure, failure)."),
-            Self::AccelerationLimited => f.write_str("The vehicles are not accelerated by more than a limit, and what keeps two apart may be more (actuation.max_accel_m_s2)."),
-            Self::AccelerationLate => f.write_str("The acceleration follows the command with a lag (actuation.lag_s)."),
-            Self::VehicleFails => f.write_str("The flight goes on with a vehicle that fails and does not do what the law commands (failure)."),
-            Self::CommandsFromOutside => f.write_str("The vehicles were commanded from outside."),
-            Self::CommandsHeld => {
-                f.write_str("The vehicles hold each command while the swarm moves on (time.control_hz).")
-            }
-            Self::Windblown => f.write_str("The law's proof is of vehicles that nothing else pushes: the wind does."),
-            Self::WindUnbounded => {
-                f.write_str("The wind is turbulent (wind.dryden): what it adds to the energy has no bound.")
-            }
-            Self::LeaderBlown => {
-                f.write_str("The wind pushes the leader off the reference: its followers are told another motion.")
-            }
-            Self::NotAPoint => f.write_str(
-                "The vehicles are no points: a command is not carried out at once and as it is given (vehicle.model).",
-            ),
-            Self::ReferenceNotFed => {
-                f.write_str("The vehicles are not told how their reference moves (reference.feed_forward).")
-            }
-            Self::ObstaclesUnknown => {
-                f.write_str("The law does not keep clear of obstacles: what hits one moves in another way than it says.")
-            }
-            Self::CarriedPastObstacles => f.write_str(
-                "The reference moves and obstacles stand: what the swarm is carried by may press it against them.",
-            ),
-            Self::StepsTooLong => f.write_str(
-                "The law asked for shorter steps than could be flown: what was flown is not the motion that its proof is of.",
-            ),
-            Self::Unresolved => f.write_str(
-                "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy.",
-            ),
-            Self::StartRefused(fault) => write!(f, "The law has no answer for the start: {fault}."),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,12 +215,9 @@ mod tests {
     fn a_renewed_promise_is_never_more_than_the_one_before() {
         let promised = |certified_m: Option<f64>| Certificate {
             certified_m,
-            certified_until_s: None,
-            certified_room_m: None,
             energy_initial: Some(1.0),
-            linked_m: None,
             void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
-            legs: Vec::new(),
+            ..Certificate::default()
         };
         for (before, later, expected) in [
             (Some(2.0), Some(1.5), Some(1.5)),

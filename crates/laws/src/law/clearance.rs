@@ -1,7 +1,7 @@
 //! The one-sided tension between vehicles and the surfaces of obstacles at rest.
 
 use super::error::{LawError, ParameterError};
-use super::setting::Setting;
+use super::interface::LawContext;
 use super::tension::{EdgeTension, TensionError};
 use crate::observation::Observation;
 use crate::space::Obstacle;
@@ -76,16 +76,16 @@ impl ClearanceTension {
 }
 
 /// The least room that a slot of any leg has from an obstacle \[m\], where slots are places that stay.
-pub(super) fn slot_room_m(setting: &Setting<'_>) -> Result<f64, ParameterError> {
-    let Some(guidance) = setting.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
+pub(super) fn slot_room_m(context: &LawContext<'_>) -> Result<f64, ParameterError> {
+    let Some(guidance) = context.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
         return Ok(f64::INFINITY);
     };
     let place_m = guidance.motion.at(0.0).position_m;
     let mut least_m = f64::INFINITY;
-    let later = setting.later.iter().map(|Leg { formation, .. }| formation);
-    for formation in std::iter::once(setting.formation).chain(later) {
+    let later = context.later.iter().map(|Leg { formation, .. }| formation);
+    for formation in std::iter::once(context.formation).chain(later) {
         for vehicle in 0..formation.count() {
-            for (obstacle, solid) in setting.obstacles.iter().enumerate() {
+            for (obstacle, solid) in context.obstacles.iter().enumerate() {
                 let (room_m, _) = solid.room_m(row(&formation.slots_m, vehicle) + place_m);
                 if room_m <= 0.0 {
                     let clearance_m = solid.clearance_m;

@@ -1,30 +1,25 @@
 //! The displacement law: consensus on the slots over any connected graph, and a one-sided edge tension between all who are
 //! near.
 
-mod conditions;
-mod promise;
-
-use conditions::{growth, voids};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, LegBound, Void};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_range, check_state, check_tables};
+use super::energy::PotentialCache;
+use super::energy::{BoundedEnergy, EnergyBound, Frame};
 use super::error::{LawError, ParameterError};
-use super::growth::Growth;
+use super::interface::LawContext;
 use super::interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin};
-use super::memo::Memo;
-use super::modes::in_contact;
-use super::modes::{Linear, Mode};
+use super::modes::{Linear, Mode, stiffest_contact_mode};
 use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
-use super::setting::Setting;
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{Metric, NearPairs, Obstacle};
-use crate::target::{Settling, Target};
+use crate::target::{Guidance, ReferenceMotion, Settling, Target};
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
 /// Keys of `[law]` with `kind = "displacement"`.
@@ -45,12 +40,6 @@ pub struct DisplacementKeys {
 impl Default for DisplacementKeys {
     fn default() -> Self {
         Self { k_per_s2: 1.0, zeta_per_s: 1.0, alpha: 1.0 }
-    }
-}
-
-impl DisplacementKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<DisplacementLaw, ParameterError> {
-        DisplacementLaw::new(setting, self.clone())
     }
 }
 
@@ -118,7 +107,7 @@ pub struct DisplacementLaw {
     /// Why nothing is certified from any start.
     voids: Vec<Void>,
     /// What the wind may add to the energy, where it blows.
-    growth: Option<Growth>,
+    energy_bound: Option<EnergyBound>,
     /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
     connectivity: f64,
     largest: f64,
@@ -133,7 +122,7 @@ pub struct DisplacementLaw {
     /// That of the target that R is taken from.
     revision: u64,
     /// Sum of `V_R` over the near pairs.
-    memo: Memo,
+    cache: PotentialCache,
 }
 
 impl DisplacementLaw {
@@ -142,8 +131,8 @@ impl DisplacementLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
     /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
-    pub fn new(setting: &Setting<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = setting;
+    pub fn new(context: &LawContext<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = context;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
         for formation in std::iter::once(formation).chain(later.iter().map(|leg| &leg.formation)) {
             ParameterError::check(links, formation, &gains)?;
@@ -151,7 +140,7 @@ impl DisplacementLaw {
         if let Some(&vehicle) = links.unreachable().first() {
             return Err(ParameterError::Disconnected { vehicle });
         }
-        let pulls = PinnedConsensus::new(links, setting.pinning());
+        let pulls = PinnedConsensus::new(links, context.pinning());
         let connectivity = pulls.connectivity();
         if connectivity <= 0.0 {
             return Err(ParameterError::NobodyKnowsTheReference);
@@ -167,11 +156,11 @@ impl DisplacementLaw {
         let clearance = if obstacles.is_empty() {
             None
         } else {
-            let range_m = slot_room_m(setting)?.min(tension.rest_m() - delta_m);
+            let range_m = slot_room_m(context)?.min(tension.rest_m() - delta_m);
             let tension = ClearanceTension::new(keys.alpha, range_m);
             Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
         };
-        let growth = growth(setting, (keys.zeta_per_s + a22_per_s).max(0.0) - a22_per_s);
+        let energy_bound = energy_bound(context, (keys.zeta_per_s + a22_per_s).max(0.0) - a22_per_s);
         Ok(Self {
             clearance,
             largest: links.largest_eigenvalue_bound(&pulls.pinning),
@@ -181,14 +170,14 @@ impl DisplacementLaw {
             metric,
             a22_per_s,
             is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
-            growth,
-            voids: voids(setting),
+            energy_bound,
+            voids: voids(context),
             connectivity,
             tension,
             rest_at_most_m,
             has_pairs: links.count() > 1,
             revision: 0,
-            memo: Memo::new(links.count()),
+            cache: PotentialCache::new(links.count()),
         })
     }
 
@@ -246,7 +235,7 @@ impl DisplacementLaw {
         check_state(self.pulls.graph.count(), at.own)?;
         let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
         let stretch = self.stretch(|i| error_m(positions_m, formation, reference.position_m, i));
-        let pushes = self.memo.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
+        let pushes = self.cache.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
         let is_absolute = self.clearance.is_some() && !self.is_guided();
         let kinetic = if is_absolute {
             0.5 * at.own.velocities_m_s.norm_squared()
@@ -264,7 +253,7 @@ impl DisplacementLaw {
         let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
         let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
         if let Some(of_pairs) = of_pairs {
-            self.memo.keep(&at.own.positions_m, of_pairs + of_obstacles);
+            self.cache.keep(&at.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
             if self.is_fed {
@@ -348,7 +337,7 @@ impl Law for DisplacementLaw {
                 let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_for(target.formation));
                 self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
                     .map_err(|_: TensionError| LawError::Target { pair, distance_m, delta_m })?;
-                self.memo.forget();
+                self.cache.forget();
             }
             self.revision = target.revision;
         }
@@ -365,7 +354,7 @@ impl Law for DisplacementLaw {
         let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
         let mut linear = self.pulls.linear(lead.times(self.scale()), lead);
         if self.pulls.graph.is_complete() && !self.is_guided() && self.has_pairs {
-            linear.in_contact = in_contact(lead, &self.tension, formation);
+            linear.stiffest_contact_mode = stiffest_contact_mode(lead, &self.tension, formation);
         }
         Some(linear)
     }
@@ -391,7 +380,7 @@ impl Law for DisplacementLaw {
     }
 
     fn certificate(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
-        self.promise_through(start, ahead)
+        self.certificate_through(start, ahead)
     }
 
     fn rates(&self, at: &RateQuery) -> Rates {
@@ -409,6 +398,109 @@ impl Law for DisplacementLaw {
             common_mode_per_s: if self.is_guided() { at.a22_per_s - self.damping_per_s() } else { at.a22_per_s },
         }
     }
+}
+
+impl DisplacementLaw {
+    /// Returns the certificate from a state on, through these formations.
+    fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
+        let energy = match self.try_energy(start) {
+            Ok(energy) => energy,
+            Err(fault) => return Certificate::void(Void::StartRefused(fault)),
+        };
+        let BoundedEnergy { energy: most, until_s } = self.bounded(energy, start, ahead);
+        let legs = self.bounds(most, start.target.formation, ahead);
+        let last = legs.last();
+        let (certified_m, certified_room_m) =
+            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
+        let legs = if ahead.is_empty() { Vec::new() } else { legs };
+        let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
+        let promised = Certificate {
+            certified_m,
+            certified_until_s: until_s,
+            certified_room_m,
+            energy_initial: Some(energy),
+            legs,
+            ..Certificate::default()
+        }
+        .void_where(closes_in, Void::TargetChanges);
+        self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
+    }
+
+    /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
+    fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
+        let bound = |energy: f64| LegBound {
+            energy,
+            certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
+            certified_room_m: self.clearance.map(|clearance| clearance.least_room_m(energy)),
+        };
+        let mut root = energy.sqrt();
+        let mut bounds = vec![bound(energy)];
+        for step in self.steps(now, ahead) {
+            root += step;
+            bounds.push(bound(root * root));
+        }
+        bounds
+    }
+
+    /// By how much sqrt E may grow where slots become those of the next formation \[m/s\].
+    fn steps<'a>(&'a self, now: &'a Formation, ahead: &'a [&Formation]) -> impl Iterator<Item = f64> + 'a {
+        std::iter::once(now)
+            .chain(ahead.iter().copied())
+            .zip(ahead)
+            .map(|(before, next)| self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
+    }
+
+    /// The most that an energy becomes under the wind before the slots change: whatever it adds later it adds to more, and that
+    /// is less. The promise ends where it could no longer be told from delta.
+    fn bounded(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
+        let Some(energy_bound) = &self.energy_bound else { return BoundedEnergy { energy, until_s: None } };
+        let borne = self.tension.value(self.delta_m + energy_bound.resolution_m()).sqrt();
+        let left = borne - self.steps(start.target.formation, ahead).sum::<f64>();
+        energy_bound.of(energy, start.time_s, left.max(0.0).powi(2))
+    }
+}
+
+/// Why nothing is certified from any start: followers are not told how their reference moves, a swarm is carried past obstacles
+/// that stand, its absolute velocity, which counts among them, is fed, or what the wind does has no bound.
+fn voids(context: &LawContext<'_>) -> Vec<Void> {
+    let &LawContext { guidance, obstacles, a22_per_s, exposure, .. } = context;
+    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
+    let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
+    let is_driven = guidance.is_none() && a22_per_s > 0.0;
+    let is_turbulent = exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some());
+    let is_led = guidance.is_some_and(|of| matches!(of.known_by, Pinning::Leader(_)));
+    let reasons = [
+        (guidance.is_some_and(is_unfed), Void::ReferenceNotFed),
+        (!obstacles.is_empty() && is_carried, Void::CarriedPastObstacles),
+        (!obstacles.is_empty() && is_driven, Void::VelocityUndamped),
+        (
+            is_turbulent && (frame(context) == Frame::Ground || exposure.is_some_and(|b| !b.wind.shared)),
+            Void::WindUnbounded,
+        ),
+        (is_led && exposure.is_some(), Void::LeaderBlown),
+    ];
+    reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
+}
+
+/// Whether a vehicle on the reference stays on it by itself.
+fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
+    motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
+}
+
+/// What the law's velocities are counted from: the mean where nobody knows a reference and nothing stands in the way.
+fn frame(context: &LawContext<'_>) -> Frame {
+    if context.guidance.is_none() && context.obstacles.is_empty() { Frame::Mean } else { Frame::Ground }
+}
+
+/// What the wind may add to the energy, of which relative velocities lose `margin_per_s` \[1/s\]. Among obstacles, without a
+/// reference, absolute ones count, which nothing brakes but the air.
+fn energy_bound(context: &LawContext<'_>, margin_per_s: f64) -> Option<EnergyBound> {
+    let exposure = context.exposure?;
+    let damping_per_s = match (context.guidance, frame(context)) {
+        (None, Frame::Ground) => margin_per_s.min(-context.a22_per_s),
+        _ => margin_per_s,
+    };
+    Some(EnergyBound::new(&exposure, context.links.count(), frame(context), damping_per_s))
 }
 
 #[cfg(test)]

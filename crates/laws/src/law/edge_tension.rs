@@ -9,13 +9,13 @@ use super::consensus::{
     add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
     consensus_margin, of_table, relative_kinetic_energy,
 };
+use super::energy::PotentialCache;
+use super::energy::{BoundedEnergy, EnergyBound, Frame};
 use super::error::{LawError, ParameterError};
-use super::growth::{Frame, Grown, Growth};
+use super::interface::LawContext;
 use super::interface::{Capabilities, Controls, Law, RateQuery, Rates};
 use super::kernel::Kernel;
-use super::memo::Memo;
 use super::modes::{Linear, Mode};
-use super::setting::{Blown, Setting};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -46,31 +46,6 @@ impl Default for EdgeTensionKeys {
     }
 }
 
-impl EdgeTensionKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<EdgeTensionLaw, ParameterError> {
-        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
-        let law =
-            EdgeTensionLaw::new(links, formation, EdgeTensionParameters { alpha: self.alpha, delta_m, a22_per_s })?;
-        let is_unbounded = |blown: &Blown<'_>| blown.wind.turbulence.is_some() && !blown.wind.shared;
-        Ok(EdgeTensionLaw {
-            growth: setting.blown.map(|blown| Growth::new(&blown, links.count(), Frame::Mean, DAMPING_PER_S)),
-            is_unbounded: setting.blown.as_ref().is_some_and(is_unbounded),
-            ..law
-        })
-    }
-}
-
-/// Parameters of [`EdgeTensionLaw`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EdgeTensionParameters {
-    /// Scale alpha of the tension \[m^2/s^2\], positive.
-    pub alpha: f64,
-    /// Safety distance delta \[m\], below every desired distance of an edge.
-    pub delta_m: f64,
-    /// Velocity coefficient a22 of the plant \[1/s\].
-    pub a22_per_s: f64,
-}
-
 /// The edge-tension law on an undirected graph of N vehicles, equation (8):
 ///
 /// ```text
@@ -95,43 +70,45 @@ pub struct EdgeTensionParameters {
 pub struct EdgeTensionLaw {
     graph: Graph,
     formation: Formation,
-    parameters: EdgeTensionParameters,
+    alpha: f64,
+    delta_m: f64,
+    a22_per_s: f64,
     kernel: Kernel,
     /// The tension of the edge with the smallest desired distance.
     tightest: Option<EdgeTension>,
     /// That of the target whose distances are desired.
     revision: u64,
     /// What the wind may add to the energy, where it blows, and whether that has no bound.
-    growth: Option<Growth>,
+    energy_bound: Option<EnergyBound>,
     is_unbounded: bool,
     /// (1/alpha) sum of V over the edges.
-    memo: Memo,
+    cache: PotentialCache,
 }
 
 impl EdgeTensionLaw {
-    /// The law for the edges of `graph` and the distances of `formation`.
+    /// The law for the links and the distances of the formation.
     ///
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where an edge has no
     /// tension (see [`EdgeTension::new`]), where a22 is not finite, or where the edges do not fit in memory.
-    pub fn new(
-        graph: &Graph,
-        formation: &Formation,
-        parameters: EdgeTensionParameters,
-    ) -> Result<Self, ParameterError> {
-        ParameterError::check(graph, formation, &[("a22", parameters.a22_per_s)])?;
-        let kernel =
-            Kernel::new(graph, parameters.delta_m).map_err(|_| ParameterError::Memory { edges: graph.edge_count() })?;
+    #[expect(clippy::needless_pass_by_value, reason = "every law takes its keys by value")]
+    pub fn new(context: &LawContext<'_>, keys: EdgeTensionKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, delta_m, a22_per_s, exposure, .. } = context;
+        ParameterError::check(links, formation, &[("a22", a22_per_s)])?;
+        let kernel = Kernel::new(links, delta_m).map_err(|_| ParameterError::Memory { edges: links.edge_count() })?;
         let mut law = Self {
-            graph: graph.clone(),
+            graph: links.clone(),
             formation: formation.clone(),
-            parameters,
+            alpha: keys.alpha,
+            delta_m,
+            a22_per_s,
             kernel,
             tightest: None,
             revision: 0,
-            growth: None,
-            is_unbounded: false,
-            memo: Memo::new(graph.count()),
+            energy_bound: exposure
+                .map(|exposure| EnergyBound::new(&exposure, links.count(), Frame::Mean, DAMPING_PER_S)),
+            is_unbounded: exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some() && !exposure.wind.shared),
+            cache: PotentialCache::new(links.count()),
         };
         law.set_rest_lengths().map_err(|(pair, source)| ParameterError::Tension { pair, source })?;
         Ok(law)
@@ -139,9 +116,9 @@ impl EdgeTensionLaw {
 
     /// Takes the tension of each edge from the formation; the first edge that has none is the error.
     fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
-        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        let Self { alpha, delta_m, .. } = *self;
         self.tightest = None;
-        self.memo.forget();
+        self.cache.forget();
         for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
             let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
                 .map_err(|source| (Pair::new(i, j), source))?;
@@ -155,7 +132,7 @@ impl EdgeTensionLaw {
 
     /// Adds `w_ij (p_i - p_j) / alpha` over what each vehicle heard of its neighbours.
     fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        let Self { alpha, delta_m, .. } = *self;
         add_heard(at, command, |i, own, j, heard| {
             let edge_m = own.position_m - heard.position_m;
             let separation_m = edge_m.norm();
@@ -177,7 +154,7 @@ impl EdgeTensionLaw {
     /// As [`Law::command`].
     pub fn matrix_form(&self, swarm: &Swarm) -> Result<Rows, LawError> {
         check_state(self.graph.count(), swarm)?;
-        let EdgeTensionParameters { alpha, delta_m, a22_per_s } = self.parameters;
+        let Self { alpha, delta_m, a22_per_s, .. } = *self;
         let within = |distance_m: f64| distance_m > delta_m && distance_m.is_finite();
         if !self.graph.edges().all(|(i, j)| within(separation(&swarm.positions_m, i, j))) {
             return Err(self.fault(swarm));
@@ -194,7 +171,7 @@ impl EdgeTensionLaw {
 
     /// The kernel found a distance that is not in (delta, infinity): names the first edge that is too short.
     fn fault(&self, swarm: &Swarm) -> LawError {
-        let delta_m = self.parameters.delta_m;
+        let delta_m = self.delta_m;
         self.graph
             .edges()
             .map(|(i, j)| (Pair::new(i, j), separation(&swarm.positions_m, i, j)))
@@ -204,13 +181,13 @@ impl EdgeTensionLaw {
 
     fn try_energy(&self, swarm: &Swarm) -> Result<f64, LawError> {
         check_rows(self.graph.count(), swarm)?;
-        let potential = if let Some(potential) = self.memo.of(&swarm.positions_m) {
+        let potential = if let Some(potential) = self.cache.of(&swarm.positions_m) {
             potential
         } else {
             check_state(self.graph.count(), swarm)?;
             self.kernel.potential(&swarm.positions_m).map_err(|_| self.fault(swarm))?
         };
-        let energy = relative_kinetic_energy(swarm) + self.parameters.alpha * potential / swarm.count().max(1) as f64;
+        let energy = relative_kinetic_energy(swarm) + self.alpha * potential / swarm.count().max(1) as f64;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 }
@@ -224,11 +201,11 @@ impl Law for EdgeTensionLaw {
         check_observation(self.graph.count(), at, command)?;
         command.fill(0.0);
         let per_vehicle = -1.0 / at.own.count().max(1) as f64;
-        let EdgeTensionParameters { alpha, a22_per_s, .. } = self.parameters;
+        let Self { alpha, a22_per_s, .. } = *self;
         let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
         if let Some(swarm) = at.shared() {
             let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
-            self.memo.keep(&swarm.positions_m, potential);
+            self.cache.keep(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
         } else {
@@ -245,7 +222,7 @@ impl Law for EdgeTensionLaw {
             return Ok(());
         }
         check_count(self.graph.count(), target.formation.count())?;
-        let EdgeTensionParameters { alpha, delta_m, .. } = self.parameters;
+        let Self { alpha, delta_m, .. } = *self;
         for (i, j) in self.graph.edges() {
             let distance_m = target.formation.desired_distance(i, j);
             EdgeTension::new(alpha, delta_m, distance_m).map_err(|_| LawError::Target {
@@ -270,7 +247,7 @@ impl Law for EdgeTensionLaw {
     fn linear(&self, formation: &Formation) -> Option<Linear> {
         /// Most vehicles for whom they are computed, in O(N^3).
         const MOST: usize = 130;
-        let (count, EdgeTensionParameters { alpha, delta_m, a22_per_s }) = (self.graph.count(), self.parameters);
+        let (count, &Self { alpha, delta_m, a22_per_s, .. }) = (self.graph.count(), self);
         if !self.graph.is_complete() || !(2..=MOST).contains(&count) {
             return None;
         }
@@ -288,7 +265,7 @@ impl Law for EdgeTensionLaw {
         // Rounding of eigenvalues that are 0.
         let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
         let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
-        Some(Linear { free: stiffnesses.iter().map(mode).collect(), in_contact: None, heard: None })
+        Some(Linear { free: stiffnesses.iter().map(mode).collect(), stiffest_contact_mode: None, heard: None })
     }
 
     /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
@@ -317,28 +294,29 @@ impl Law for EdgeTensionLaw {
         let count = start.own.count() as f64;
         // On the complete graph every pair is linked.
         let links_alone = energy_initial.zip(self.tightest).filter(|_| !self.graph.is_complete());
-        let grown = promised.map(|(energy, tightest)| match &self.growth {
-            None => Grown { energy, until_s: None },
-            Some(growth) => {
-                let borne = tightest.value(tightest.delta_m() + growth.resolution_m()) / count;
-                growth.of(energy, start.time_s, borne)
+        let bounded = promised.map(|(energy, tightest)| match &self.energy_bound {
+            None => BoundedEnergy { energy, until_s: None },
+            Some(energy_bound) => {
+                let borne = tightest.value(tightest.delta_m() + energy_bound.resolution_m()) / count;
+                energy_bound.of(energy, start.time_s, borne)
             }
         });
         Certificate {
-            certified_m: promised.zip(grown).map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
-            certified_until_s: grown.and_then(|grown| grown.until_s),
-            certified_room_m: None,
+            certified_m: promised
+                .zip(bounded)
+                .map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
+            certified_until_s: bounded.and_then(|bounded| bounded.until_s),
             energy_initial,
             linked_m: links_alone.map(|(energy, of)| of.push_side_root(count * energy)),
             void,
-            legs: Vec::new(),
+            ..Certificate::default()
         }
     }
 
     fn capabilities(&self) -> Capabilities {
         Capabilities {
             controls: Controls::Distances,
-            barrier_m: Some(self.parameters.delta_m),
+            barrier_m: Some(self.delta_m),
             certifies_under_wind: true,
             assumptions: "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on \
                           the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows by \
@@ -356,7 +334,7 @@ impl Law for EdgeTensionLaw {
     /// rate 1/s, so the fastest rate is max(omega, 1/s).
     fn rates(&self, at: &RateQuery) -> Rates {
         let fastest = |(of, nearest_m): (EdgeTension, f64)| of.second_derivative(nearest_m).sqrt().max(1.0);
-        let gain_per_s = 1.0 + self.parameters.a22_per_s;
+        let gain_per_s = 1.0 + self.a22_per_s;
         let margin = consensus_margin(self.graph.count(), gain_per_s, at.connectivity, at.a22_per_s);
         Rates {
             fastest_per_s: self.tightest.zip(at.nearest_m).map(fastest),

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
+use super::interface::LawContext;
+use super::interface::ReferenceUse;
 use super::interface::{Capabilities, Law, RateQuery, Rates};
-use super::setting::Carried;
-use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
 use crate::target::Target;
@@ -51,12 +51,6 @@ impl Default for FlockingKeys {
     }
 }
 
-impl FlockingKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<FlockingLaw, ParameterError> {
-        FlockingLaw::new(setting, self.clone())
-    }
-}
-
 /// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms and theory,
 /// 2006, algorithm 2), whose objective pulls with at most `c1_gamma` times a metre, as its algorithm 3 does:
 ///
@@ -78,7 +72,7 @@ impl FlockingKeys {
 #[derive(Clone, Debug)]
 pub struct FlockingLaw {
     keys: FlockingKeys,
-    carried: Carried,
+    reference_use: ReferenceUse,
     count: usize,
     a22_per_s: f64,
     /// d \[m\].
@@ -93,8 +87,8 @@ impl FlockingLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
     /// finite, or where there is a reference that some do not know.
-    pub fn new(setting: &Setting<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, a22_per_s, .. } = setting;
+    pub fn new(context: &LawContext<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, a22_per_s, .. } = context;
         let gains = [
             ("c1_alpha_per_s2", keys.c1_alpha_per_s2),
             ("c1_gamma_per_s2", keys.c1_gamma_per_s2),
@@ -103,8 +97,8 @@ impl FlockingLaw {
         ];
         ParameterError::check(links, formation, &gains)?;
         let spacing_m = spacing_m(&keys, formation);
-        let carried = Carried::new(setting)?;
-        Ok(Self { keys, carried, count: links.count(), a22_per_s, spacing_m, revision: 0 })
+        let reference_use = ReferenceUse::new(context)?;
+        Ok(Self { keys, reference_use, count: links.count(), a22_per_s, spacing_m, revision: 0 })
     }
 
     /// r \[m\].
@@ -130,7 +124,7 @@ impl FlockingLaw {
         let own_m_s = row(&at.own.velocities_m_s, i);
         let off_m_s = own_m_s - reference.velocity_m_s;
         let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
-        self.carried.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
+        self.reference_use.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
     }
 }
 
@@ -204,7 +198,7 @@ impl Law for FlockingLaw {
         Capabilities {
             max_command_m_s2: Some(self.keys.max_accel_m_s2),
             sensing_range_m: Some(self.range_m()),
-            ..self.carried.capabilities()
+            ..self.reference_use.capabilities()
         }
     }
 

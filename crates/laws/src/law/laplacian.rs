@@ -8,10 +8,10 @@ use super::consensus::{
     of_table, relative_kinetic_energy, sum_of_squares_about_mean,
 };
 use super::error::{LawError, ParameterError};
+use super::interface::LawContext;
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use super::modes::{Linear, Mode};
 use super::pinned::PinnedConsensus;
-use super::setting::Setting;
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
@@ -46,11 +46,6 @@ impl LaplacianKeys {
     pub(super) fn complete(self, a22_per_s: f64) -> Self {
         Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
     }
-
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<LaplacianLaw, ParameterError> {
-        let f2_per_s = self.f2_per_s.unwrap_or(1.0 + setting.a22_per_s);
-        LaplacianLaw::new(setting.links, setting.formation, self.f1_per_s2, f2_per_s)
-    }
 }
 
 /// The Laplacian law on an undirected graph of N vehicles, equation (3):
@@ -81,14 +76,17 @@ pub struct LaplacianLaw {
 }
 
 impl LaplacianLaw {
-    /// The law with position gain f1 \[1/s^2\] and velocity gain f2 \[1/s\].
+    /// The law on these links.
     ///
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
     /// is not finite.
-    pub fn new(graph: &Graph, formation: &Formation, f1_per_s2: f64, f2_per_s: f64) -> Result<Self, ParameterError> {
-        ParameterError::check(graph, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
-        Ok(Self { graph: graph.clone(), f1_per_s2, f2_per_s })
+    #[expect(clippy::needless_pass_by_value, reason = "every law takes its keys by value")]
+    pub fn new(context: &LawContext<'_>, keys: LaplacianKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, a22_per_s, .. } = context;
+        let (f1_per_s2, f2_per_s) = (keys.f1_per_s2, keys.f2_per_s.unwrap_or(1.0 + a22_per_s));
+        ParameterError::check(links, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
+        Ok(Self { graph: links.clone(), f1_per_s2, f2_per_s })
     }
 }
 

@@ -4,42 +4,39 @@
 //! the laws that scenarios may name. A law of your own implements [`Law`] and is flown like the built-in ones
 //! (see `examples/own_law.rs`).
 
-mod bands;
 mod cbf_qp;
 mod certificate;
 mod clearance;
 mod consensus;
 mod displacement;
 mod edge_tension;
+mod energy;
 mod error;
 mod flocking;
-mod growth;
 mod half_spaces;
 mod interface;
 mod kernel;
 mod laplacian;
-mod memo;
 mod modes;
-mod near_lists;
 mod orca;
 mod pinned;
 mod potential;
-mod setting;
 mod spec;
 mod tension;
 
 pub use cbf_qp::{CbfQpKeys, CbfQpLaw};
 pub use certificate::{Certificate, LegBound, Void};
 pub use displacement::{DisplacementKeys, DisplacementLaw};
-pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw, EdgeTensionParameters};
+pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw};
 pub use error::{LawError, ParameterError};
 pub use flocking::{FlockingKeys, FlockingLaw};
-pub use interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin, certificate_through};
+pub use interface::{
+    Capabilities, Controls, Law, LawContext, RateQuery, Rates, VelocityMargin, WindExposure, certificate_through,
+};
 pub use laplacian::{LaplacianKeys, LaplacianLaw};
 pub use modes::{Heard, HeardLinks, Linear, Mode};
 pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
-pub use setting::{Blown, Setting};
 pub use spec::LawSpec;
 pub use tension::{EdgeTension, TensionError};
 

@@ -26,7 +26,7 @@ pub struct Linear {
     pub free: Vec<Mode>,
     /// The stiffest that a mode can be with the nearest slots' vehicles on the edge of pushing each other; none where that is
     /// not known, or nobody pushes.
-    pub in_contact: Option<Mode>,
+    pub stiffest_contact_mode: Option<Mode>,
     /// What is heard of others, where the modes are known with that late and a vehicle's own state not.
     pub heard: Option<Heard>,
 }
@@ -133,9 +133,9 @@ impl Mode {
             return f64::INFINITY;
         }
         let is_stable = |period_s: f64| {
-            let (grown, moved_s, pushed_s2) = held(a22_per_s, period_s);
-            let trace = 1.0 + grown - k * pushed_s2 - c * moved_s;
-            let determinant = grown - c * moved_s + k * (moved_s * moved_s - grown * pushed_s2);
+            let (bounded, moved_s, pushed_s2) = held(a22_per_s, period_s);
+            let trace = 1.0 + bounded - k * pushed_s2 - c * moved_s;
+            let determinant = bounded - c * moved_s + k * (moved_s * moved_s - bounded * pushed_s2);
             determinant < 1.0 && 1.0 + trace + determinant > 0.0
         };
         let scale_s = if k > 0.0 { (2.0 / c.abs()).min(2.0 * c.abs() / k) } else { 2.0 / c.abs() };
@@ -253,7 +253,7 @@ const SAME: f64 = 1e-6;
 
 /// The stiffest mode there: those at the nearest slots push each other with `V_R''` at R, which adds at most its product with the
 /// largest eigenvalue of the Laplacian of who is nearest. None for fewer than two vehicles.
-pub(super) fn in_contact(free: Mode, tension: &EdgeTension, formation: &Formation) -> Option<Mode> {
+pub(super) fn stiffest_contact_mode(free: Mode, tension: &EdgeTension, formation: &Formation) -> Option<Mode> {
     let (_, nearest_m) = formation.min_distance()?;
     let mut near = NearPairs::default();
     near.update(&formation.slots_m, nearest_m * (1.0 + SAME));

@@ -1,23 +1,23 @@
 //! Optimal reciprocal collision avoidance: each vehicle takes the velocity nearest to the one it prefers that no other, doing
 //! the same, needs to collide with.
 
-mod obstacle;
-
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use self::obstacle::VelocityObstacle;
 use super::certificate::{Certificate, Void};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
+use super::interface::LawContext;
+use super::interface::ReferenceUse;
 use super::interface::{Capabilities, Law, RateQuery, Rates};
-use super::near_lists::NearLists;
-use super::setting::Carried;
-use super::setting::Setting;
 use crate::formation::Formation;
 use crate::observation::Observation;
+use crate::space::NearLists;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
+
+/// Part of a speed below which it has no direction across the line of sight.
+const STRAIGHT: f64 = 1e-9;
 
 /// The margin unless given, as a part of delta.
 const MARGIN: f64 = 0.01;
@@ -74,12 +74,6 @@ impl Default for OrcaKeys {
     }
 }
 
-impl OrcaKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<OrcaLaw, ParameterError> {
-        OrcaLaw::new(setting, self.clone())
-    }
-}
-
 /// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance, 2011), with
 /// half-spaces, for vehicles of diameter D = delta + margin that track the velocities it chooses:
 ///
@@ -102,7 +96,7 @@ impl OrcaKeys {
 #[derive(Clone, Debug)]
 pub struct OrcaLaw {
     keys: OrcaKeys,
-    carried: Carried,
+    reference_use: ReferenceUse,
     count: usize,
     delta_m: f64,
     /// D \[m\].
@@ -121,8 +115,8 @@ impl OrcaLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
     /// finite, or where there is a reference that some do not know.
-    pub fn new(setting: &Setting<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
-        let &Setting { links, formation, delta_m, a22_per_s, .. } = setting;
+    pub fn new(context: &LawContext<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
+        let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
             ("k_per_s", keys.k_per_s),
             ("speed_m_s", keys.speed_m_s),
@@ -138,7 +132,7 @@ impl OrcaLaw {
         let range_m = keys.range_m.unwrap_or(diameter_m + 2.0 * keys.max_speed_m_s * keys.horizon_s);
         Ok(Self {
             keys,
-            carried: Carried::new(setting)?,
+            reference_use: ReferenceUse::new(context)?,
             count: links.count(),
             delta_m,
             diameter_m,
@@ -217,7 +211,7 @@ impl Law for OrcaLaw {
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(at, command)?;
-        let fed_m_s2 = self.carried.fed_m_s2(&at.target.reference);
+        let fed_m_s2 = self.reference_use.fed_m_s2(&at.target.reference);
         for i in 0..self.count {
             let own_m_s = row(&at.own.velocities_m_s, i);
             let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
@@ -235,7 +229,7 @@ impl Law for OrcaLaw {
         Capabilities {
             max_command_m_s2: Some(self.keys.max_accel_m_s2),
             sensing_range_m: Some(self.range_m),
-            ..self.carried.capabilities()
+            ..self.reference_use.capabilities()
         }
     }
 
@@ -247,6 +241,62 @@ impl Law for OrcaLaw {
         let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
         Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(at) }
     }
+}
+
+/// The relative velocities of vehicle i against vehicle j with which i comes nearer to j than a diameter within the horizon.
+struct VelocityObstacle {
+    /// From i to j \[m\], not zero.
+    towards_m: Vector3<f64>,
+    diameter_m: f64,
+    horizon_s: f64,
+    /// In place of the horizon where the two are too near already: the time in which they part.
+    parting_s: f64,
+}
+
+impl VelocityObstacle {
+    /// The outward normal where a relative velocity is nearest to the boundary, and how deep inside it lies \[m/s\]; negative
+    /// outside.
+    ///
+    /// The set is the ball of radius diameter/horizon about `towards_m`/horizon, and its shadow away from the origin: a cone whose
+    /// half-angle has the sine diameter/distance. The nearest point is on the ball where the way from its centre to the velocity
+    /// leads off the cone's mantle, and on the mantle elsewhere.
+    fn way_out(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
+        let Self { towards_m, diameter_m, horizon_s, parting_s } = self;
+        let distance_m = towards_m.norm();
+        let sight = towards_m / distance_m;
+        if distance_m <= *diameter_m {
+            return self.out_of_ball(relative_m_s, *parting_s);
+        }
+        let from_centre = relative_m_s - towards_m / *horizon_s;
+        let sine = diameter_m / distance_m;
+        if -from_centre.dot(&sight) > sine * from_centre.norm() {
+            return self.out_of_ball(relative_m_s, *horizon_s);
+        }
+        let cosine = ((distance_m - diameter_m) * (distance_m + diameter_m)).sqrt() / distance_m;
+        let normal = across(relative_m_s, sight) * cosine - sight * sine;
+        (normal, -normal.dot(&relative_m_s))
+    }
+
+    fn out_of_ball(&self, relative_m_s: Vector3<f64>, within_s: f64) -> (Vector3<f64>, f64) {
+        let from_centre = relative_m_s - self.towards_m / within_s;
+        let length = from_centre.norm();
+        let normal = if length > 0.0 { from_centre / length } else { -self.towards_m.normalize() };
+        (normal, self.diameter_m / within_s - length)
+    }
+}
+
+/// The direction of a velocity across a line of sight. Where it has none, to the left as seen from above, so that the two of a
+/// pair turn to different sides; along a vertical line of sight, to x.
+fn across(velocity_m_s: Vector3<f64>, sight: Vector3<f64>) -> Vector3<f64> {
+    let rest = velocity_m_s - sight * sight.dot(&velocity_m_s);
+    let rest = rest - sight * sight.dot(&rest);
+    let length = rest.norm();
+    if length > STRAIGHT * velocity_m_s.norm() {
+        return rest / length;
+    }
+    let left = Vector3::new(-sight.y, sight.x, 0.0);
+    let length = left.norm();
+    if length > STRAIGHT { left / length } else { Vector3::x() * sight.z.signum() }
 }
 
 #[cfg(test)]

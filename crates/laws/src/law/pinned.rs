@@ -49,7 +49,7 @@ impl PinnedConsensus {
         let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
         let free = eigenvalues.iter().map(|&eigenvalue| gain.times(eigenvalue)).chain(leads).collect();
         let links = self.heard_links(&eigenvalues);
-        Linear { free, in_contact: None, heard: links.map(|links| Heard { gain, links }) }
+        Linear { free, stiffest_contact_mode: None, heard: links.map(|links| Heard { gain, links }) }
     }
 
     /// The loop over links, where own and others' parts have the same modes, and on a star.

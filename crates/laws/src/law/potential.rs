@@ -7,10 +7,10 @@ use super::certificate::{Certificate, Void};
 use super::consensus::{
     add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
 };
+use super::energy::PotentialCache;
 use super::error::{LawError, ParameterError};
+use super::interface::LawContext;
 use super::interface::{Capabilities, Law, RateQuery, Rates, VelocityMargin};
-use super::memo::Memo;
-use super::setting::Setting;
 use super::tension::TensionError;
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -40,12 +40,6 @@ pub struct PotentialKeys {
 impl Default for PotentialKeys {
     fn default() -> Self {
         Self { k_per_s2: 1.0, c_per_s: 2.0, eta_m4_per_s2: 1.0, max_accel_m_s2: None }
-    }
-}
-
-impl PotentialKeys {
-    pub(super) fn build(&self, setting: &Setting<'_>) -> Result<PotentialLaw, ParameterError> {
-        PotentialLaw::new(setting, self.clone())
     }
 }
 
@@ -82,7 +76,7 @@ pub struct PotentialLaw {
     /// That of the target that R is taken from.
     revision: u64,
     /// Sum of U over the near pairs.
-    memo: Memo,
+    cache: PotentialCache,
 }
 
 impl PotentialLaw {
@@ -91,21 +85,21 @@ impl PotentialLaw {
     /// # Errors
     /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
     /// is not finite.
-    pub fn new(setting: &Setting<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
+    pub fn new(context: &LawContext<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
         let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
-        ParameterError::check(setting.links, setting.formation, &gains)?;
-        let range_m = range(setting.formation, setting.delta_m).map_err(|(pair, rest_m)| ParameterError::Tension {
+        ParameterError::check(context.links, context.formation, &gains)?;
+        let range_m = range(context.formation, context.delta_m).map_err(|(pair, rest_m)| ParameterError::Tension {
             pair,
-            source: TensionError::Rest { rest_m, delta_m: setting.delta_m },
+            source: TensionError::Rest { rest_m, delta_m: context.delta_m },
         })?;
         Ok(Self {
-            graph: setting.links.clone(),
+            graph: context.links.clone(),
             keys,
-            delta_m: setting.delta_m,
-            a22_per_s: setting.a22_per_s,
+            delta_m: context.delta_m,
+            a22_per_s: context.a22_per_s,
             range_m,
             revision: 0,
-            memo: Memo::new(setting.links.count()),
+            cache: PotentialCache::new(context.links.count()),
         })
     }
 
@@ -147,7 +141,7 @@ impl PotentialLaw {
         let (positions_m, slots_m) = (&at.own.positions_m, &at.target.formation.slots_m);
         let error_m = |i| row(positions_m, i) - row(slots_m, i);
         let attraction: f64 = self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum();
-        let repulsion = self.memo.of(positions_m).map_or_else(|| self.repulsive_potential(positions_m), Ok)?;
+        let repulsion = self.cache.of(positions_m).map_or_else(|| self.repulsive_potential(positions_m), Ok)?;
         let kinetic = 0.5 * at.own.velocities_m_s.norm_squared();
         let energy = kinetic + 0.5 * self.keys.k_per_s2 / at.own.count().max(1) as f64 * attraction + repulsion;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
@@ -200,7 +194,7 @@ impl Law for PotentialLaw {
         }
         let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
         if let Some(potential) = potential {
-            self.memo.keep(&at.own.positions_m, potential);
+            self.cache.keep(&at.own.positions_m, potential);
         }
         if let Some(limit) = self.keys.max_accel_m_s2 {
             (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
@@ -218,7 +212,7 @@ impl Law for PotentialLaw {
                 delta_m,
             })?;
             self.revision = target.revision;
-            self.memo.forget();
+            self.cache.forget();
         }
         Ok(())
     }
@@ -241,15 +235,7 @@ impl Law for PotentialLaw {
             let steep = (2.0 * energy / self.keys.eta_m4_per_s2).sqrt();
             self.delta_m + 1.0 / (steep + 1.0 / (self.range_m - self.delta_m))
         });
-        Certificate {
-            certified_m,
-            certified_until_s: None,
-            certified_room_m: None,
-            energy_initial: energy,
-            linked_m: None,
-            void,
-            legs: Vec::new(),
-        }
+        Certificate { certified_m, energy_initial: energy, void, ..Certificate::default() }
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -1,20 +1,20 @@
-//! The list of laws. What there is to know of a law stands in its own file; this list is the only one.
+//! The list of laws. Every law is built by `new(context, keys)` of its own file.
 
 use serde::{Deserialize, Serialize};
 
-use super::cbf_qp::CbfQpKeys;
-use super::displacement::DisplacementKeys;
-use super::edge_tension::EdgeTensionKeys;
+use super::cbf_qp::{CbfQpKeys, CbfQpLaw};
+use super::displacement::{DisplacementKeys, DisplacementLaw};
+use super::edge_tension::{EdgeTensionKeys, EdgeTensionLaw};
 use super::error::ParameterError;
-use super::flocking::FlockingKeys;
+use super::flocking::{FlockingKeys, FlockingLaw};
 use super::interface::Law;
-use super::laplacian::LaplacianKeys;
-use super::orca::OrcaKeys;
-use super::potential::PotentialKeys;
-use super::setting::Setting;
+use super::interface::LawContext;
+use super::laplacian::{LaplacianKeys, LaplacianLaw};
+use super::orca::{OrcaKeys, OrcaLaw};
+use super::potential::{PotentialKeys, PotentialLaw};
 
 macro_rules! laws {
-    ($($(#[doc = $doc:literal])+ $kind:ident($keys:ty),)+) => {
+    ($($(#[doc = $doc:literal])+ $kind:ident($keys:ty) => $law:ty,)+) => {
         /// A control law and its parameters, as `[law]` of a scenario gives them.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
         #[schemars(tag = "kind")]
@@ -34,8 +34,8 @@ macro_rules! laws {
             ///
             /// # Errors
             /// [`ParameterError`] where it does not exist for these parameters.
-            pub fn build(&self, setting: &Setting<'_>) -> Result<Box<dyn Law>, ParameterError> {
-                Ok(match self { $(Self::$kind(keys) => Box::new(keys.build(setting)?),)+ })
+            pub fn build(&self, context: &LawContext<'_>) -> Result<Box<dyn Law>, ParameterError> {
+                Ok(match self { $(Self::$kind(keys) => Box::new(<$law>::new(context, keys.clone())?),)+ })
             }
         }
     };
@@ -60,17 +60,17 @@ impl LawSpec {
 
 laws! {
     /// Distances as springs with a barrier at delta: collision-free on the complete graph.
-    EdgeTension(EdgeTensionKeys),
+    EdgeTension(EdgeTensionKeys) => EdgeTensionLaw,
     /// Consensus on the slots over any connected graph, and a tension between all who are near: collision-free.
-    Displacement(DisplacementKeys),
+    Displacement(DisplacementKeys) => DisplacementLaw,
     /// The Laplacian baseline: converges from every start and avoids nothing.
-    Laplacian(LaplacianKeys),
+    Laplacian(LaplacianKeys) => LaplacianLaw,
     /// A potential field: consensus on the slots, repulsion from whoever is near, each vehicle braking itself.
-    Potential(PotentialKeys),
+    Potential(PotentialKeys) => PotentialLaw,
     /// Velocities that are reciprocally free of collisions, tracked.
-    Orca(OrcaKeys),
+    Orca(OrcaKeys) => OrcaLaw,
     /// A controller to the slot, overruled where two could no longer brake.
-    CbfQp(CbfQpKeys),
+    CbfQp(CbfQpKeys) => CbfQpLaw,
     /// One distance to all who are near, bounded forces: a lattice, not given slots.
-    Flocking(FlockingKeys),
+    Flocking(FlockingKeys) => FlockingLaw,
 }

@@ -21,8 +21,8 @@ fn swarm() -> Swarm {
 }
 
 fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
-    let setting = Setting::new(links, formation, 1.0, 0.1);
-    spec.clone().complete(0.1).build(&setting).expect("a law")
+    let context = LawContext::new(links, formation, 1.0, 0.1);
+    spec.clone().complete(0.1).build(&context).expect("a law")
 }
 
 fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {

@@ -9,11 +9,10 @@ mod shape;
 mod spaced;
 
 pub use metric::Metric;
-pub use near::KeptPairs;
-pub use near::NearPairs;
+pub(crate) use near::NearLists;
+pub use near::{KeptPairs, NearPairs};
 pub use shape::Shape;
-pub use spaced::Spaced;
-pub use spaced::closest_pair;
+pub use spaced::{Spaced, closest_pair};
 
 use nalgebra::Vector3;
 

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 
 use tempfile::TempDir;
 
-use super::encoder::{self, FilmEncoder};
+use super::FilmEncoder;
 use crate::error::RenderError;
 use crate::picture::Picture;
 
@@ -30,7 +30,7 @@ pub(super) fn check() -> Result<(), RenderError> {
 }
 
 fn failed(error: impl std::fmt::Display) -> RenderError {
-    encoder::failed("MP4", error)
+    super::failed("MP4", error)
 }
 
 impl<W: Write> Ffmpeg<W> {

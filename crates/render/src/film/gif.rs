@@ -4,7 +4,7 @@ use std::io::Write;
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use super::encoder::{self, FilmEncoder};
+use super::FilmEncoder;
 use crate::error::RenderError;
 use crate::picture::Picture;
 
@@ -24,7 +24,7 @@ pub(super) struct Gif<W: Write> {
 fn failed(error: gif::EncodingError) -> RenderError {
     match error {
         gif::EncodingError::Io(error) => error.into(),
-        error => encoder::failed("GIF", error),
+        error => super::failed("GIF", error),
     }
 }
 

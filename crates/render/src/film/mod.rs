@@ -1,6 +1,5 @@
 //! Films: pictures one after another, as MP4 or GIF.
 
-mod encoder;
 #[cfg(not(feature = "mp4"))]
 mod ffmpeg;
 mod gif;
@@ -12,7 +11,6 @@ use std::path::Path;
 
 use super::error::RenderError;
 use super::picture::Picture;
-use encoder::FilmEncoder;
 
 /// Most pictures a second that a film is made for.
 const MOST_FPS: u32 = 240;
@@ -139,6 +137,20 @@ impl<'a> Film<'a> {
         }
         self.encoder.finish()
     }
+}
+
+/// That the encoder of a format failed.
+fn failed(format: &str, error: impl std::fmt::Display) -> RenderError {
+    RenderError::Film(format!("the {format} encoder failed: {error}"))
+}
+
+/// Writes pictures of one size as a film.
+trait FilmEncoder: Send {
+    /// Adds pictures in order. What can be done to each by itself is done side by side.
+    fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError>;
+
+    /// Writes the end of the film.
+    fn finish(self: Box<Self>) -> Result<(), RenderError>;
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use openh264::formats::{RgbaSliceU8, YUVBuffer};
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use super::encoder::{self, FilmEncoder};
+use super::FilmEncoder;
 use crate::error::RenderError;
 use crate::picture::Picture;
 
@@ -26,7 +26,7 @@ pub(super) struct Mp4<W> {
 }
 
 fn failed(error: impl std::fmt::Display) -> RenderError {
-    encoder::failed("MP4", error)
+    super::failed("MP4", error)
 }
 
 /// Brightness and colour of a picture.

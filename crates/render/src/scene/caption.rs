@@ -3,9 +3,9 @@
 use super::camera::Projected;
 use super::colour::Colour;
 use super::compose::SceneBuilder;
-use super::draw_list::{Annotation, pixels};
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
+use super::{Annotation, pixels};
 use tautline_audit::Violation;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::at_least;

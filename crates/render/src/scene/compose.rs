@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 
 use super::camera::{Camera, CameraSpec, Projected};
 use super::colour::{Colour, Theme};
-use super::draw_list::{Line, Scene};
 use super::extent::Extent;
 use super::labels::LabelLayout;
+use super::{Line, Scene};
 use crate::timeline::Timeline;
 use tautline_audit::Violation;
 use tautline_core::swarm::Pair;

@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use super::camera::Lens;
 use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
-use super::draw_list::{Ball, Disc, Line, Scene, single};
+use super::{Ball, Disc, Line, Scene, single};
 use crate::timeline::QuadrotorShape;
 use tautline_core::swarm::Pair;
 use tautline_laws::space::{Obstacle, Shape};

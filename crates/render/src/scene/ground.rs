@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::Line;
 use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
-use super::draw_list::Line;
 use super::labels::{LabelLayout, width};
 use tautline_core::text::decimals_of;
 

@@ -1,7 +1,7 @@
 //! Words that do not cover each other.
 
 use super::colour::Colour;
-use super::draw_list::{Annotation, pixels};
+use super::{Annotation, pixels};
 
 /// Widths of the letters from space to ~ in thousandths of the height of a line, as the overlay's font has them.
 #[rustfmt::skip]

@@ -4,7 +4,7 @@ use tautline_audit::{Status, swept_separation_m};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{CbfQpKeys, FlockingKeys, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, Setting, Void};
+use tautline_laws::law::{CbfQpKeys, FlockingKeys, LawContext, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, Void};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::NearPairs;
 use tautline_report::run::run;
@@ -59,8 +59,8 @@ struct Crossing {
 fn cross(count: usize, radius_m: f64, longest_s: f64) -> Crossing {
     let mut swarm = Swarm::at_rest(circle(count, radius_m));
     let (links, formation) = (Graph::complete(count), Formation::points(-&swarm.positions_m));
-    let setting = Setting::new(&links, &formation, CIRCLE_DELTA_M, 0.0);
-    let mut law = OrcaLaw::new(&setting, circle_keys()).expect("a law");
+    let context = LawContext::new(&links, &formation, CIRCLE_DELTA_M, 0.0);
+    let mut law = OrcaLaw::new(&context, circle_keys()).expect("a law");
     let (mut near, mut velocities) = (NearPairs::default(), Rows::zeros(count));
     let is_there = |positions_m: &Rows, i: usize| {
         (row(positions_m, i) - row(&formation.slots_m, i)).norm() <= 0.5 * CIRCLE_DELTA_M

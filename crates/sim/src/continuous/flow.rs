@@ -4,8 +4,8 @@ use std::cell::RefCell;
 
 use differential_equations::ode::ODE;
 
-use crate::feedback::Feedback;
 use crate::plant::Air;
+use crate::plant::Feedback;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::law::LawError;
 

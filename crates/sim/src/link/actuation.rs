@@ -35,8 +35,7 @@ impl ImperfectionSpec for ActuationSpec {
         Err(ScenarioError::new("the ideal plant supports no lag")
             .coded("scenario/unsupported-by-plant")
             .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
-            .at("actuation.lag_s")
-            .at("plant.kind"))
+            .at_keys(["actuation.lag_s", "plant.kind"]))
     }
 
     fn voids(&self) -> Vec<Void> {

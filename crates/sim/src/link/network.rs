@@ -200,8 +200,7 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
-            .at("network.rate_hz")
-            .at("sensing.rate_hz"));
+            .at_keys(["network.rate_hz", "sensing.rate_hz"]));
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);
@@ -219,8 +218,7 @@ impl Scenario {
         ))
         .coded("scenario/memory")
         .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
-        .at("network.rate_hz")
-        .at("graph.kind"))
+        .at_keys(["network.rate_hz", "graph.kind"]))
     }
 }
 
@@ -234,8 +232,7 @@ fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
     }
     Err(ScenarioError::new(format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}"))
         .with_help(format!("give at least {least}, or leave network.loss_burst out for independent losses"))
-        .at("network.loss_burst")
-        .at("network.loss"))
+        .at_keys(["network.loss_burst", "network.loss"]))
 }
 
 /// Communication between the vehicles of a flight.

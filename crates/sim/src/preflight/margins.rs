@@ -50,7 +50,7 @@ pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin
         return Vec::new();
     }
     let Some(linear) = law.linear(scenario.formation()) else { return Vec::new() };
-    let Linear { in_contact, heard, .. } = &linear;
+    let Linear { stiffest_contact_mode, heard, .. } = &linear;
     let a22_per_s = scenario.velocity_coefficient_per_s();
     let at_most = |key, state, value: f64| PredictedMargin { key, state, bound: Bound::AtMost, value: finite(value) };
     let at_least = |state, period_s: f64| PredictedMargin {
@@ -60,11 +60,12 @@ pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin
         value: finite(1.0 / period_s).filter(|rate_hz| *rate_hz > 0.0),
     };
     let mut margins = vec![at_most(KNOWN_LATE, Near::Free, linear.delay_margin_s(a22_per_s))];
-    margins.extend(in_contact.map(|mode| at_most(KNOWN_LATE, Near::InContact, mode.delay_margin_s(a22_per_s))));
+    margins
+        .extend(stiffest_contact_mode.map(|mode| at_most(KNOWN_LATE, Near::InContact, mode.delay_margin_s(a22_per_s))));
     let heard_s = heard.as_ref().and_then(|heard| heard.delay_margin_s(a22_per_s));
     margins.extend(heard_s.map(|heard_s| at_most(HEARD_LATE, Near::Free, heard_s)));
     margins.push(at_least(Near::Free, linear.sampling_margin_s(a22_per_s)));
-    margins.extend(in_contact.map(|mode| at_least(Near::InContact, mode.sampling_margin_s(a22_per_s))));
+    margins.extend(stiffest_contact_mode.map(|mode| at_least(Near::InContact, mode.sampling_margin_s(a22_per_s))));
     margins
 }
 

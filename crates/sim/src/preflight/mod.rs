@@ -205,7 +205,7 @@ impl Preflight {
             dt_s: scenario.time.dt_s,
             dt_max_s: rates
                 .fastest_per_s
-                .map(|rate_per_s| scenario.time.honest_rate_dt() / rate_per_s.hypot(rates.obstacles_per_s2.sqrt())),
+                .map(|rate_per_s| scenario.time.stable_rate_dt() / rate_per_s.hypot(rates.obstacles_per_s2.sqrt())),
             dt_links_s: scenario.links_step_s(law),
             margins: margins::margins(law, scenario),
             samples: scenario.time.samples(),

@@ -143,7 +143,7 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
 /// The space asked for, or else the plane if everything lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
-    let moved = document.leg.iter().filter_map(|leg| leg.move_m).chain(document.formation.move_m);
+    let moved = document.leg.iter().filter_map(|leg| leg.placement.move_m).chain(document.formation.placement.move_m);
     let shapes = document.leg.iter().filter_map(|leg| leg.shape.as_ref()).chain([&document.formation.shape]);
     let reference_is_flat = document.reference.as_ref().is_none_or(ReferenceTable::is_flat);
     let formation_is_flat =
@@ -174,8 +174,7 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
             return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
                 .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
-                .at("start.shape")
-                .at("start.positions_m"));
+                .at_keys(["start.shape", "start.positions_m"]));
         }
         (None, None) => {
             return Err(ScenarioError::new("no start positions are given")

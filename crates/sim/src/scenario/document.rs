@@ -1,6 +1,6 @@
 //! The scenario file: its keys, units and defaults.
 //!
-//! Read by `deserializer`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
+//! Read by `text`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
 //! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
 
 use std::path::PathBuf;
@@ -204,22 +204,8 @@ pub(super) enum StartShape {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FormationTable {
-    /// Who flies to which slot.
-    #[serde(default, skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = "given"))]
-    pub(super) assignment: Assignment,
-    /// The slots are scaled by this about their centre.
-    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
-    pub(super) scale: f64,
-    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
-    #[serde(default, skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = 0.0))]
-    pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Point")]
-    pub(super) move_m: Option<Point>,
+    #[serde(flatten)]
+    pub(super) placement: Placement,
     #[schemars(flatten)]
     pub(super) shape: FormationShape,
 }
@@ -233,24 +219,38 @@ pub(super) struct LegTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "LegStart")]
     pub(super) start_s: Option<LegStart>,
-    /// Who flies to which slot, from the slots before.
-    #[serde(default, skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = "given"))]
-    pub(super) assignment: Assignment,
-    /// The slots are scaled by this about their centre.
-    #[serde(default = "unscaled", skip_serializing_if = "is_unscaled")]
-    #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
-    pub(super) scale: f64,
-    /// Then they are turned by this about their centre in degrees, counterclockwise seen from above.
-    #[serde(default, skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = 0.0))]
-    pub(super) yaw_deg: f64,
-    /// Then they are moved by this in m.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Point")]
-    pub(super) move_m: Option<Point>,
+    #[serde(flatten)]
+    pub(super) placement: Placement,
     #[schemars(flatten)]
     pub(super) shape: Option<FormationShape>,
+}
+
+/// Where the slots of a formation are, and which vehicle flies to which slot.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(default)]
+pub(super) struct Placement {
+    /// Which vehicle flies to which slot; for a leg, from the slots before.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = "given"))]
+    pub(super) assignment: Assignment,
+    /// Scale of the slots about their centre.
+    #[serde(skip_serializing_if = "is_unscaled")]
+    #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
+    pub(super) scale: f64,
+    /// Turn of the scaled slots about their centre in degrees, counterclockwise seen from above.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(extend("default" = 0.0))]
+    pub(super) yaw_deg: f64,
+    /// Translation of the turned slots in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Point")]
+    pub(super) move_m: Option<Point>,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { assignment: Assignment::Given, scale: 1.0, yaw_deg: 0.0, move_m: None }
+    }
 }
 
 /// Who flies to which slot.
@@ -384,10 +384,6 @@ impl Default for SwarmTable {
     }
 }
 
-fn unscaled() -> f64 {
-    1.0
-}
-
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
 fn is_unscaled(scale: &f64) -> bool {
     *scale == 1.0
@@ -442,6 +438,21 @@ pub(super) struct HelixKeys {
     pub(super) turns: Option<f64>,
 }
 
+/// Size of a drawing: one of the keys, or none.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[expect(clippy::struct_field_names, reason = "each is in metres")]
+pub(super) struct DrawingSize {
+    /// Height of everything that is drawn in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) height_m: Option<f64>,
+    /// Width of everything that is drawn in m, in place of `height_m`.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) width_m: Option<f64>,
+    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub(super) spacing_m: Option<f64>,
+}
+
 /// Keys of `shape = "text"`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -449,15 +460,8 @@ pub(super) struct TextKeys {
     /// The text; a line break begins a new line below.
     #[schemars(length(min = 1, max = 1000))]
     pub(super) text: String,
-    /// Height of the whole text in m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) height_m: Option<f64>,
-    /// Width of the whole text in m, in place of `height_m`.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) width_m: Option<f64>,
-    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) spacing_m: Option<f64>,
+    #[serde(flatten)]
+    pub(super) size: DrawingSize,
 }
 
 /// Keys of `shape = "svg"`.
@@ -471,15 +475,8 @@ pub(super) struct SvgKeys {
     /// Whether slots fill the areas inside the lines, instead of standing on the lines.
     #[serde(default)]
     pub(super) filled: bool,
-    /// Height of the drawing in m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) height_m: Option<f64>,
-    /// Width of the drawing in m, in place of `height_m`.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) width_m: Option<f64>,
-    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) spacing_m: Option<f64>,
+    #[serde(flatten)]
+    pub(super) size: DrawingSize,
 }
 
 /// Keys of `shape = "image"`.
@@ -493,15 +490,8 @@ pub(super) struct ImageKeys {
     #[serde(default)]
     #[schemars(with = "Ink")]
     pub(super) ink: Option<Ink>,
-    /// Height of the drawn pixels in m.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) height_m: Option<f64>,
-    /// Width of the drawn pixels in m, in place of `height_m`.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) width_m: Option<f64>,
-    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub(super) spacing_m: Option<f64>,
+    #[serde(flatten)]
+    pub(super) size: DrawingSize,
 }
 
 /// Keys of `shape = "file"`.

@@ -72,6 +72,11 @@ impl ScenarioError {
         self
     }
 
+    /// Like [`ScenarioError::at`], for several keys in this order.
+    pub(crate) fn at_keys<const N: usize>(self, keys: [&'static str; N]) -> Self {
+        keys.into_iter().fold(self, Self::at)
+    }
+
     /// Like [`ScenarioError::at`], for an entry of a list.
     pub(crate) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
         self.fields.push(Field { key: key.into(), entry: Some(entry), leg: 0 });

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::document::{Assignment, FormationShape, FormationTable, LegTable};
-use super::document::{HelixKeys, ImageKeys, SvgKeys, TextKeys};
-use super::document::{LegStart, Point, rows};
+use super::document::{
+    Assignment, DrawingSize, FormationShape, FormationTable, HelixKeys, ImageKeys, LegStart, LegTable, Placement,
+    Point, SvgKeys, TextKeys, rows,
+};
 use super::error::ScenarioError;
 use super::files;
 use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, rounded_up};
@@ -20,39 +21,26 @@ use tautline_laws::target::{Begins, Leg};
 /// Slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
 
-/// How slots are placed.
-struct Placement {
-    scale: f64,
-    yaw_rad: f64,
-    offset_m: Vector3<f64>,
-}
-
 /// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
 pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
     let (count, delta_m) = (scenario.count(), scenario.delta_m);
-    let placement = Placement::of(first.scale, first.yaw_deg, first.move_m);
-    let leg = placement.place(Leg::first(formation(&first.shape, count, delta_m)?));
-    scenario.legs.push(leg);
-    let mut assignments = std::iter::once(first.assignment).chain(later.iter().map(|leg| leg.assignment));
-    let freedom = if assignments.any(|by| by != Assignment::Given) { freedom(scenario)? } else { None };
-    let is_interchangeable = interchangeable(scenario, 0, first.assignment)?;
-    scenario.legs[0].interchangeable = is_interchangeable;
-    let starts_m = scenario.start.positions_m.clone();
+    scenario.legs.push(first.placement.place(Leg::first(formation(&first.shape, count, delta_m)?)));
+    let mut placements = std::iter::once(&first.placement).chain(later.iter().map(|leg| &leg.placement));
+    let is_assigned = placements.any(|placement| placement.assignment != Assignment::Given);
+    let freedom = if is_assigned { freedom(scenario)? } else { None };
     let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-    let assign = |leg: &mut Leg, by: Assignment, from_m: &Rows| assign(leg, by, from_m, (freedom, leader));
-    assign(&mut scenario.legs[0], first.assignment, &starts_m);
-    for (number, table) in later.iter().enumerate() {
-        let placement = Placement::of(table.scale, table.yaw_deg, table.move_m);
+    scenario.legs[0].interchangeable = interchangeable(scenario, 0, first.placement.assignment)?;
+    assign(&mut scenario.legs[0], first.placement.assignment, &scenario.start.positions_m, (freedom, leader));
+    for (number, LegTable { start_s, placement, shape }) in later.iter().enumerate() {
         let before = scenario.legs[number].formation.clone();
-        let formation = table
-            .shape
+        let formation = shape
             .as_ref()
             .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
             .map_err(|error| error.on_leg(number + 1))?;
-        let begins = table.start_s.map_or(Begins::Reached, LegStart::begins);
-        let interchangeable = interchangeable(scenario, number + 1, table.assignment)?;
+        let begins = start_s.map_or(Begins::Reached, LegStart::begins);
+        let interchangeable = interchangeable(scenario, number + 1, placement.assignment)?;
         let mut leg = placement.place(Leg { formation, begins, interchangeable });
-        assign(&mut leg, table.assignment, &before.slots_m);
+        assign(&mut leg, placement.assignment, &before.slots_m, (freedom, leader));
         scenario.legs.push(leg);
     }
     anchor(scenario);
@@ -70,8 +58,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
         return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
             .coded("scenario/out-of-range")
             .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
-            .at("formation.assignment")
-            .at("swarm.count"));
+            .at_keys(["formation.assignment", "swarm.count"]));
     }
     Ok(Some(freedom))
 }
@@ -94,8 +81,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
         .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
         .at_leg(leg, "formation.assignment")
-        .at("law.kind")
-        .at("breathing.mode"))
+        .at_keys(["law.kind", "breathing.mode"]))
 }
 
 /// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.
@@ -112,17 +98,12 @@ fn assign(leg: &mut Leg, by: Assignment, from_m: &Rows, (freedom, leader): (Opti
 }
 
 impl Placement {
-    fn of(scale: f64, yaw_deg: f64, move_m: Option<Point>) -> Self {
-        let offset_m = move_m.map_or_else(Vector3::zeros, |point| point.coordinates().into());
-        Self { scale, yaw_rad: yaw_deg.to_radians(), offset_m }
-    }
-
     fn place(&self, leg: Leg) -> Leg {
-        let &Self { scale, yaw_rad, offset_m } = self;
-        if scale == 1.0 && yaw_rad == 0.0 && offset_m == Vector3::zeros() {
+        let (yaw_rad, offset_m) = (self.yaw_deg.to_radians(), self.move_m.map_or([0.0; 3], Point::coordinates).into());
+        if self.scale == 1.0 && yaw_rad == 0.0 && offset_m == Vector3::zeros() {
             return leg;
         }
-        leg.placed(scale, yaw_rad, offset_m)
+        leg.placed(self.scale, yaw_rad, offset_m)
     }
 }
 
@@ -231,8 +212,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
             return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
                 .coded("scenario/exclusive-keys")
                 .with_help("keep one of them")
-                .at("formation.turns")
-                .at("formation.spacing_m"));
+                .at_keys(["formation.turns", "formation.spacing_m"]));
         }
         let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
         return Ok(Formation::helix(count, radius_m, pitch_m, step_rad));
@@ -242,8 +222,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
             .coded("scenario/shape")
             .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
-            .at("formation.radius_m")
-            .at("formation.spacing_m"));
+            .at_keys(["formation.radius_m", "formation.spacing_m"]));
     };
     let keeps = |pitch_m: f64, step_rad: f64| {
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
@@ -262,8 +241,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         ))
         .coded("scenario/shape")
         .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
-        .at("formation.pitch_m")
-        .at("formation.spacing_m"));
+        .at_keys(["formation.pitch_m", "formation.spacing_m"]));
     }
     Ok(Formation::helix(count, radius_m, pitch_m, step_rad))
 }
@@ -292,38 +270,35 @@ const HEIGHT: Dimension = Dimension { key: "formation.height_m", name: "high", a
 const WIDTH: Dimension = Dimension { key: "formation.width_m", name: "wide", axis: 0 };
 const SPACING: &str = "formation.spacing_m";
 
-/// The size that is asked for, by one key at most.
-fn size(
-    height_m: Option<f64>,
-    width_m: Option<f64>,
-    spacing_m: Option<f64>,
-    delta_m: f64,
-) -> Result<Size, ScenarioError> {
-    match (height_m, width_m, spacing_m) {
-        (Some(height_m), None, None) => Ok(Size::Of(HEIGHT, height_m)),
-        (None, Some(width_m), None) => Ok(Size::Of(WIDTH, width_m)),
-        (None, None, Some(spacing_m)) => Ok(Size::Spacing(spacing_m)),
-        (None, None, None) => Ok(Size::Spacing(DEFAULT_SPACING * delta_m)),
-        _ => {
-            let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
-            let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
-                .coded("scenario/exclusive-keys")
-                .with_help("keep one of them: each decides how large the drawing is");
-            Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
+impl DrawingSize {
+    /// Returns the size, which at most one key gives.
+    fn size(self, delta_m: f64) -> Result<Size, ScenarioError> {
+        match (self.height_m, self.width_m, self.spacing_m) {
+            (Some(height_m), None, None) => Ok(Size::Of(HEIGHT, height_m)),
+            (None, Some(width_m), None) => Ok(Size::Of(WIDTH, width_m)),
+            (None, None, Some(spacing_m)) => Ok(Size::Spacing(spacing_m)),
+            (None, None, None) => Ok(Size::Spacing(DEFAULT_SPACING * delta_m)),
+            (height_m, width_m, spacing_m) => {
+                let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
+                let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
+                    .coded("scenario/exclusive-keys")
+                    .with_help("keep one of them: each decides how large the drawing is");
+                Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
+            }
         }
     }
 }
 
 /// The letters of a text.
 pub(super) fn text(keys: &TextKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let size = keys.size.size(delta_m)?;
     let drawing = Drawing::text(&keys.text).map_err(|error| refused(&error, TEXT, None))?;
     sized(&drawing, size, count, delta_m, TEXT)
 }
 
 /// SVG path data or an SVG file.
 pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let size = keys.size.size(delta_m)?;
     let (drawing, key) = match (&keys.path, &keys.file) {
         (Some(data), None) => (Drawing::path(data, keys.filled).map_err(|error| refused(&error, PATH, None))?, PATH),
         (None, Some(file)) => {
@@ -339,8 +314,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
             return Err(ScenarioError::new(said)
                 .coded(code)
                 .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
-                .at(PATH)
-                .at(files::KEY));
+                .at_keys([PATH, files::KEY]));
         }
     };
     sized(&drawing, size, count, delta_m, key)
@@ -348,7 +322,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
 
 /// A picture.
 pub(super) fn image(keys: &ImageKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
-    let size = size(keys.height_m, keys.width_m, keys.spacing_m, delta_m)?;
+    let size = keys.size.size(delta_m)?;
     let bytes = files::bytes(&keys.file, files::KEY)?;
     let drawing = Drawing::png(&bytes, keys.ink).map_err(|error| refused(&error, files::KEY, Some(&keys.file)))?;
     sized(&drawing, size, count, delta_m, files::KEY)
@@ -368,8 +342,7 @@ fn sized(
         return Err(ScenarioError::new(format!("slots {pair} of what is drawn are the same point"))
             .coded("scenario/within-delta")
             .with_help("draw longer lines or larger areas, or fly fewer vehicles")
-            .at(key)
-            .at("swarm.count"));
+            .at_keys([key, "swarm.count"]));
     }
     let scale = match size {
         Size::Spacing(spacing_m) => spacing_m / nearest,
@@ -413,9 +386,7 @@ impl Dimension {
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
         ))
-        .at(key)
-        .at("swarm.count")
-        .at("law.delta_m"))
+        .at_keys([key, "swarm.count", "law.delta_m"]))
     }
 }
 

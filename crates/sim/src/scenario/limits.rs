@@ -71,8 +71,7 @@ pub(super) fn check_lengths<const N: usize>(
         Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
             .coded("scenario/count-mismatch")
             .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
-            .at(key)
-            .at("swarm.count")),
+            .at_keys([key, "swarm.count"])),
         _ => Ok(()),
     }
 }
@@ -91,8 +90,7 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
     ))
     .coded("scenario/memory")
     .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
-    .at("swarm.count")
-    .at("graph.kind"))
+    .at_keys(["swarm.count", "graph.kind"]))
 }
 
 /// Number of pairs of `count` vehicles.

@@ -15,7 +15,6 @@ mod formation;
 mod graph;
 mod limits;
 mod obstacles;
-mod overrides;
 mod reference;
 mod resolution;
 mod resolved;
@@ -28,7 +27,6 @@ mod text;
 mod time;
 mod validate;
 mod vehicle;
-mod wind;
 
 pub use crate::link::{ActuationSpec, Failure, FailureKind, LinkFailure, Missing, NearBy, NetworkSpec, SensingSpec};
 pub use error::{Field, Place, ScenarioError};
@@ -37,13 +35,12 @@ pub use limits::{
     MAX_STEPS, SMALLEST,
 };
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
-pub use overrides::Override;
 pub use resolution::Drift;
 pub use schema::{schema, takes_integers_only};
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
-pub use start::random;
-pub use start::{offset, scatter};
+pub use start::{offset, random, scatter};
 pub use template::{Draw, NamedLaw, Template};
+pub use text::Override;
 pub use time::TimeSpec;
 pub use vehicle::{DEFAULT_ATTITUDE_HZ, QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};

@@ -145,8 +145,7 @@ impl ReferenceTable {
             (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
                 .coded("scenario/exclusive-keys")
                 .with_help("a leader knows the reference alone: keep one of them")
-                .at("reference.leader")
-                .at("reference.known_by")),
+                .at_keys(["reference.leader", "reference.known_by"])),
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
             (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
             (Some(Vehicles::Listed(listed)), None) => {
@@ -200,9 +199,7 @@ impl ReferenceKind {
                         return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
                             .coded("scenario/missing-key")
                             .with_help("give the time at each point, or the largest speed between them")
-                            .at("reference.times_s")
-                            .at("reference.speed_m_s")
-                            .at("reference.points_m"));
+                            .at_keys(["reference.times_s", "reference.speed_m_s", "reference.points_m"]));
                     }
                 };
                 ReferenceMotion::WayPoints { points: in_time(&points_m, &times_s)? }
@@ -251,8 +248,7 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
         return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
             .coded("scenario/count-mismatch")
             .with_help("give a time for each point")
-            .at("reference.times_s")
-            .at("reference.points_m"));
+            .at_keys(["reference.times_s", "reference.points_m"]));
     }
     for (k, &time_s) in times_s.iter().enumerate() {
         if k > 0 && time_s <= times_s[k - 1] {
@@ -281,8 +277,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
         ))
         .coded("scenario/outside-flight")
         .with_help("give points from time 0 to the end of the flight, or shorten time.duration_s")
-        .at("reference.times_s")
-        .at("time.duration_s"));
+        .at_keys(["reference.times_s", "time.duration_s"]));
     }
     Ok(())
 }

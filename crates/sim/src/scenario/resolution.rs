@@ -61,7 +61,7 @@ impl Scenario {
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
         let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
         let is_uncounted = !self.wind.is_still() && !law.capabilities().certifies_under_wind;
-        self.as_far_as_told(self.promised(law))
+        self.with_scenario_limits(self.promised(law))
             .void_where(ignored, Void::ObstaclesUnknown)
             .void_where(is_uncounted, Void::Windblown)
     }
@@ -88,7 +88,7 @@ impl Scenario {
     /// A promise as far as this scenario lets it hold: not with commands that are held, nor where numbers do not tell it from
     /// delta.
     #[must_use]
-    pub fn as_far_as_told(&self, promised: Certificate) -> Certificate {
+    pub fn with_scenario_limits(&self, promised: Certificate) -> Certificate {
         let of_time = self.time.control_hz.map(|_| Void::CommandsHeld);
         let of_body = (!self.airframe.is_point()).then_some(Void::NotAPoint);
         let of_links = self.imperfections().into_iter().flat_map(ImperfectionSpec::voids);

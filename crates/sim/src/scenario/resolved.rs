@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, FormationShape, FormationTable, Given, LawTable, LegTable, NoiseTable, PlantTable,
+    Assignment, Document, FormationShape, FormationTable, Given, LawTable, LegTable, NoiseTable, Placement, PlantTable,
     SafetyTable, StartTable, SwarmTable,
 };
 use super::document::{Edge, LegStart, PerVehicle, Point};
@@ -50,10 +50,7 @@ impl Scenario {
                 Begins::At(start_s) => Some(LegStart::At(start_s)),
                 Begins::Reached => None,
             },
-            assignment: assignment(leg),
-            scale: 1.0,
-            yaw_deg: 0.0,
-            move_m: None,
+            placement: placement(leg),
             shape: Some(FormationShape::Points { points_m: self.points(&leg.formation.slots_m) }),
         }
     }
@@ -92,10 +89,7 @@ impl From<&Scenario> for Document {
                 shape: None,
             },
             formation: FormationTable {
-                assignment: scenario.legs.first().map_or(Assignment::Given, assignment),
-                scale: 1.0,
-                yaw_deg: 0.0,
-                move_m: None,
+                placement: scenario.legs.first().map(placement).unwrap_or_default(),
                 shape: FormationShape::Points { points_m: scenario.points(&scenario.formation().slots_m) },
             },
             leg: scenario.legs.iter().skip(1).map(|leg| scenario.leg_table(leg)).collect(),
@@ -126,8 +120,9 @@ impl From<&Scenario> for Document {
 }
 
 /// Slots are in the order in which vehicles were assigned to them.
-fn assignment(leg: &Leg) -> Assignment {
-    if leg.interchangeable { Assignment::WhenStalled } else { Assignment::Given }
+fn placement(leg: &Leg) -> Placement {
+    let assignment = if leg.interchangeable { Assignment::WhenStalled } else { Assignment::Given };
+    Placement { assignment, ..Placement::default() }
 }
 
 /// One number if all are the same, otherwise the list.

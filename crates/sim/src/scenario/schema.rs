@@ -10,8 +10,8 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::document::Document;
-use super::overrides::Override;
 use super::source::Source;
+use super::text::Override;
 use super::text::Text;
 
 /// Tables with their default kind.

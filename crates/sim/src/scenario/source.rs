@@ -8,8 +8,8 @@ use super::document::Document;
 use super::error::suggest;
 use super::error::{Place, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
-use super::overrides::Override;
 use super::spec::Scenario;
+use super::text::Override;
 use super::text::Text;
 use super::{build, builtin, template};
 

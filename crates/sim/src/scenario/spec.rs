@@ -11,7 +11,7 @@ use crate::vehicle::Airframe;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{Blown, EdgeTensionKeys, Law, LawSpec, ParameterError, Setting};
+use tautline_laws::law::{EdgeTensionKeys, Law, LawContext, LawSpec, ParameterError, WindExposure};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::{Metric, Obstacle};
 use tautline_laws::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
@@ -190,20 +190,20 @@ impl Scenario {
     pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
         let guidance = self.reference.as_ref();
         let later = self.legs.get(1..).unwrap_or_default();
-        let setting = Setting::new(&self.graph, self.formation(), self.delta_m, self.velocity_coefficient_per_s());
-        let blown = (!self.wind.is_still()).then(|| Blown {
+        let context = LawContext::new(&self.graph, self.formation(), self.delta_m, self.velocity_coefficient_per_s());
+        let exposure = (!self.wind.is_still()).then(|| WindExposure {
             wind: &self.wind,
             drag_per_s: self.drag_per_s,
             until_s: self.time.duration_s,
             resolution_m: self.told_apart_m(),
         });
-        self.law.build(&Setting {
+        self.law.build(&LawContext {
             later,
             guidance,
             obstacles: &self.obstacles,
-            blown,
+            exposure,
             metric: self.metric(),
-            ..setting
+            ..context
         })
     }
 

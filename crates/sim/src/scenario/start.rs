@@ -38,8 +38,7 @@ pub(super) fn positions(
                 ))
                 .coded("scenario/within-delta")
                 .with_help("enlarge start.min_separation_m or reduce law.delta_m")
-                .at("start.min_separation_m")
-                .at("law.delta_m"));
+                .at_keys(["start.min_separation_m", "law.delta_m"]));
             }
             return scatter(count, space, half_extent_m, min_separation_m, random);
         }
@@ -91,9 +90,7 @@ pub fn scatter(
             ))
             .coded("scenario/no-room")
             .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
-            .at("start.half_extent_m")
-            .at("start.min_separation_m")
-            .at("swarm.count"));
+            .at_keys(["start.half_extent_m", "start.min_separation_m", "swarm.count"]));
         };
         set_row(&mut positions_m, i, position);
     }

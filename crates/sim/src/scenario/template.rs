@@ -11,9 +11,9 @@ use super::document::{Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::error::suggest;
 use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
-use super::overrides::Override;
 use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
+use super::text::Override;
 use super::text::Text;
 use tautline_laws::law::LawSpec;
 

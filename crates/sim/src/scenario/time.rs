@@ -147,7 +147,7 @@ impl TimeSpec {
     /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
     /// energy.
     #[must_use]
-    pub fn honest_rate_dt(&self) -> f64 {
+    pub fn stable_rate_dt(&self) -> f64 {
         self.max_rate_dt.min(Self::DEFAULT_MAX_RATE_DT)
     }
 
@@ -164,7 +164,7 @@ impl Scenario {
     pub fn links_step_s(&self, law: &dyn Law) -> Option<f64> {
         let rate_per_s =
             law.rates(&RateQuery::new(self.velocity_coefficient_per_s(), Some(f64::INFINITY))).fastest_per_s?;
-        (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.honest_rate_dt() / rate_per_s)
+        (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.stable_rate_dt() / rate_per_s)
     }
 
     /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
@@ -197,7 +197,7 @@ impl Scenario {
         let query = RateQuery::new(self.velocity_coefficient_per_s(), certified_m);
         let Some(rate_per_s) = law.rates(&query).fastest_per_s else { return };
         while self.time.max_halvings < MAX_HALVINGS
-            && self.time.shortest_step_s() * rate_per_s > self.time.honest_rate_dt()
+            && self.time.shortest_step_s() * rate_per_s > self.time.stable_rate_dt()
         {
             self.time.max_halvings += 1;
         }

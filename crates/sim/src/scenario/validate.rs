@@ -1,5 +1,7 @@
 //! What a scenario must be for it to be flown.
 
+use nalgebra::Vector3;
+
 use super::check::{Misfit, conform};
 use super::error::ScenarioError;
 use super::limits::{
@@ -13,6 +15,7 @@ use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
 use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg};
+use tautline_laws::wind::Gust;
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
@@ -87,8 +90,7 @@ impl Scenario {
             ))
             .coded("scenario/outside-flight")
             .with_help("enlarge time.duration_s or reduce arrival.hold_s")
-            .at("arrival.hold_s")
-            .at("time.duration_s"));
+            .at_keys(["arrival.hold_s", "time.duration_s"]));
         }
         Ok(())
     }
@@ -143,15 +145,13 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
-            .at("reference.kind")
-            .at("time.dt_s"));
+            .at_keys(["reference.kind", "time.dt_s"]));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
             return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
                 .coded("scenario/plane")
                 .with_help("set its z to 0, or swarm.dimensions to 3")
-                .at("reference.kind")
-                .at("swarm.dimensions"));
+                .at_keys(["reference.kind", "swarm.dimensions"]));
         }
         let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
         let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
@@ -345,8 +345,7 @@ impl Scenario {
             ))
             .coded("scenario/too-many-steps")
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
-            .at("time.duration_s")
-            .at("time.dt_s"));
+            .at_keys(["time.duration_s", "time.dt_s"]));
         }
         if self.a22_per_s.abs() * dt_s > 1.0 {
             return Err(ScenarioError::new(format!(
@@ -355,8 +354,7 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help("reduce time.dt_s or swarm.a22_per_s")
-            .at("swarm.a22_per_s")
-            .at("time.dt_s"));
+            .at_keys(["swarm.a22_per_s", "time.dt_s"]));
         }
         if let Some(control_hz) = control_hz
             && control_hz * dt_s > 1.0 + 1e-6
@@ -366,8 +364,7 @@ impl Scenario {
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
-            .at("time.control_hz")
-            .at("time.dt_s"));
+            .at_keys(["time.control_hz", "time.dt_s"]));
         }
         Ok(())
     }
@@ -416,8 +413,7 @@ impl Scenario {
             ))
             .coded("scenario/outside-flight")
             .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
-            .at("breathing.hold_s")
-            .at("time.duration_s"));
+            .at_keys(["breathing.hold_s", "time.duration_s"]));
         }
         if self.breathing.mode == BreathingMode::Start
             && let Ok(law) = self.law()
@@ -426,8 +422,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
                 .coded("scenario/unsupported-by-law")
                 .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
-                .at("breathing.mode")
-                .at("law.kind"));
+                .at_keys(["breathing.mode", "law.kind"]));
         }
         Ok(())
     }
@@ -452,8 +447,7 @@ impl Scenario {
                 "a safety distance of {delta_m} m, and ellipsoids that touch side by side at {width_m} m"
             ))
             .with_help("leave law.delta_m out: it is twice the level half axes")
-            .at("law.delta_m")
-            .at(key));
+            .at_keys(["law.delta_m", key]));
         }
         let Ok(law) = self.law() else { return Ok(()) };
         if law.capabilities().uses_ellipsoid_metric {
@@ -462,7 +456,96 @@ impl Scenario {
         Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))
             .coded("scenario/unsupported-by-law")
             .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
-            .at("safety.shape")
-            .at("law.kind"))
+            .at_keys(["safety.shape", "law.kind"]))
+    }
+}
+
+/// Steps that a slope of a gust takes at least: it is followed from step to step.
+const STEPS_A_SLOPE: f64 = 10.0;
+
+impl Scenario {
+    /// A wind that the vehicles feel.
+    pub(super) fn check_wind(&self) -> Result<(), ScenarioError> {
+        let drag_per_s = self.drag_per_s;
+        if drag_per_s * self.time.dt_s > 1.0 {
+            return Err(ScenarioError::new(format!(
+                "one step of {} s is longer than the time 1/drag = {} s in which the air brakes a vehicle",
+                self.time.dt_s,
+                1.0 / drag_per_s
+            ))
+            .coded("scenario/step-too-long")
+            .with_help("reduce time.dt_s or vehicle.drag_per_s")
+            .at_keys(["vehicle.drag_per_s", "time.dt_s"]));
+        }
+        if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
+            return Err(ScenarioError::new(format!("a drag of {drag_per_s} 1/s on vehicles that are no points"))
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("leave it out: the drag of a quadrotor is that of its rotors and its body, in its model")
+                .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
+        }
+        if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
+            return Err(ScenarioError::new(
+                "a wind blows and the vehicles are points without drag, which do not feel it",
+            )
+            .coded("scenario/unsupported-by-vehicle")
+            .with_help(
+                "set vehicle.drag_per_s to what a vehicle loses of its velocity through still air, for example 0.3",
+            )
+            .at_keys(["wind", "vehicle.drag_per_s"]));
+        }
+        self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
+        self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
+    }
+
+    /// A velocity of the air \[m/s\], level where the swarm lives in the plane.
+    fn check_air(&self, key: &'static str, what: &str, air_m_s: Vector3<f64>) -> Result<(), ScenarioError> {
+        if self.space == Space::Plane && air_m_s.z != 0.0 {
+            return Err(ScenarioError::new(format!(
+                "{what} blows at {} m/s along z, out of the plane z = 0",
+                air_m_s.z
+            ))
+            .coded("scenario/plane")
+            .with_help("set its z to 0, or swarm.dimensions to 3")
+            .at_keys([key, "swarm.dimensions"]));
+        }
+        Ok(())
+    }
+
+    fn check_gust(&self, gust: &Gust) -> Result<(), ScenarioError> {
+        let Gust { at_s, rise_s, velocity_m_s, ref vehicles, .. } = *gust;
+        self.check_air("wind.gust", "a gust", velocity_m_s)?;
+        let shortest_s = STEPS_A_SLOPE * self.time.dt_s;
+        for (what, slope_s) in [("the rise of a gust", rise_s), ("the fall of a gust", gust.fall_s())] {
+            if slope_s < shortest_s {
+                return Err(ScenarioError::new(format!(
+                    "{what} takes {slope_s} s, too short to be followed in steps of {} s",
+                    self.time.dt_s
+                ))
+                .coded("scenario/step-too-long")
+                .with_help(format!("give it at least {shortest_s} s, or reduce time.dt_s"))
+                .at_keys(["wind.gust", "time.dt_s"]));
+            }
+        }
+        if at_s >= self.time.duration_s {
+            return Err(ScenarioError::new(format!(
+                "a gust begins at {at_s} s, after the flight of {} s",
+                self.time.duration_s
+            ))
+            .coded("scenario/outside-flight")
+            .with_help("let it begin earlier, or enlarge time.duration_s")
+            .at_keys(["wind.gust", "time.duration_s"]));
+        }
+        match vehicles.as_deref() {
+            Some([]) => Err(ScenarioError::new("a gust meets no vehicle")
+                .with_help("leave out `vehicles`: it then meets all")
+                .at("wind.gust")),
+            Some(met) if !met.is_sorted() || met.last().is_some_and(|&last| last >= self.count()) => {
+                Err(ScenarioError::new("a gust meets a vehicle that the swarm does not have")
+                    .coded("scenario/unknown-vehicle")
+                    .with_help(format!("vehicles are counted from 1 to {}", self.count()))
+                    .at("wind.gust"))
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -158,7 +158,7 @@ impl VehicleTable {
         })))
     }
 
-    /// Refuses what only quadrotors have.
+    /// Refuses the keys of quadrotors.
     fn without_rotors(&self, what: &str) -> Result<(), ScenarioError> {
         let given = [
             ("vehicle.attitude_hz", self.attitude_hz.is_some()),
@@ -167,17 +167,10 @@ impl VehicleTable {
             ("vehicle.ground_effect", self.ground_effect.is_some()),
             ("vehicle.downwash", self.downwash.is_some()),
         ];
-        match given.into_iter().find(|(_, given)| *given) {
-            Some((key, _)) => Err(ScenarioError::new(format!("{what} has neither attitude nor rotors"))
-                .coded("scenario/unsupported-by-vehicle")
-                .with_help("leave this key out, or set vehicle.model to a quadrotor such as \"crazyflie\"")
-                .at(key)
-                .at(MODEL)),
-            None => Ok(()),
-        }
+        refuse_given(given, &format!("{what} has neither attitude nor rotors"), "a quadrotor such as \"crazyflie\"")
     }
 
-    /// Refuses what only unicycles have.
+    /// Refuses the keys of unicycles.
     fn without_limits(&self, what: &str) -> Result<(), ScenarioError> {
         let given = [
             ("vehicle.min_speed_m_s", self.min_speed_m_s.is_some()),
@@ -185,15 +178,21 @@ impl VehicleTable {
             ("vehicle.max_turn_rad_s", self.max_turn_rad_s.is_some()),
             ("vehicle.max_accel_m_s2", self.max_accel_m_s2.is_some()),
         ];
-        match given.into_iter().find(|(_, given)| *given) {
-            Some((key, _)) => Err(ScenarioError::new(format!("{what} has no such limit"))
-                .coded("scenario/unsupported-by-vehicle")
-                .with_help("leave this key out, or set vehicle.model to \"unicycle\"")
-                .at(key)
-                .at(MODEL)),
-            None => Ok(()),
-        }
+        refuse_given(given, &format!("{what} has no such limit"), "\"unicycle\"")
     }
+}
+
+/// Refuses the first key that is given although the model has no use for it.
+fn refuse_given<const N: usize>(
+    keys: [(&'static str, bool); N],
+    said: &str,
+    other_model: &str,
+) -> Result<(), ScenarioError> {
+    let Some((key, _)) = keys.into_iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
+    Err(ScenarioError::new(said)
+        .coded("scenario/unsupported-by-vehicle")
+        .with_help(format!("leave this key out, or set vehicle.model to {other_model}"))
+        .at_keys([key, MODEL]))
 }
 
 /// What was read stands there: a built-in model by its name, another one with its keys.
@@ -313,8 +312,7 @@ impl Scenario {
                 1.0 / self.time.dt_s,
                 1.0 / attitude_hz
             ))
-            .at("vehicle.attitude_hz")
-            .at("time.dt_s"));
+            .at_keys(["vehicle.attitude_hz", "time.dt_s"]));
         }
         model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at("vehicle.attitude_hz"))
     }
@@ -333,37 +331,32 @@ impl Scenario {
                 "the least speed of {min_speed_m_s} m/s is more than the largest of {max_speed_m_s} m/s"
             ))
             .with_help("reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s")
-            .at("vehicle.min_speed_m_s")
-            .at("vehicle.max_speed_m_s"));
+            .at_keys(["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"]));
         }
         if self.space != Space::Plane {
             return Err(ScenarioError::new("unicycles move in the plane z = 0, and this swarm lives in space")
                 .coded("scenario/plane")
                 .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
-                .at("vehicle.model")
-                .at("swarm.dimensions"));
+                .at_keys(["vehicle.model", "swarm.dimensions"]));
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
             return Err(ScenarioError::new("the ideal plant flies points and quadrotors, no unicycles")
                 .coded("scenario/unsupported-by-plant")
                 .with_help("leave out plant.kind: the way of a unicycle is solved in closed form")
-                .at("plant.kind")
-                .at("vehicle.model"));
+                .at_keys(["plant.kind", "vehicle.model"]));
         }
         if self.a22_per_s != 0.0 {
             return Err(ScenarioError::new("a unicycle has no velocity coefficient a22")
                 .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave out swarm.a22_per_s")
-                .at("swarm.a22_per_s")
-                .at("vehicle.model"));
+                .at_keys(["swarm.a22_per_s", "vehicle.model"]));
         }
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
             return Err(ScenarioError::new("a unicycle does not feel the air")
                 .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
-                .at(key)
-                .at("vehicle.model"));
+                .at_keys([key, "vehicle.model"]));
         }
         for i in 0..self.count() {
             let speed_m_s = Heading::of(row(&self.start.velocities_m_s, i)).speed_m_s;
@@ -375,8 +368,7 @@ impl Scenario {
                 )).coded("scenario/out-of-range")
                 .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
                 .at_entry("start.velocities_m_s", i)
-                .at("vehicle.min_speed_m_s")
-                .at("vehicle.model"));
+                .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));
             }
         }
         Ok(())

@@ -1,8 +1,8 @@
 //! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
 
 use super::ending::SimError;
-use crate::feedback::Feedback;
 use crate::link::Imperfections;
+use crate::plant::Feedback;
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;

@@ -5,19 +5,18 @@
 //! is one of continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
 //! shortened too. A step allocates nothing.
 
-mod accuracy;
 mod controller;
 mod ending;
 mod judge;
+mod monitors;
 mod simulation;
-mod watch;
-
-use std::ops::ControlFlow;
-use std::time::Instant;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use judge::{judged, judged_shape};
 pub use simulation::{Parts, Saved, Simulation};
+
+use std::ops::ControlFlow;
+use std::time::Instant;
 
 use crate::scenario::Scenario;
 use tautline_core::record::{Event, RecordError, Sink, Step};

@@ -2,11 +2,11 @@
 
 mod step;
 
-use super::accuracy::{IntegrationError, Resolution};
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
 use super::judge::{Judge, Judged};
-use super::watch::Watch;
+use super::monitors::EnergyMonitor;
+use super::monitors::{IntegrationError, Resolution};
 use crate::link::{self, Imperfections};
 use crate::plant::{self, Path, Plant};
 use crate::scenario::Scenario;
@@ -61,7 +61,7 @@ pub struct Simulation {
     error: Option<IntegrationError>,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
-    watch: Watch,
+    energy_monitor: EnergyMonitor,
     /// Since the last sample.
     peaks: Peaks,
     channels: Channels,
@@ -122,7 +122,7 @@ impl Simulation {
             overlong_steps: 0,
             error: None,
             energy: None,
-            watch: Watch::default(),
+            energy_monitor: EnergyMonitor::default(),
             peaks: Peaks::default(),
             channels,
             sample_is_due: false,
@@ -317,9 +317,9 @@ impl Simulation {
             clearance,
             engine_contacts,
             bounces,
-            energy_rise: self.watch.worst(),
-            breaths: self.watch.breaths,
-            assignments: self.watch.assignments,
+            energy_rise: self.energy_monitor.worst(),
+            breaths: self.energy_monitor.breaths,
+            assignments: self.energy_monitor.assignments,
             traffic: self.controller.link.traffic(),
             last: self.state,
             performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },

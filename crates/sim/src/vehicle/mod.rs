@@ -8,22 +8,16 @@
 //! World: z up. Body: x ahead, y to the left, z along the thrust. An attitude turns body into world. Rotors are counted in
 //! the order of the model.
 
-mod attitude;
 mod dynamics;
 mod fleet;
 mod model;
 mod rotors;
 mod unicycle;
 
-pub use attitude::{Attitude, LEAST_LIFT, THRUST_RESERVE};
-pub use dynamics::{Drift, Dynamics, Ground, State, Wrench};
+pub use dynamics::{Attitude, Drift, Dynamics, Ground, LEAST_LIFT, State, THRUST_RESERVE, Wrench};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
-pub use model::ModelError;
-pub use model::{GRAVITY_M_S2, Model, Quadrotor, Turn};
-pub use model::{MODELS, Misread, read};
-pub use rotors::Mixer;
-pub use rotors::{AIR_DENSITY_KG_M3, Downwash};
-pub use rotors::{RotorCurve, RotorLag};
+pub use model::{GRAVITY_M_S2, MODELS, Misread, Model, ModelError, Quadrotor, Turn, read};
+pub use rotors::{AIR_DENSITY_KG_M3, Downwash, Mixer, RotorCurve, RotorLag};
 pub use unicycle::{Heading, Steering, Unicycle};
 
 /// What kind of body a vehicle is.

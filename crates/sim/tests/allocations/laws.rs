@@ -5,7 +5,8 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{
-    DisplacementKeys, DisplacementLaw, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, LawSpec, Setting,
+    DisplacementKeys, DisplacementLaw, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law, LawContext,
+    LawSpec,
 };
 use tautline_laws::observation::Observation;
 use tautline_laws::space::NearPairs;
@@ -13,16 +14,15 @@ use tautline_laws::space::NearPairs;
 use crate::ALLOCATOR;
 
 pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
-    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 0.1, a22_per_s: 0.1 };
     for count in [5, 40, 300] {
         let formation = Formation::sphere(count, 10.0);
         let swarm = Swarm::at_rest(Formation::sphere(count, 12.0).slots_m);
         let mut control = Rows::zeros(count);
         for graph in [Graph::complete(count), Graph::ring(count)] {
-            let mut edge_tension = EdgeTensionLaw::new(&graph, &formation, parameters).expect("slots clear of delta");
-            let mut laplacian = LaplacianLaw::new(&graph, &formation, 1.0, 1.1).expect("finite gains");
-            let setting = Setting::new(&graph, &formation, 0.1, 0.1);
-            let mut displacement = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+            let context = LawContext::new(&graph, &formation, 0.1, 0.1);
+            let mut edge_tension = EdgeTensionLaw::new(&context, EdgeTensionKeys::default()).expect("a law");
+            let mut laplacian = LaplacianLaw::new(&context, LaplacianKeys::default()).expect("a law");
+            let mut displacement = DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law");
             let laws: [&mut dyn Law; 3] = [&mut edge_tension, &mut laplacian, &mut displacement];
             let at = Observation::exact(&swarm, &graph, &formation);
             let region = Region::new(ALLOCATOR);
@@ -49,8 +49,8 @@ pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
     let crowd = Swarm::at_rest(Formation::sphere(30, 3.0).slots_m);
     let mut control = Rows::zeros(30);
     for spec in LawSpec::all() {
-        let setting = Setting::new(&links, &formation, 0.8, 0.1);
-        let mut law = spec.complete(0.1).build(&setting).expect("a law");
+        let context = LawContext::new(&links, &formation, 0.8, 0.1);
+        let mut law = spec.complete(0.1).build(&context).expect("a law");
         let mut near = NearPairs::default();
         near.update(&crowd.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
         let at = Observation { near: near.pairs(), ..Observation::exact(&crowd, &links, &formation) };

@@ -7,7 +7,7 @@ use tautline_audit::{Auditor, Status};
 use tautline_core::swarm::{Pair, Rows, Swarm, row, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{EdgeTensionLaw, EdgeTensionParameters, Law, LawError};
+use tautline_laws::law::{EdgeTensionKeys, EdgeTensionLaw, Law, LawContext, LawError};
 use tautline_laws::observation::Observation;
 use tautline_sim::continuous::{self, IdealError, Solution, Tolerances};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
@@ -162,8 +162,9 @@ fn the_closest_approach_is_found_between_the_times_asked_for() {
 /// Two vehicles of the edge tension, 3 m apart with delta = 2 m, thrown at each other.
 fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
     let formation = Formation::line(2, 3.0);
-    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 2.0, a22_per_s: 0.0 };
-    let law = EdgeTensionLaw::new(&Graph::complete(2), &formation, parameters).expect("a law");
+    let graph = Graph::complete(2);
+    let context = LawContext::new(&graph, &formation, 2.0, 0.0);
+    let law = EdgeTensionLaw::new(&context, EdgeTensionKeys::default()).expect("a law");
     let mut start = Swarm::at_rest(formation.slots_m);
     set_row(&mut start.velocities_m_s, 1, Vector3::new(-closing_m_s, 0.0, 0.0));
     (law, start)

@@ -9,7 +9,9 @@ use proptest::test_runner::TestCaseResult;
 use tautline_core::swarm::{Rows, Swarm, row, separation, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{EdgeTension, EdgeTensionLaw, EdgeTensionParameters, LaplacianLaw, Law, LawError};
+use tautline_laws::law::{
+    EdgeTension, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law, LawContext, LawError,
+};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::closest_pair;
 
@@ -39,12 +41,13 @@ struct Case {
 
 impl Case {
     fn edge_tension(&self, graph: &Graph) -> Result<EdgeTensionLaw, TestCaseError> {
-        let parameters = EdgeTensionParameters { alpha: ALPHA, delta_m: DELTA_M, a22_per_s: self.a22_per_s };
-        EdgeTensionLaw::new(graph, &self.formation, parameters).map_err(fail)
+        let context = LawContext::new(graph, &self.formation, DELTA_M, self.a22_per_s);
+        EdgeTensionLaw::new(&context, EdgeTensionKeys { alpha: ALPHA }).map_err(fail)
     }
 
     fn laplacian(&self, graph: &Graph) -> Result<LaplacianLaw, TestCaseError> {
-        LaplacianLaw::new(graph, &self.formation, F1_PER_S2, 1.0 + self.a22_per_s).map_err(fail)
+        let context = LawContext::new(graph, &self.formation, DELTA_M, self.a22_per_s);
+        LaplacianLaw::new(&context, LaplacianKeys { f1_per_s2: F1_PER_S2, f2_per_s: None }).map_err(fail)
     }
 
     /// Size of the terms in a control: the largest pull of an edge, the extent and the largest velocity.

@@ -11,8 +11,8 @@ const A22_PER_S: f64 = -0.2;
 
 fn law(formation: &Formation) -> CbfQpLaw {
     let links = Graph::complete(formation.count());
-    let setting = Setting::new(&links, formation, DELTA_M, A22_PER_S);
-    CbfQpLaw::new(&setting, CbfQpKeys::default()).expect("finite keys")
+    let context = LawContext::new(&links, formation, DELTA_M, A22_PER_S);
+    CbfQpLaw::new(&context, CbfQpKeys::default()).expect("finite keys")
 }
 
 fn command(law: &mut CbfQpLaw, swarm: &Swarm, formation: &Formation) -> Result<Rows, LawError> {

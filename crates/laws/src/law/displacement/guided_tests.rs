@@ -26,8 +26,9 @@ fn guidance(known_by: &Pinning) -> Guidance {
 }
 
 fn law(links: &Graph, formation: &Formation, later: &[Leg], guidance: &Guidance) -> DisplacementLaw {
-    let setting = Setting { later, guidance: Some(guidance), ..Setting::new(links, formation, DELTA_M, A22_PER_S) };
-    DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law")
+    let context =
+        LawContext { later, guidance: Some(guidance), ..LawContext::new(links, formation, DELTA_M, A22_PER_S) };
+    DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law")
 }
 
 fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Rows {
@@ -98,8 +99,8 @@ fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
     }
     // One alone, which hears nobody.
     let (formation, links) = (Formation::grid(1, 2.0), Graph::complete(1));
-    let setting = Setting::new(&links, &formation, DELTA_M, A22_PER_S);
-    let mut law = DisplacementLaw::new(&setting, DisplacementKeys::default()).expect("a law");
+    let context = LawContext::new(&links, &formation, DELTA_M, A22_PER_S);
+    let mut law = DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law");
     let mut lost = Swarm::at_rest(formation.slots_m.clone());
     lost.positions_m[(0, 2)] = f64::INFINITY;
     let clear = Swarm::at_rest(formation.slots_m.clone());
@@ -211,10 +212,10 @@ fn what_a_leg_to_come_asks_for_holds_from_the_start() {
     law.follow(&target.view()).expect("slots");
     assert_eq!(law.tension.rest_m(), 2.0, "no leg widens it again");
     let apart = [Leg::first(Formation::grid(COUNT, 0.9))];
-    let setting = Setting { later: &apart, ..Setting::new(&links, &apart[0].formation, 0.5, 0.0) };
-    assert!(DisplacementLaw::new(&setting, DisplacementKeys::default()).is_ok());
-    let setting = Setting { later: &apart, ..Setting::new(&links, &later[0].formation, DELTA_M, 0.0) };
-    assert!(matches!(DisplacementLaw::new(&setting, DisplacementKeys::default()), Err(ParameterError::Tension { .. })));
+    let context = LawContext { later: &apart, ..LawContext::new(&links, &apart[0].formation, 0.5, 0.0) };
+    assert!(DisplacementLaw::new(&context, DisplacementKeys::default()).is_ok());
+    let context = LawContext { later: &apart, ..LawContext::new(&links, &later[0].formation, DELTA_M, 0.0) };
+    assert!(matches!(DisplacementLaw::new(&context, DisplacementKeys::default()), Err(ParameterError::Tension { .. })));
 }
 
 #[test]
@@ -230,7 +231,7 @@ fn a_reference_that_nobody_is_told_of_certifies_nothing_unless_it_rests() {
         assert_eq!(certificate.void.contains(&Void::ReferenceNotFed), !holds);
     }
     let nobody = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
-    let setting = Setting { guidance: Some(&nobody), ..Setting::new(&links, &formation, DELTA_M, 0.0) };
-    let refused = DisplacementLaw::new(&setting, DisplacementKeys::default());
+    let context = LawContext { guidance: Some(&nobody), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
+    let refused = DisplacementLaw::new(&context, DisplacementKeys::default());
     assert!(matches!(refused, Err(ParameterError::NobodyKnowsTheReference)));
 }

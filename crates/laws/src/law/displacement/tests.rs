@@ -13,8 +13,8 @@ fn keys() -> DisplacementKeys {
 }
 
 fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
-    let setting = Setting::new(links, formation, DELTA_M, A22_PER_S);
-    DisplacementLaw::new(&setting, keys()).expect("a law")
+    let context = LawContext::new(links, formation, DELTA_M, A22_PER_S);
+    DisplacementLaw::new(&context, keys()).expect("a law")
 }
 
 fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
@@ -101,8 +101,8 @@ fn who_is_not_finite_is_named_wherever_the_number_stands() {
     let formation = Formation::grid(7, 2.0);
     for links in graphs() {
         for a22_per_s in [A22_PER_S, -ZETA_PER_S] {
-            let setting = Setting::new(&links, &formation, DELTA_M, a22_per_s);
-            let mut law = DisplacementLaw::new(&setting, keys()).expect("a law");
+            let context = LawContext::new(&links, &formation, DELTA_M, a22_per_s);
+            let mut law = DisplacementLaw::new(&context, keys()).expect("a law");
             for (vehicle, axis) in (0..7).flat_map(|vehicle| (0..3).map(move |axis| (vehicle, axis))) {
                 for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                     let mut lost = Swarm::at_rest(formation.slots_m.clone());
@@ -212,13 +212,13 @@ fn what_has_no_law_is_refused() {
 
     let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
     let line = Formation::line(4, 2.0);
-    let setting = Setting::new(&apart, &line, DELTA_M, 0.0);
-    let refused = DisplacementLaw::new(&setting, keys()).expect_err("not connected");
+    let context = LawContext::new(&apart, &line, DELTA_M, 0.0);
+    let refused = DisplacementLaw::new(&context, keys()).expect_err("not connected");
     assert_eq!(refused.to_string(), "the graph is not connected: no path joins vehicle 3 to vehicle 1");
     let tight = Formation::line(4, DELTA_M);
     let links = Graph::ring(4);
-    let setting = Setting::new(&links, &tight, DELTA_M, 0.0);
-    assert!(matches!(DisplacementLaw::new(&setting, keys()), Err(ParameterError::Tension { .. })));
+    let context = LawContext::new(&links, &tight, DELTA_M, 0.0);
+    assert!(matches!(DisplacementLaw::new(&context, keys()), Err(ParameterError::Tension { .. })));
 }
 
 #[test]
@@ -253,8 +253,8 @@ fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feed
     let (links, formation) =
         (Graph::complete(2), Formation::points(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0])));
     let metric = Metric::of_ratio(3.0);
-    let setting = Setting { metric, ..Setting::new(&links, &formation, DELTA_M, 0.0) };
-    let law = DisplacementLaw::new(&setting, keys()).expect("a law");
+    let context = LawContext { metric, ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
+    let law = DisplacementLaw::new(&context, keys()).expect("a law");
     let right =
         |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or_else(Vector3::zeros, |(pushed, _)| pushed);
     // S once: -V' S dp/l.

@@ -32,8 +32,8 @@ fn exact(swarm: &Swarm) -> Observation<'_> {
 }
 
 fn law(graph: &Graph, formation: &Formation, delta_m: f64) -> EdgeTensionLaw {
-    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m, a22_per_s: A22_PER_S };
-    EdgeTensionLaw::new(graph, formation, parameters).expect("slots farther apart than delta")
+    let context = LawContext::new(graph, formation, delta_m, A22_PER_S);
+    EdgeTensionLaw::new(&context, EdgeTensionKeys::default()).expect("slots farther apart than delta")
 }
 
 fn pentagon_law() -> EdgeTensionLaw {
@@ -180,25 +180,21 @@ fn states_beyond_double_precision_are_refused() {
 
 #[test]
 fn parameters_without_a_law_are_refused() {
-    let parameters = EdgeTensionParameters { alpha: 1.0, delta_m: 2.0, a22_per_s: 0.0 };
-    let refusal =
-        |graph: &Graph, formation: &Formation, parameters| EdgeTensionLaw::new(graph, formation, parameters).err();
+    let refusal = |graph: &Graph, formation: &Formation, a22_per_s| {
+        EdgeTensionLaw::new(&LawContext::new(graph, formation, 2.0, a22_per_s), EdgeTensionKeys::default()).err()
+    };
     let (complete, line) = (Graph::complete(4), Formation::line(4, 1.5));
     let rest = TensionError::Rest { rest_m: 1.5, delta_m: 2.0 };
-    assert_eq!(
-        refusal(&complete, &line, parameters),
-        Some(ParameterError::Tension { pair: Pair::new(0, 1), source: rest })
-    );
+    assert_eq!(refusal(&complete, &line, 0.0), Some(ParameterError::Tension { pair: Pair::new(0, 1), source: rest }));
     let apart = Graph::from_edges(4, &[(0, 2), (1, 3)]).expect("a simple graph");
-    assert_eq!(refusal(&apart, &line, parameters), None);
+    assert_eq!(refusal(&apart, &line, 0.0), None);
+    assert_eq!(refusal(&Graph::complete(5), &line, 0.0), Some(ParameterError::Counts { graph: 5, formation: 4 }));
     assert_eq!(
-        refusal(&Graph::complete(5), &line, parameters),
-        Some(ParameterError::Counts { graph: 5, formation: 4 })
+        refusal(&apart, &line, f64::INFINITY),
+        Some(ParameterError::NotFinite { name: "a22", value: f64::INFINITY })
     );
-    let unsteady = EdgeTensionParameters { a22_per_s: f64::INFINITY, ..parameters };
-    assert_eq!(refusal(&apart, &line, unsteady), Some(ParameterError::NotFinite { name: "a22", value: f64::INFINITY }));
     let lost = Formation::points(Rows::from_element(4, f64::NAN));
-    assert_eq!(refusal(&apart, &lost, parameters), Some(ParameterError::Slot { vehicle: 0 }));
+    assert_eq!(refusal(&apart, &lost, 0.0), Some(ParameterError::Slot { vehicle: 0 }));
 }
 
 #[test]
@@ -210,15 +206,7 @@ fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
         let mut control = Rows::from_element(count, 1.0);
         law.command(&exact(&swarm), &mut control)?;
         assert_eq!((control.amax(), law.energy(&exact(&swarm))), (0.0, Some(0.0)));
-        let expected = Certificate {
-            certified_m: None,
-            certified_until_s: None,
-            certified_room_m: None,
-            energy_initial: Some(0.0),
-            linked_m: None,
-            void: vec![],
-            legs: vec![],
-        };
+        let expected = Certificate { energy_initial: Some(0.0), ..Certificate::default() };
         assert_eq!(law.certificate(&exact(&swarm), &[]), expected);
     }
     Ok(())

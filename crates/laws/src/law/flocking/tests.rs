@@ -9,8 +9,8 @@ const SPACING_M: f64 = 7.0;
 
 fn law(count: usize, keys: FlockingKeys) -> FlockingLaw {
     let (links, formation) = (Graph::complete(count), Formation::line(count, SPACING_M));
-    let setting = Setting::new(&links, &formation, 2.0, 0.1);
-    FlockingLaw::new(&setting, keys).expect("finite keys")
+    let context = LawContext::new(&links, &formation, 2.0, 0.1);
+    FlockingLaw::new(&context, keys).expect("finite keys")
 }
 
 fn command(law: &mut FlockingLaw, swarm: &Swarm) -> Result<Rows, LawError> {

@@ -156,3 +156,40 @@ fn one_pair_out_of_domain_is_noticed_in_every_band() {
         assert_eq!(kernel.potential(&touching), Err(OutOfDomain));
     }
 }
+
+const BANDS: usize = 16;
+
+#[test]
+fn every_row_is_in_one_band_and_bands_have_about_as_many_edges() {
+    for count in [0, 1, 2, 17, 640, 1000, 12_345] {
+        let mut bands = Bands::new(count, BANDS, 3, -1.0);
+        let rows: Vec<_> = bands.bands.iter().flat_map(|band| band.rows.clone()).collect();
+        assert_eq!(rows, (0..count).collect::<Vec<_>>());
+        let edges = |rows: &Range<usize>| rows.clone().map(|i| count - 1 - i).sum::<usize>();
+        let even = count * count / 2 / BANDS;
+        for band in bands.bands.iter().filter(|_| count >= 640) {
+            assert!(edges(&band.rows).abs_diff(even) <= 2 * count, "{count}: {:?}", band.rows);
+        }
+        let mut sums = [vec![1.0; count], vec![2.0; count], vec![3.0; count]];
+        let heights: Vec<_> = (0..count).map(|i| i as f64).collect();
+        let axes = [&[], &[], heights.as_slice()];
+        let potential = bands.add_to(axes, sums.each_mut().map(Vec::as_mut_slice), |rows, axes, sums| {
+            assert_eq!(axes[2][count..], [-1.0; 3]);
+            rows.clone().for_each(|i| sums[1][i - rows.start] += axes[2][i]);
+            Ok(rows.len() as f64)
+        });
+        assert_eq!(potential, Ok(count as f64));
+        assert_eq!(sums[1], (0..count).map(|i| 2.0 + i as f64).collect::<Vec<_>>());
+        assert_eq!((sums[0].clone(), sums[2].clone()), (vec![1.0; count], vec![3.0; count]));
+    }
+}
+
+#[test]
+fn one_band_without_a_potential_leaves_all_without() {
+    let mut sums = [(); 3].map(|()| vec![0.0; 100]);
+    let sums = sums.each_mut().map(Vec::as_mut_slice);
+    let evaluate = |rows: Range<usize>, _: [&[f64]; 3], _: [&mut [f64]; 3]| {
+        if rows.contains(&40) { Err(OutOfDomain) } else { Ok(1.0) }
+    };
+    assert_eq!(Bands::new(100, BANDS, 0, 0.0).add_to([&[]; 3], sums, evaluate), Err(OutOfDomain));
+}

@@ -14,6 +14,11 @@ fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
     Observation::exact(swarm, &NOBODY, formation)
 }
 
+fn laplacian(graph: &Graph, formation: &Formation, f1: f64, f2: f64) -> Result<LaplacianLaw, ParameterError> {
+    let keys = LaplacianKeys { f1_per_s2: f1, f2_per_s: Some(f2) };
+    LaplacianLaw::new(&LawContext::new(graph, formation, 1.0, 0.1), keys)
+}
+
 fn swarm(count: usize) -> Swarm {
     let wave = |phase: f64| Rows::from_fn(count, |i, axis| (1.7 * i as f64 + 0.6 * axis as f64 + phase).sin() * 4.0);
     Swarm { positions_m: wave(0.0), velocities_m_s: wave(1.0) }
@@ -35,7 +40,7 @@ fn the_control_is_the_sum_over_the_neighbours() -> Result<(), Box<dyn std::error
             }
         }
         let mut control = Rows::from_element(9, f64::NAN);
-        LaplacianLaw::new(&graph, &formation, f1, f2)?.command(&exact(&swarm, &formation), &mut control)?;
+        laplacian(&graph, &formation, f1, f2)?.command(&exact(&swarm, &formation), &mut control)?;
         assert!((control - &expected).amax() <= ROUNDING * expected.amax(), "{graph:?}");
     }
     Ok(())
@@ -48,7 +53,7 @@ fn at_the_slots_moving_together_nothing_is_asked_for() -> Result<(), Box<dyn std
     swarm.velocities_m_s.fill(2.5);
     swarm.positions_m.add_scalar_mut(8.0);
     let mut control = Rows::zeros(5);
-    let mut law = LaplacianLaw::new(&Graph::complete(5), &formation, 1.0, 1.1)?;
+    let mut law = laplacian(&Graph::complete(5), &formation, 1.0, 1.1)?;
     law.command(&exact(&swarm, &formation), &mut control)?;
     assert!(control.amax() < ROUNDING);
     assert!(law.energy(&exact(&swarm, &formation)).unwrap_or(f64::NAN) < ROUNDING);
@@ -58,7 +63,7 @@ fn at_the_slots_moving_together_nothing_is_asked_for() -> Result<(), Box<dyn std
 #[test]
 fn nothing_is_certified_and_an_energy_is_given_only_where_it_is_one() -> Result<(), ParameterError> {
     let (formation, swarm) = (Formation::grid(6, 2.0), swarm(6));
-    let law = |graph: &Graph, f1| LaplacianLaw::new(graph, &formation, f1, 1.1);
+    let law = |graph: &Graph, f1| laplacian(graph, &formation, f1, 1.1);
     let certificate = law(&Graph::complete(6), 1.0)?.certificate(&exact(&swarm, &formation), &[]);
     assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::NoBarrier]));
     assert!(certificate.energy_initial.is_some_and(|energy| energy > 0.0));
@@ -72,11 +77,11 @@ fn nothing_is_certified_and_an_energy_is_given_only_where_it_is_one() -> Result<
 fn wrong_input_is_refused() -> Result<(), ParameterError> {
     let formation = Formation::pentagon(3.0);
     let complete = Graph::complete(5);
-    let refusal = |graph: &Graph, f1, f2| LaplacianLaw::new(graph, &formation, f1, f2).err();
+    let refusal = |graph: &Graph, f1, f2| laplacian(graph, &formation, f1, f2).err();
     assert_eq!(refusal(&Graph::complete(4), 1.0, 1.0), Some(ParameterError::Counts { graph: 4, formation: 5 }));
     assert!(matches!(refusal(&complete, f64::NAN, 1.0), Some(ParameterError::NotFinite { name: "f1", .. })));
     assert!(matches!(refusal(&complete, 1.0, f64::INFINITY), Some(ParameterError::NotFinite { name: "f2", .. })));
-    let mut law = LaplacianLaw::new(&complete, &formation, 10.0, 1.0)?;
+    let mut law = laplacian(&complete, &formation, 10.0, 1.0)?;
     let mut control = Rows::zeros(5);
     let mut swarm = swarm(5);
     assert_eq!(

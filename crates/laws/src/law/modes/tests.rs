@@ -3,7 +3,7 @@ use nalgebra::{DMatrix, Matrix2};
 use super::*;
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
-use crate::law::{DisplacementKeys, EdgeTensionKeys, LawSpec, Setting};
+use crate::law::{DisplacementKeys, EdgeTensionKeys, LawContext, LawSpec};
 use crate::target::{Guidance, ReferenceMotion};
 
 fn mode(k: f64, c: f64) -> Mode {
@@ -63,8 +63,8 @@ fn sampling_margins_are_the_closed_form_and_where_the_largest_eigenvalue_leaves_
     for (k, c, a22) in [(1.0, 1.1, 0.1), (2.0, 1.0, -0.5), (1.0, 1.0, 1e-7)] {
         let margin_s = mode(k, c).sampling_margin_s(a22);
         let radius = |period_s: f64| {
-            let (grown, moved_s, pushed_s2) = held(a22, period_s);
-            let step = Matrix2::new(1.0 - k * pushed_s2, moved_s - c * pushed_s2, -k * moved_s, grown - c * moved_s);
+            let (bounded, moved_s, pushed_s2) = held(a22, period_s);
+            let step = Matrix2::new(1.0 - k * pushed_s2, moved_s - c * pushed_s2, -k * moved_s, bounded - c * moved_s);
             step.complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max)
         };
         assert!(
@@ -87,8 +87,9 @@ fn what_a_held_command_does_is_as_exact_where_the_closed_form_cancels() {
             first + terms.sum::<f64>()
         };
         let period_s = 2.5;
-        let (grown, moved_s, pushed_s2) = held(x / period_s, period_s);
-        for (found, exact) in [(grown, sum(0)), (moved_s, period_s * sum(1)), (pushed_s2, period_s * period_s * sum(2))]
+        let (bounded, moved_s, pushed_s2) = held(x / period_s, period_s);
+        for (found, exact) in
+            [(bounded, sum(0)), (moved_s, period_s * sum(1)), (pushed_s2, period_s * period_s * sum(2))]
         {
             assert!((found / exact - 1.0).abs() < 1e-10, "{x}: {found} {exact}");
         }
@@ -187,11 +188,11 @@ fn followers_of_a_hub_hear_nobody_in_a_loop_and_bear_any_delay() {
 #[test]
 fn the_pentagon_in_contact_is_far_stiffer_than_free() {
     let (graph, slots) = (Graph::complete(5), Formation::pentagon(3.0));
-    let setting = Setting::new(&graph, &slots, 2.0, 0.0);
-    let law = LawSpec::Displacement(DisplacementKeys::default()).build(&setting).expect("a law");
+    let context = LawContext::new(&graph, &slots, 2.0, 0.0);
+    let law = LawSpec::Displacement(DisplacementKeys::default()).build(&context).expect("a law");
     let linear = law.linear(&slots).expect("modes");
     assert_eq!(linear.free, [mode(1.0, 1.0)]);
-    let contact = linear.in_contact.expect("a push");
+    let contact = linear.stiffest_contact_mode.expect("a push");
     let margins_s = [linear.delay_margin_s(0.0), contact.delay_margin_s(0.0)];
     assert!((margins_s[0] - 0.711).abs() < 5e-4 && (margins_s[1] - 0.0811).abs() < 5e-5, "{contact:?} {margins_s:?}");
     let guidance = Guidance {
@@ -199,18 +200,18 @@ fn the_pentagon_in_contact_is_far_stiffer_than_free() {
         known_by: Pinning::Leader(2),
         feed_forward: true,
     };
-    let led = Setting { guidance: Some(&guidance), ..setting };
+    let led = LawContext { guidance: Some(&guidance), ..context };
     let law = LawSpec::Displacement(DisplacementKeys::default()).build(&led).expect("a law");
     let linear = law.linear(&slots).expect("modes");
     // Followers hear four others, one of them the leader, and the leader is drawn to the reference by itself.
-    assert_eq!((linear.free.len(), linear.in_contact), (3, None));
+    assert_eq!((linear.free.len(), linear.stiffest_contact_mode), (3, None));
 }
 
 #[test]
 fn modes_of_the_edge_tension_are_those_of_its_command_near_the_formation() {
     let (graph, slots) = (Graph::complete(5), Formation::pentagon(4.0));
-    let setting = Setting::new(&graph, &slots, 2.0, 0.1);
-    let law = LawSpec::EdgeTension(EdgeTensionKeys::default()).build(&setting).expect("a law");
+    let context = LawContext::new(&graph, &slots, 2.0, 0.1);
+    let law = LawSpec::EdgeTension(EdgeTensionKeys::default()).build(&context).expect("a law");
     let linear = law.linear(&slots).expect("modes");
     assert!(linear.free.iter().all(|mode| mode.damping_per_s == 1.1));
     let stiffest = linear.free.iter().map(|mode| mode.stiffness_per_s2).fold(0.0, f64::max);
@@ -232,5 +233,7 @@ fn modes_of_the_edge_tension_are_those_of_its_command_near_the_formation() {
         direction = change;
     }
     assert!((found / stiffest - 1.0).abs() < 1e-5, "{found} {stiffest}");
-    assert!(EdgeTensionKeys::default().alpha == 1.0 && linear.in_contact.is_none() && linear.heard.is_none());
+    assert!(
+        EdgeTensionKeys::default().alpha == 1.0 && linear.stiffest_contact_mode.is_none() && linear.heard.is_none()
+    );
 }

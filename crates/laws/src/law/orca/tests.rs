@@ -19,8 +19,8 @@ fn keys() -> OrcaKeys {
 
 fn law(formation: &Formation, keys: OrcaKeys) -> OrcaLaw {
     let links = Graph::complete(formation.count());
-    let setting = Setting::new(&links, formation, DELTA_M, 0.3);
-    OrcaLaw::new(&setting, keys).expect("finite keys")
+    let context = LawContext::new(&links, formation, DELTA_M, 0.3);
+    OrcaLaw::new(&context, keys).expect("finite keys")
 }
 
 /// The velocities that are chosen, and the accelerations that are commanded.

@@ -9,8 +9,8 @@ const DELTA_M: f64 = 1.0;
 const A22_PER_S: f64 = 0.3;
 
 fn law(links: &Graph, formation: &Formation) -> PotentialLaw {
-    let setting = Setting::new(links, formation, DELTA_M, A22_PER_S);
-    PotentialLaw::new(&setting, PotentialKeys { k_per_s2: 0.7, c_per_s: 1.1, eta_m4_per_s2: 0.4, max_accel_m_s2: None })
+    let context = LawContext::new(links, formation, DELTA_M, A22_PER_S);
+    PotentialLaw::new(&context, PotentialKeys { k_per_s2: 0.7, c_per_s: 1.1, eta_m4_per_s2: 0.4, max_accel_m_s2: None })
         .expect("finite gains")
 }
 
@@ -72,15 +72,15 @@ fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_not
     assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
     assert_eq!(law(&links, &formation).energy(&at), None);
 
-    let setting = Setting::new(&links, &formation, DELTA_M, 3.0);
-    let fed = PotentialLaw::new(&setting, PotentialKeys::default()).expect("finite gains");
+    let context = LawContext::new(&links, &formation, DELTA_M, 3.0);
+    let fed = PotentialLaw::new(&context, PotentialKeys::default()).expect("finite gains");
     let apart = Swarm::at_rest(formation.slots_m.clone());
     let at = Observation::exact(&apart, &links, &formation);
     assert_eq!(fed.certificate(&at, &[]).void, [Void::VelocityUndamped]);
 
     let keys = PotentialKeys { max_accel_m_s2: Some(0.5), ..PotentialKeys::default() };
-    let setting = Setting { a22_per_s: 0.0, ..setting };
-    let mut limited = PotentialLaw::new(&setting, keys).expect("finite gains");
+    let context = LawContext { a22_per_s: 0.0, ..context };
+    let mut limited = PotentialLaw::new(&context, keys).expect("finite gains");
     assert_eq!(limited.certificate(&at, &[]).void, [Void::CommandLimited]);
     let near = Swarm::at_rest(Formation::line(2, 1.1 * DELTA_M).slots_m);
     let pushed = command(&mut limited, &Observation::exact(&near, &links, &formation)).expect("a command");

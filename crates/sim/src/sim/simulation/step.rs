@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::super::accuracy::Part;
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
 use super::super::judge::longest_move_m;
+use super::super::monitors::Part;
 use super::Simulation;
-use crate::feedback::Feedback as _;
+use crate::plant::Feedback as _;
 use crate::plant::PlantError;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
 use tautline_core::record::Event;
@@ -19,7 +19,7 @@ use tautline_laws::law::{Law, LawError, RateQuery, Void};
 const SIDE_BY_SIDE_FROM: usize = 512;
 
 /// Into how many parts a step had to be cut, and whether that was enough.
-struct Fineness {
+struct Substeps {
     /// The fewest parts that were flown at once.
     shortest: u64,
     /// A part that cannot be halved was still too long for the law.
@@ -34,9 +34,9 @@ impl Simulation {
     /// Flies one step, in halves where it is refused.
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
-        let mut parts = Fineness { shortest: whole, is_overlong: false };
+        let mut parts = Substeps { shortest: whole, is_overlong: false };
         let flown = self.fly_parts(step, whole, &mut parts);
-        let Fineness { shortest, is_overlong } = parts;
+        let Substeps { shortest, is_overlong } = parts;
         if shortest < whole && shortest != self.shortest {
             let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
             let dt_s = length_s * (shortest as f64 / whole as f64);
@@ -61,7 +61,7 @@ impl Simulation {
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.room_m));
         let of_any_pair = rate(judge.nearest_m);
         // The nearest pair may be one that the law does not act on: the exact distance costs a look at every edge.
-        if of_any_pair * length_s <= scenario.time.honest_rate_dt() {
+        if of_any_pair * length_s <= scenario.time.stable_rate_dt() {
             return of_any_pair;
         }
         rate(judge.nearest_acted_on_m(law.as_ref(), links, state))
@@ -74,7 +74,7 @@ impl Simulation {
     }
 
     /// Flies the `whole` parts of a step, as many at once as are honest and not refused.
-    fn fly_parts(&mut self, step: u64, whole: u64, fineness: &mut Fineness) -> Result<(), Ending> {
+    fn fly_parts(&mut self, step: u64, whole: u64, substeps: &mut Substeps) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
@@ -82,7 +82,7 @@ impl Simulation {
             let rate_per_s = self.rate_per_s(seconds(part));
             while part > 1 && seconds(part) * rate_per_s > self.scenario.time.max_rate_dt {
                 part /= 2;
-                fineness.shortest = part.min(fineness.shortest);
+                substeps.shortest = part.min(substeps.shortest);
             }
             let undefined = self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
@@ -91,7 +91,7 @@ impl Simulation {
                 self.plant.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
                 part /= 2;
-                fineness.shortest = part.min(fineness.shortest);
+                substeps.shortest = part.min(substeps.shortest);
                 continue;
             }
             if bend_m > MAX_BEND_M {
@@ -100,7 +100,7 @@ impl Simulation {
             let [begun, way] = [rate_per_s.min(on_the_way_per_s), on_the_way_per_s].map(|rate| seconds(part) * rate);
             let is_honest = begun <= TimeSpec::DEFAULT_MAX_RATE_DT && way <= MAX_RATE_DT_ON_THE_WAY;
             let is_overlong = !is_honest && self.follows_the_law();
-            fineness.is_overlong |= is_overlong;
+            substeps.is_overlong |= is_overlong;
             self.note_error(seconds(part), rate_per_s.max(on_the_way_per_s), is_overlong);
             flown += part;
             let from_s = self.time_s;
@@ -234,8 +234,8 @@ impl Simulation {
         let ((judged, audit_time), (commanded, law_time)) =
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
-        let Self { watch, scenario, controller, state, certificate, events, .. } = self;
-        watch.look(scenario, controller, (time_s, state), certificate, events);
+        let Self { energy_monitor, scenario, controller, state, certificate, events, .. } = self;
+        energy_monitor.look(scenario, controller, (time_s, state), certificate, events);
         let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
         self.judge.note_engine_contacts(self.plant.as_ref(), self.time_s, &mut self.events);
@@ -271,7 +271,7 @@ impl Simulation {
         let began = Instant::now();
         self.energy = self.controller.energy(self.time_s, &self.state);
         self.performance.energy += began.elapsed();
-        self.watch.take(self.controller.target.view().revision, self.energy);
+        self.energy_monitor.take(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
     }

@@ -7,22 +7,22 @@ fn gust(velocity_m_s: Vector3<f64>, vehicles: Option<Vec<usize>>) -> Gust {
     Gust { at_s: 1.0, rise_s: 2.0, hold_s: 1.0, fall_s: Some(2.0), velocity_m_s, vehicles }
 }
 
-fn blown(wind: &WindSpec) -> Blown<'_> {
-    Blown { wind, drag_per_s: 0.5, until_s: 10.0, resolution_m: 1e-9 }
+fn exposure(wind: &WindSpec) -> WindExposure<'_> {
+    WindExposure { wind, drag_per_s: 0.5, until_s: 10.0, resolution_m: 1e-9 }
 }
 
-fn grown(wind: &WindSpec, frame: Frame, energy: f64) -> Grown {
-    Growth::new(&blown(wind), 4, frame, 0.8).of(energy, 0.0, f64::INFINITY)
+fn bounded(wind: &WindSpec, frame: Frame, energy: f64) -> BoundedEnergy {
+    EnergyBound::new(&exposure(wind), 4, frame, 0.8).of(energy, 0.0, f64::INFINITY)
 }
 
 #[test]
 fn a_steady_wind_adds_its_square_over_four_zeta_and_one_for_all_nothing_about_the_mean() {
     let wind = WindSpec { mean_m_s: Vector3::new(3.0, 0.0, 4.0), ..WindSpec::default() };
-    let ground = grown(&wind, Frame::Ground, 100.0);
+    let ground = bounded(&wind, Frame::Ground, 100.0);
     // |w|^2 = 4 (0.5 5)^2 = 25 over 10 s.
     assert!((ground.energy - (100.0 + 25.0 * 10.0 / 3.2)).abs() < 1e-12, "{ground:?}");
     assert_eq!(ground.until_s, Some(10.0));
-    assert_eq!(grown(&wind, Frame::Mean, 100.0), Grown { energy: 100.0, until_s: None });
+    assert_eq!(bounded(&wind, Frame::Mean, 100.0), BoundedEnergy { energy: 100.0, until_s: None });
 }
 
 #[test]
@@ -30,11 +30,11 @@ fn a_short_gust_adds_to_the_root() {
     let wind = WindSpec { gusts: vec![gust(Vector3::x(), Some(vec![2]))], ..WindSpec::default() };
     // Without energy to begin with: the integral of |w|/sqrt 2 of one vehicle, 0.5 (1 + 1 + 1) s, or of its square.
     let felt = 0.5 * 3.0 * std::f64::consts::FRAC_1_SQRT_2;
-    let ground = grown(&wind, Frame::Ground, 0.0);
+    let ground = bounded(&wind, Frame::Ground, 0.0);
     assert!(ground.energy <= felt * felt && ground.energy > 0.1 * felt * felt, "{ground:?}");
     assert_eq!(ground.until_s, None, "it is over before the flight is");
     // About the mean of four a push of one is the less by 3/4 in its square.
-    let (large, mean) = (grown(&wind, Frame::Ground, 1e6), grown(&wind, Frame::Mean, 1e6));
+    let (large, mean) = (bounded(&wind, Frame::Ground, 1e6), bounded(&wind, Frame::Mean, 1e6));
     assert!(((mean.energy - 1e6) / (large.energy - 1e6) - 0.75).abs() < 1e-3);
     // 1/4 zeta of the integral of the square of a slope, 3/8 of its length, and of what is held: within the parts' 0.3 %.
     let exact = 0.25 * (2.0 * 2.0 * 0.375 + 1.0) / 3.2;
@@ -46,7 +46,7 @@ fn a_short_gust_adds_to_the_root() {
 fn gusts_that_meet_different_vehicles_are_counted_each_where_it_blows() {
     let gusts = vec![gust(Vector3::x(), Some(vec![0])), gust(-Vector3::x(), Some(vec![1])), gust(Vector3::y(), None)];
     let wind = WindSpec { gusts, ..WindSpec::default() };
-    let held = |frame: Frame| most_m_s2(&blown(&wind), &groups(&blown(&wind), 4), frame, (3.0, 4.0));
+    let held = |frame: Frame| most_m_s2(&exposure(&wind), &groups(&exposure(&wind), 4), frame, (3.0, 4.0));
     assert!((held(Frame::Mean) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-15);
     assert!((held(Frame::Ground) - 0.5 * 6.0_f64.sqrt()).abs() < 1e-15);
 }
@@ -54,11 +54,11 @@ fn gusts_that_meet_different_vehicles_are_counted_each_where_it_blows() {
 #[test]
 fn a_promise_ends_where_the_energy_may_pass_what_it_bears() {
     let wind = WindSpec { mean_m_s: Vector3::new(3.0, 0.0, 4.0), ..WindSpec::default() };
-    let growth = Growth::new(&blown(&wind), 4, Frame::Ground, 0.8);
-    let Grown { energy, until_s } = growth.of(100.0, 2.0, 139.062_5);
+    let energy_bound = EnergyBound::new(&exposure(&wind), 4, Frame::Ground, 0.8);
+    let BoundedEnergy { energy, until_s } = energy_bound.of(100.0, 2.0, 139.062_5);
     assert_eq!((energy, until_s.map(|until_s| (until_s * 1e6).round())), (139.062_5, Some(7e6)));
-    assert_eq!(growth.of(100.0, 2.0, 90.0).until_s, Some(2.0), "at once");
-    let undamped = Growth::new(&blown(&wind), 4, Frame::Ground, 0.0).of(4.0, 0.0, f64::INFINITY);
+    assert_eq!(energy_bound.of(100.0, 2.0, 90.0).until_s, Some(2.0), "at once");
+    let undamped = EnergyBound::new(&exposure(&wind), 4, Frame::Ground, 0.0).of(4.0, 0.0, f64::INFINITY);
     assert!((undamped.energy - (2.0 + 50.0 * std::f64::consts::FRAC_1_SQRT_2).powi(2)).abs() < 1e-9);
 }
 

@@ -1,9 +1,10 @@
-//! What a bounded disturbance may add to an energy.
+//! Energies of laws: a cache of their potential part, and a bound under wind.
 
 use nalgebra::Vector3;
 
-use super::setting::Blown;
+use super::interface::WindExposure;
 use crate::wind::Gust;
+use tautline_core::swarm::Rows;
 
 /// Parts of a slope of a gust, over each of which its strength is taken for its largest.
 const PARTS: u32 = 1024;
@@ -27,7 +28,7 @@ pub(super) enum Frame {
 ///
 /// hold, the first the better one for long winds and the second for short gusts. Over each span of time the less is taken.
 #[derive(Clone, Debug)]
-pub(super) struct Growth {
+pub(super) struct EnergyBound {
     /// zeta \[1/s\]; where it is not positive, only the second bound is there.
     damping_per_s: f64,
     spans: Vec<Span>,
@@ -44,23 +45,23 @@ struct Span {
 
 /// What is left of a promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grown {
+pub(super) struct BoundedEnergy {
     /// The energy does not exceed this \[m^2/s^2\].
     pub(super) energy: f64,
     /// Up to then \[s\]; for ever where there is no such time.
     pub(super) until_s: Option<f64>,
 }
 
-impl Growth {
+impl EnergyBound {
     /// Of a wind without turbulence that is felt, over the flight.
-    pub(super) fn new(blown: &Blown<'_>, count: usize, frame: Frame, damping_per_s: f64) -> Self {
-        let groups = groups(blown, count);
-        let corners_s = corners_s(blown);
+    pub(super) fn new(exposure: &WindExposure<'_>, count: usize, frame: Frame, damping_per_s: f64) -> Self {
+        let groups = groups(exposure, count);
+        let corners_s = corners_s(exposure);
         let mut spans = Vec::new();
         for ends in corners_s.windows(2) {
             let (from_s, length_s) = (ends[0], ends[1] - ends[0]);
             let middle_s = from_s + 0.5 * length_s;
-            let is_sloping = blown.wind.gusts.iter().any(|gust| {
+            let is_sloping = exposure.wind.gusts.iter().any(|gust| {
                 let [begins_s, full_s, falls_s, ends_s] = gust.corners_s();
                 (begins_s..full_s).contains(&middle_s) || (falls_s..ends_s).contains(&middle_s)
             });
@@ -68,10 +69,10 @@ impl Growth {
             let at_s = |part: u32| from_s + length_s * (f64::from(part) / f64::from(parts));
             spans.extend((0..parts).map(|part| {
                 let (from_s, to_s) = (at_s(part), at_s(part + 1));
-                Span { from_s, to_s, most_m_s2: most_m_s2(blown, &groups, frame, (from_s, to_s)) }
+                Span { from_s, to_s, most_m_s2: most_m_s2(exposure, &groups, frame, (from_s, to_s)) }
             }));
         }
-        Self { damping_per_s, spans, resolution_m: blown.resolution_m }
+        Self { damping_per_s, spans, resolution_m: exposure.resolution_m }
     }
 
     /// Distances above delta that are not told from it \[m\].
@@ -80,9 +81,9 @@ impl Growth {
     }
 
     /// The bound on an energy from a time on \[s\], until it passes `most` or the flight ends.
-    pub(super) fn of(&self, energy: f64, from_s: f64, most: f64) -> Grown {
+    pub(super) fn of(&self, energy: f64, from_s: f64, most: f64) -> BoundedEnergy {
         if energy >= most {
-            return Grown { energy, until_s: Some(from_s) };
+            return BoundedEnergy { energy, until_s: Some(from_s) };
         }
         let mut now = energy;
         for &Span { from_s: begins_s, to_s, most_m_s2 } in self.spans.iter().filter(|span| span.to_s > from_s) {
@@ -95,20 +96,20 @@ impl Growth {
             if next > most {
                 let steady_s = if is_damped { ((most - now) / fed_per_s).max(0.0) } else { 0.0 };
                 let short_s = (most.sqrt() - now.sqrt()) * std::f64::consts::SQRT_2 / most_m_s2;
-                return Grown { energy: most, until_s: Some(begins_s + steady_s.max(short_s).min(length_s)) };
+                return BoundedEnergy { energy: most, until_s: Some(begins_s + steady_s.max(short_s).min(length_s)) };
             }
             now = next;
         }
         let blows_on = self.spans.last().is_some_and(|last| last.most_m_s2 > 0.0);
-        Grown { energy: now, until_s: self.spans.last().filter(|_| blows_on).map(|last| last.to_s) }
+        BoundedEnergy { energy: now, until_s: self.spans.last().filter(|_| blows_on).map(|last| last.to_s) }
     }
 }
 
 /// Which gusts meet how many vehicles.
-fn groups(blown: &Blown<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
+fn groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
     let mut groups: Vec<(Vec<bool>, usize)> = Vec::new();
     for vehicle in 0..count {
-        let met: Vec<_> = blown.wind.gusts.iter().map(|gust| gust.meets(vehicle)).collect();
+        let met: Vec<_> = exposure.wind.gusts.iter().map(|gust| gust.meets(vehicle)).collect();
         match groups.iter_mut().find(|(known, _)| *known == met) {
             Some((_, size)) => *size += 1,
             None => groups.push((met, 1)),
@@ -118,10 +119,10 @@ fn groups(blown: &Blown<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
 }
 
 /// The beginning, the end, and what gusts do in between, in order \[s\].
-fn corners_s(blown: &Blown<'_>) -> Vec<f64> {
-    let of_gusts = blown.wind.gusts.iter().flat_map(Gust::corners_s);
-    let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < blown.until_s);
-    let mut corners_s: Vec<_> = inside.chain([0.0, blown.until_s]).collect();
+fn corners_s(exposure: &WindExposure<'_>) -> Vec<f64> {
+    let of_gusts = exposure.wind.gusts.iter().flat_map(Gust::corners_s);
+    let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < exposure.until_s);
+    let mut corners_s: Vec<_> = inside.chain([0.0, exposure.until_s]).collect();
     corners_s.sort_by(f64::total_cmp);
     corners_s.dedup();
     corners_s
@@ -129,13 +130,18 @@ fn corners_s(blown: &Blown<'_>) -> Vec<f64> {
 
 /// No larger |w| in a span in which each gust grows or falls all along: that of the middle of its shares, and as much as half
 /// of their changes come to.
-fn most_m_s2(blown: &Blown<'_>, groups: &[(Vec<bool>, usize)], frame: Frame, (from_s, to_s): (f64, f64)) -> f64 {
-    let gusts = &blown.wind.gusts;
+fn most_m_s2(
+    exposure: &WindExposure<'_>,
+    groups: &[(Vec<bool>, usize)],
+    frame: Frame,
+    (from_s, to_s): (f64, f64),
+) -> f64 {
+    let gusts = &exposure.wind.gusts;
     let shares: Vec<_> = gusts.iter().map(|gust| (gust.share(from_s), gust.share(to_s))).collect();
     let count = groups.iter().map(|(_, size)| *size).sum::<usize>().max(1) as f64;
     let air = |met: &[bool]| {
         let blowing = gusts.iter().zip(&shares).zip(met).filter(|(_, met)| **met);
-        blowing.fold(blown.wind.mean_m_s, |sum, ((gust, (a, b)), _)| sum + 0.5 * (a + b) * gust.velocity_m_s)
+        blowing.fold(exposure.wind.mean_m_s, |sum, ((gust, (a, b)), _)| sum + 0.5 * (a + b) * gust.velocity_m_s)
     };
     let from: Vector3<f64> = match frame {
         Frame::Ground => Vector3::zeros(),
@@ -149,7 +155,37 @@ fn most_m_s2(blown: &Blown<'_>, groups: &[(Vec<bool>, usize)], frame: Frame, (fr
         let felt = if frame == Frame::Mean { met * (1.0 - met / count) } else { met };
         0.5 * (b - a).abs() * gust.velocity_m_s.norm() * felt.max(0.0).sqrt()
     });
-    blown.drag_per_s * (middle + changes.sum::<f64>())
+    exposure.drag_per_s * (middle + changes.sum::<f64>())
+}
+
+/// The potential part of an energy at the positions that a law was asked about last: found while it made its command, and
+/// wanted again for the energy of the same instant.
+#[derive(Clone, Debug)]
+pub(super) struct PotentialCache {
+    positions_m: Rows,
+    potential: Option<f64>,
+}
+
+impl PotentialCache {
+    /// Nothing is known yet about so many vehicles.
+    pub(super) fn new(count: usize) -> Self {
+        Self { positions_m: Rows::zeros(count), potential: None }
+    }
+
+    /// Keeps the potential of these positions, as many as [`PotentialCache::new`] was told.
+    pub(super) fn keep(&mut self, positions_m: &Rows, potential: f64) {
+        self.positions_m.as_mut_slice().copy_from_slice(positions_m.as_slice());
+        self.potential = Some(potential);
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.potential = None;
+    }
+
+    /// The potential of these very positions, where it is known.
+    pub(super) fn of(&self, positions_m: &Rows) -> Option<f64> {
+        self.potential.filter(|_| self.positions_m.as_slice() == positions_m.as_slice())
+    }
 }
 
 #[cfg(test)]
