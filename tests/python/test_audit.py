@@ -141,7 +141,7 @@ class Arrays(Case):
         a.to_html(page)
         self.assertIn("VIOLATION", page.read_text())
         p[0, 3] = 50.0
-        self.refuses(tl.Error, "not what it was", lambda: a.to_html(page))
+        self.refuses(tl.Error, "has changed", lambda: a.to_html(page))
 
 
 class Files(Case):

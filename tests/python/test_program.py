@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import tautline as tl
 from shared import Case, passing, short
-from tautline import _words
+from tautline import _arguments
 
 SPEC = """\
 scenario = "pentagon"
@@ -58,7 +58,7 @@ class Command(Case):
         asked = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
         self.assertIn("max-gap", asked)
         answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "proof", "allow-undecided", "no-config", "help"}
-        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_words.reading).parameters}
+        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_arguments.read_options).parameters}
         taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
         self.assertEqual({name for name in asked - answers if name.replace("-", "_") not in taken}, set())
 

@@ -127,7 +127,7 @@ class Kept(Case):
         a.to_html(page)
         before = page.read_bytes()
         p[:, 0] = [0.0, 9.0, 0.0]
-        self.refuses(tl.Error, "not what it was", lambda: a.to_html(page))
+        self.refuses(tl.Error, "has changed", lambda: a.to_html(page))
         self.assertEqual(page.read_bytes(), before)
 
     def test_a_flight_overwrites_neither_its_scenario_nor_itself(self) -> None:
@@ -166,7 +166,7 @@ class Kept(Case):
         file.write_text(short(**{"law.alpha": 2.0}).to_toml())
         self.refuses(tl.Error, "has changed", lambda: tl.compare(s, runs=1))
         self.refuses(tl.Error, "has changed", lambda: tl.fly(s, set={"time.duration_s": 1.0}))
-        self.refuses(tl.Error, "not what it was", lambda: pickle.loads(pickle.dumps(s)))
+        self.refuses(tl.Error, "has changed", lambda: pickle.loads(pickle.dumps(s)))
         file.unlink()
         self.refuses(FileNotFoundError, "s.toml", lambda: tl.compare(s, runs=1))
 

@@ -82,7 +82,7 @@ class Arrays(Case):
             self.refuses(tl.Error, says, lambda asked=asked: tl.audit(t, p, **asked))
         self.refuses(TypeError, "delta: a number is needed, not str", lambda: tl.audit(t, p, delta="1"))
         self.refuses(TypeError, "a number is needed, not bool", lambda: tl.audit(t, p, delta=True))
-        self.refuses(TypeError, "says how a file is read", lambda: tl.audit(t, p, delta=1, fps=30))
+        self.refuses(TypeError, "fps: only for files", lambda: tl.audit(t, p, delta=1, fps=30))
         self.refuses(TypeError, "unexpected keyword", lambda: tl.audit("a.csv", delta=1, bogus=1))
 
     def test_an_error_has_the_code_of_its_problem(self) -> None:
@@ -172,7 +172,7 @@ class Simulations(Case):
             (tl.Error, "not (5, 1)", lambda: sim.step(u[:, :1])),
             (tl.Error, "not of shape (15,)", lambda: sim.step(u.ravel())),
             (tl.Error, "step 1: the command for vehicle 3 is not a finite number", lambda: sim.step(np.where(np.arange(5)[:, None] == 2, np.nan, u))),
-            (tl.Error, "steps: 0 were asked for", lambda: sim.step(steps=0)),
+            (tl.Error, "steps: must be at least 1, got 0", lambda: sim.step(steps=0)),
             (TypeError, "a whole number is needed, not float", lambda: sim.step(steps=1.5)),
         ):
             self.refuses(kind, says, do)
