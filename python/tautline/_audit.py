@@ -57,8 +57,7 @@ class ViolationError(Error):
 class Audit:
     """Result of an audit."""
 
-    #: ``PROVED CLEAR``, ``CLEAR if straight between samples`` (or similar), ``VIOLATION`` or ``UNDECIDED``.
-    #: A flight's own audit gives ``PROVED CLEAR by the run's audit of every step``.
+    #: Verdict in words: ``PROVED CLEAR``, ``CLEAR if straight between samples``, ``VIOLATION``, ``UNDECIDED``, ...
     verdict: str
     #: Verdict with its reason, in a line.
     headline: str
