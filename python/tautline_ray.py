@@ -100,7 +100,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("camp", type=Path, help="folder of the campaign, from tautline campaign plan")
     parser.add_argument("--address", default="auto", help="HOST:PORT of the cluster, or local; by default this machine's")
-    parser.add_argument("--tautline", default="tautline", metavar="PATH", help="program, at the same path on all nodes")
+    parser.add_argument("--tautline", default="tautline", metavar="PATH", help="path of the program on all nodes")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="threads of a shard, by default 1")
     parser.add_argument(
         "--hedge-after", type=float, default=10.0, metavar="S", help="shortest time before another attempt [s]"

@@ -3,9 +3,10 @@
 Example::
 
     env = FormationEnv("pentagon")
-    observations, infos = env.reset(seed=0)  # Start of an episode.
+    observations, infos = env.reset(seed=0)
+    # An episode of random actions.
     actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-    observations, rewards, terminations, truncations, infos = env.step(actions)
+    env.step(actions)  # Repeat until `env.agents` is empty.
 
 A violation, at or between steps, terminates the episode of all agents. The end of the flight truncates it.
 """

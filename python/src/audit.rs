@@ -1,4 +1,4 @@
-//! Audits of arrays and of files.
+//! Audits of arrays and files.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -18,7 +18,7 @@ use crate::numbers::{borrowed, shown};
 use crate::request::{Question, ReadOptions};
 use crate::work::away;
 
-/// The verdict in words, the headline, the summary, and the report as JSON.
+/// Verdict in words, headline, summary, and report as JSON.
 type Judged = (String, String, String, String);
 
 fn judged(report: &RecordedReport) -> PyResult<Judged> {
@@ -26,11 +26,11 @@ fn judged(report: &RecordedReport) -> PyResult<Judged> {
     Ok((report.verdict(), report.headline(), report.text(), json))
 }
 
-/// Limits, obstacles and audit of a flight, as its recording holds them.
+/// Limits, obstacles and audit of a flight, as in its recording.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Seen(pub(crate) OwnRecording);
 
-/// The arrays that are judged.
+/// Arrays of an audit.
 struct Given<'py> {
     times: PyReadonlyArray1<'py, f64>,
     positions: PyReadonlyArray3<'py, f64>,
@@ -74,7 +74,7 @@ impl<'py> Given<'py> {
     }
 }
 
-/// Judges a recording; several paths are one, with a vehicle in each. A page is written where `html` names one.
+/// Audits a recording, in one file or in a file for each vehicle. Writes a page to `html`, if given.
 #[pyfunction]
 pub(crate) fn audit_files(
     py: Python<'_>,
@@ -91,9 +91,9 @@ pub(crate) fn audit_files(
     judged(&audited.map_err(Failure::raised)?.report)
 }
 
-/// Judges arrays of positions.
+/// Audits arrays of positions. Writes a page to `html`, if given.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn audit_arrays<'py>(
     py: Python<'py>,
     question: &Question,
@@ -127,8 +127,9 @@ pub(crate) fn audit_arrays<'py>(
     judged(&audited.map_err(Failure::raised)?.report)
 }
 
-/// How long the library takes in Rust \[s\] to judge the same positions, at first as items that it made before, then with the
-/// time to make them: what `bench/ratios.py` compares `audit` with.
+/// Measures an audit in Rust \[s\], without and with the conversion of the arrays into items.
+///
+/// `bench/ratios.py` compares `audit` with it.
 #[pyfunction]
 pub(crate) fn audit_in_rust(
     times: &Bound<'_, PyAny>,

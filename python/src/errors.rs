@@ -1,4 +1,4 @@
-//! Errors of the library as exceptions.
+//! Converts errors of the library into exceptions.
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
@@ -12,27 +12,27 @@ create_exception!(
     tautline,
     Error,
     PyValueError,
-    "The input is wrong: the message names the place, the value and the remedy, as the command line does."
+    "Wrong input. The message has the place, the problem, the value and the remedy."
 );
 
-/// The input is wrong.
+/// Returns an exception for wrong input.
 pub(crate) fn wrong(message: impl Into<String>) -> PyErr {
     Error::new_err(message.into())
 }
 
-/// Something is not of the type that it must be.
+/// Returns an exception for an argument of a wrong type.
 pub(crate) fn wrong_type(message: impl Into<String>) -> PyErr {
     PyTypeError::new_err(message.into())
 }
 
-/// The library broke a promise.
+/// Returns an exception for an internal error.
 pub(crate) fn broken(what: &str) -> PyErr {
-    PyRuntimeError::new_err(format!("tautline failed inside, please report it: {what}"))
+    PyRuntimeError::new_err(format!("internal error of tautline: {what}; please report it"))
 }
 
-/// The library's errors, which another crate's exceptions cannot be made of by `From`.
+/// Conversion into an exception: orphan rules forbid `From` for types of two other crates.
 pub(crate) trait Raised {
-    /// The exception that says the same.
+    /// Returns the exception with the message of the error.
     fn raised(self) -> PyErr;
 }
 
@@ -43,14 +43,14 @@ impl Raised for Failure {
     }
 }
 
-/// The input is wrong, with a code.
+/// Returns an exception for wrong input with a code.
 pub(crate) fn wrong_by(code: &str, message: impl Into<String>) -> PyErr {
     coded(wrong(message), code)
 }
 
-/// The exception with the stable name of the problem as its attribute `code`.
+/// Sets the attribute `code` of an exception to the stable code of the problem.
 fn coded(error: PyErr, code: &str) -> PyErr {
-    // Without the attribute the exception says the same in words.
+    // A failure to set it is ignored: the message is complete without it.
     Python::attach(|py| error.value(py).setattr("code", code).ok());
     error
 }
@@ -67,7 +67,7 @@ impl Raised for SimError {
     }
 }
 
-/// What is known before the first step, as JSON.
+/// Returns a check as JSON.
 pub(crate) fn json(answer: &Preflight) -> PyResult<String> {
     serde_json::to_string(answer).map_err(|error| broken(&error.to_string()))
 }

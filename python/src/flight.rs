@@ -1,4 +1,4 @@
-//! Whole flights.
+//! Flights from start to end.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
 use crate::work::{Signals, here};
 
-/// The samples of a flight, in memory.
+/// Samples of a flight in memory.
 #[derive(Default)]
 struct Samples {
     is_kept: bool,
@@ -32,7 +32,7 @@ struct Samples {
     velocities_m_s: Vec<f64>,
     commands_m_s2: Vec<f64>,
     separations_m: Vec<f64>,
-    /// The law that was flown, where it is not the scenario's.
+    /// Name of the law, if it differs from the scenario's.
     other_law: Option<String>,
     /// Reason of an early end.
     ended_early: Option<String>,
@@ -47,7 +47,7 @@ impl Sink for Samples {
         self.positions_m.extend(by_row(&sample.swarm.positions_m));
         self.velocities_m_s.extend(by_row(&sample.swarm.velocities_m_s));
         self.commands_m_s2.extend(by_row(sample.control));
-        // There is no command where the law had none.
+        // The law failed: the missing commands are NaN.
         self.commands_m_s2.resize(self.positions_m.len(), f64::NAN);
         self.separations_m.push(sample.separation.map_or(f64::NAN, |closest| closest.separation_m));
         Ok(())
@@ -67,7 +67,7 @@ impl Sink for Samples {
     }
 }
 
-/// What a flight gives back: its report in words and as JSON, and its samples.
+/// Result of a flight: its report in words and as JSON, and its samples.
 #[pyclass(frozen, get_all, module = "tautline._native")]
 pub(crate) struct Flown {
     passed: bool,
@@ -100,7 +100,7 @@ impl Flown {
     }
 }
 
-/// Where what is recorded goes beside memory.
+/// Recording and page of a flight.
 #[derive(Default)]
 struct Beside {
     recording: Option<McapRecorder>,
@@ -123,7 +123,7 @@ impl Sink for Beside {
     }
 }
 
-/// Flies a scenario to its end, under a law in Python where one is given.
+/// Flies a scenario to its end, under a law in Python if given.
 #[pyfunction]
 #[pyo3(signature = (scenario, law, record, html, command, keep))]
 pub(crate) fn fly(
@@ -173,7 +173,7 @@ pub(crate) fn fly(
     }
     let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
     if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
-        return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
+        return Err(wrong(format!("{why} (elements of `out` that `control` does not write are NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {
         tautline::report::write_atomically(&path, page.as_bytes())

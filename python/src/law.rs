@@ -1,4 +1,4 @@
-//! Laws that are written in Python.
+//! Control laws in Python.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ use crate::errors::{wrong, wrong_type};
 use crate::numbers::{borrowed, shown};
 use crate::observation::Observation;
 
-/// A law whose answers come from an object's method `control(obs, out)`.
+/// A law that calls the method `control(obs, out)` of an object.
 ///
-/// Clones ask the same object: what it remembers is its own, and no simulation saves it.
+/// Clones share the object: its state belongs to no simulation and is not saved.
 #[derive(Clone)]
 pub(crate) struct PythonLaw {
     name: String,
@@ -28,14 +28,14 @@ pub(crate) struct PythonLaw {
 }
 
 thread_local! {
-    /// Exception of a law in the innermost [`catching`] of this thread.
+    /// Exception of a law within the innermost [`catching`] of this thread.
     static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
 }
 
-/// Does work that may ask laws, in this thread, and returns the exception that one of them raised beside what was done.
+/// Runs work that calls laws on this thread. Returns its result and the exception that a law raised.
 ///
-/// The law runs on the calling thread ([`Capabilities::requires_calling_thread`]), so an exception belongs to the work of its own thread, and no
-/// other simulation finds it. Calls may lie within each other: a law may step another simulation.
+/// A law runs on the calling thread ([`Capabilities::requires_calling_thread`]), so its exception cannot reach another
+/// simulation. Calls may be nested, because a law may step another simulation.
 pub(crate) fn catching<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
     let outer = RAISED.take();
     let done = work();
@@ -43,7 +43,7 @@ pub(crate) fn catching<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
 }
 
 impl PythonLaw {
-    /// The law of an object that has a method `control`, and may have `name`, `sensing_range_m` and `reaches`.
+    /// Wraps an object with a method `control` and optional attributes `name`, `sensing_range_m` and `reaches`.
     pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
         let py = object.py();
         let control = object.getattr_opt(intern!(py, "control"))?.filter(PyAnyMethods::is_callable);
@@ -88,7 +88,7 @@ impl PythonLaw {
         }
         let written = borrowed::<Ix2>(out.as_any(), "out", "(N, 3)")?;
         if written.shape() != [count, 3] {
-            return Err(wrong(format!("out: it was made an array of shape {}", shown(written.shape()))));
+            return Err(wrong(format!("out: must keep its shape ({count}, 3), got {}", shown(written.shape()))));
         }
         let written = written.as_array();
         command.iter_mut().enumerate().for_each(|(k, x)| *x = written[(k % count, k / count)]);

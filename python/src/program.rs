@@ -1,4 +1,4 @@
-//! The command line as a process of it would be.
+//! The command line.
 
 use std::ffi::OsString;
 
@@ -7,8 +7,7 @@ use tautline::cli;
 
 use crate::work::here;
 
-/// Runs the program with these arguments, the first of which is its own name, as a process of it would, and gives its exit
-/// code.
+/// Runs the program and returns its exit code. The first argument is the program's name.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
     here(py, || cli::entry(&arguments))

@@ -1,4 +1,4 @@
-//! Keyword arguments of Python as parts of requests.
+//! Converts keyword arguments of Python into parts of requests.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use tautline::request::{AuditRequest, ConfigFile, Subject};
 
 use crate::errors::{wrong, wrong_by};
 
-/// The value of this name; an error names all values.
+/// Returns the value with this name. The error for an unknown name lists all names.
 pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)]) -> PyResult<Option<T>> {
     let Some(name) = name else { return Ok(None) };
     let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
@@ -19,7 +19,7 @@ pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)
     found.map(Some).ok_or_else(|| wrong_by("request/unknown-choice", message()))
 }
 
-/// Formats by their names.
+/// Returns all formats with their names.
 fn formats() -> Vec<(&'static str, Format)> {
     Format::all().map(|format| (format.name, format)).collect()
 }
@@ -28,16 +28,16 @@ fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) 
     text.map(|text| text.parse()).transpose().map_err(|error| wrong(format!("{what}: {error}")))
 }
 
-/// How a recording is read.
+/// Options of reading.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct ReadOptions(pub(crate) read::ReadOptions);
 
 #[pymethods]
 impl ReadOptions {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
-    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions, column,
-                        start, layout, frame, topic, origin, allow_unfinished))]
+    #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
+    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions,
+                        column, start, layout, frame, topic, origin, allow_unfinished))]
     fn new(
         format: Option<String>,
         time_unit: Option<String>,
@@ -98,7 +98,7 @@ impl ReadOptions {
     }
 }
 
-/// The question of an audit.
+/// Options of an audit.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Question {
     settings: recorded::Settings,
@@ -109,15 +109,16 @@ pub(crate) struct Question {
     independent: bool,
 }
 
-/// The values of one quantity: of all vehicles, and of vehicles by name.
+/// Value of a quantity for all vehicles, and values by name.
 type OfVehicles = (Option<f64>, Vec<(String, f64)>);
 
 #[pymethods]
 impl Question {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+    #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
-                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence, independent))]
+                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence,
+                        independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
@@ -183,7 +184,7 @@ impl Question {
 }
 
 impl Question {
-    /// The request about a recording, which `command` makes again.
+    /// Returns the request for an audit. `command` is the call that repeats it.
     pub(crate) fn request<'a>(&self, subject: Subject<'a>, command: &str, html: Option<PathBuf>) -> AuditRequest<'a> {
         AuditRequest {
             settings: self.settings.clone(),

@@ -10,17 +10,17 @@ use crate::errors::{Raised as _, json, wrong};
 use crate::numbers::table;
 use crate::work::here;
 
-/// What is to be flown, complete and checked.
+/// A complete and valid scenario.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Scenario {
     pub(crate) scenario: scenario::Scenario,
-    /// Where it comes from, for studies that vary it.
+    /// Source of the scenario, for studies that vary it.
     pub(crate) request: ScenarioRequest,
 }
 
 #[pymethods]
 impl Scenario {
-    /// The built-in scenario or the file of this name, or a text of TOML; with overrides as `--set` takes them.
+    /// Reads a built-in scenario, a file, or a TOML text, with overrides in the form of `--set`.
     #[new]
     fn new(py: Python<'_>, source: String, is_text: bool, overrides: Vec<String>) -> PyResult<Self> {
         let read = || {
@@ -87,7 +87,7 @@ impl Scenario {
         table(py, &self.scenario.formation().slots_m)
     }
 
-    /// Pairs of vehicles, from 0, that hear each other.
+    /// Linked vehicles, from 0.
     #[getter]
     fn links(&self) -> Vec<(usize, usize)> {
         self.scenario.graph.edges().collect()
@@ -103,7 +103,7 @@ impl Scenario {
         self.scenario.sha256_hex()
     }
 
-    /// What is known before the first step: whether nothing refuses the flight, a headline, a summary, and all as JSON.
+    /// Checks the scenario. Returns whether it may fly, a headline, a summary, and the check as JSON.
     fn check(&self, py: Python<'_>) -> PyResult<(bool, String, String, String)> {
         let found = here(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong(error.to_string()))?;
         Ok((!found.refuses(), found.headline(), found.text(), json(&found)?))

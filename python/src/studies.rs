@@ -1,4 +1,4 @@
-//! Requests of studies, exports and the validation.
+//! Studies, exports and the validation.
 
 use std::path::PathBuf;
 
@@ -18,16 +18,16 @@ use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
 use crate::work::away_with_threads;
 
-/// Whether an answer is good, and the answer as JSON.
+/// Whether a result is good, and the result as JSON.
 type Answer = (bool, String);
 
-/// Works on a request without the interpreter's lock.
+/// Runs a request without the interpreter's lock.
 fn answered<T: Send>(py: Python<'_>, work: impl FnOnce(&Silent) -> Result<T, Failure> + Send) -> PyResult<T> {
     let monitor = Silent::default();
     away_with_threads(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::raised)
 }
 
-/// The answer of a study that was not interrupted.
+/// Returns the result of a study that was not interrupted.
 fn whole<T>(answer: Option<T>) -> PyResult<T> {
     answer.ok_or_else(|| broken("the work was interrupted"))
 }
@@ -36,7 +36,7 @@ fn json<E: std::fmt::Display>(text: Result<String, E>) -> PyResult<String> {
     text.map_err(|error| broken(&error.to_string()))
 }
 
-/// Names of the built-in scenarios.
+/// Returns the names of the built-in scenarios.
 #[pyfunction]
 pub(crate) fn scenarios() -> Vec<&'static str> {
     builtin::all().iter().map(|builtin| builtin.name).collect()
@@ -59,7 +59,7 @@ pub(crate) fn export(
     answered(py, |monitor| export_file(&request, monitor))
 }
 
-/// Files and threads of a study, as keyword arguments give them.
+/// Files and threads of a study.
 #[derive(FromPyObject)]
 pub(crate) struct Outputs {
     #[pyo3(item)]
@@ -104,9 +104,9 @@ pub(crate) fn compare(
     study(py, scenario, tautline::compare::Options { laws, runs, seed }, outputs)
 }
 
-/// Searches for the values of a key between which a verdict turns.
+/// Searches for the two values of a key between which a verdict turns.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn margin(
     py: Python<'_>,
     scenario: &Scenario,
@@ -145,7 +145,7 @@ pub(crate) fn sweep(
 
 /// Searches for the worst flight within bounds.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn attack(
     py: Python<'_>,
     scenario: &Scenario,
@@ -166,7 +166,7 @@ pub(crate) fn attack(
     study(py, scenario, options, outputs)
 }
 
-/// Judges the claims of the paper and ours.
+/// Measures the claims of the paper and of tautline.
 #[pyfunction]
 pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Option<usize>) -> PyResult<Answer> {
     let request = ValidateRequest { out, force, threads };
@@ -174,9 +174,9 @@ pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Optio
     Ok((validation.pass, json(validation.to_json())?))
 }
 
-/// Flies a campaign: whether no flight violated, its answer as JSON, and its folder.
+/// Flies a campaign. Returns whether no flight had a violation, the result as JSON, and the folder.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn campaign(
     py: Python<'_>,
     spec: PathBuf,

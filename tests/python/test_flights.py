@@ -151,7 +151,7 @@ class Laws(Case):
                 out.shape = (3, 5)
 
         self.refuses(TypeError, "writes into `out`", lambda: tl.fly(short(), law=Returns()))
-        self.refuses(tl.Error, "made an array of shape (3, 5)", lambda: tl.fly(short(), law=Reshapes()))
+        self.refuses(tl.Error, "must keep its shape (5, 3), got (3, 5)", lambda: tl.fly(short(), law=Reshapes()))
         self.refuses(NotImplementedError, "write control", lambda: tl.fly(short(), law=tl.Law()))
 
     def test_a_large_swarms_law_stays_in_the_thread_that_flies(self) -> None:

@@ -111,7 +111,7 @@ class Words(Case):
         t, p = passing()
         p[:, 3], p[1:, 2] = np.nan, np.nan
         notes = " ".join(tl.audit(t, p, delta=0.1).notes)
-        self.assertIn("`4` are NaN at every instant: nothing is said of them", notes)
+        self.assertIn("`4` are NaN at every instant and are not audited", notes)
         self.assertIn("`3` are not seen from the first instant to the last", notes)
         self.assertEqual(tl.audit(*passing(), delta=0.1).notes, [])
 
