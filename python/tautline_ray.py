@@ -99,7 +99,7 @@ def main() -> int:
     """Runs the command line. Returns 0 if no shard is missing, 2 for wrong input, 3 if shards are missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("camp", type=Path, help="folder of the campaign, from tautline campaign plan")
-    parser.add_argument("--address", default="auto", help="HOST:PORT of the cluster, or local; by default this machine's")
+    parser.add_argument("--address", default="auto", help="HOST:PORT of the cluster, or local [this machine's cluster]")
     parser.add_argument("--tautline", default="tautline", metavar="PATH", help="path of the program on all nodes")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="threads of a shard, by default 1")
     parser.add_argument(

@@ -1,12 +1,6 @@
 """PettingZoo ``ParallelEnv`` on :class:`tautline.Simulation`: agents command accelerations to reach their slots.
 
-Example::
-
-    env = FormationEnv("pentagon")
-    observations, infos = env.reset(seed=0)
-    # An episode of random actions.
-    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-    env.step(actions)  # Repeat until `env.agents` is empty.
+Use: `env = FormationEnv("pentagon")`, `env.reset(seed=0)`, then `env.step(actions)` until `env.agents` is empty.
 
 A violation, at or between steps, terminates the episode of all agents. The end of the flight truncates it.
 """

@@ -175,7 +175,7 @@ impl Simulation {
         self.with(py, |simulation| simulation.least_clearance_m())
     }
 
-    /// Verdict so far, or of the whole flight after its end (`clear`, `violation`, `undecided`), and violations of pairs.
+    /// Verdict so far, or of the whole flight after its end, and violations of pairs.
     fn judged(&self, py: Python<'_>) -> PyResult<(String, Vec<Violation>)> {
         let (flight, is_over) =
             self.with(py, |simulation| (simulation.clone().finish(), simulation.ending().is_some()))?;
