@@ -40,7 +40,8 @@ touch crates/*/src/lib.rs
 
 mutants() {
     cargo mutants --no-shuffle --package tautline-audit,tautline-laws,tautline-sim \
-        -f 'crates/audit/src/**' -f 'crates/laws/src/law/**' -f 'crates/sim/src/sim/**' -f 'crates/sim/src/plant/**' "$@"
+        -f 'crates/audit/src/**' -f 'crates/laws/src/law/**' \
+        -f 'crates/sim/src/sim/**' -f 'crates/sim/src/plant/**' "$@"
 }
 
 # Random order by a hash with the seed as its key. Mutants that delete a field of a struct are excluded: cargo-mutants
