@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from commands import help_of, run, spoken, unknown_arguments
+from commands import run, spoken, unknown_arguments
 from exceptions import AROUND
 from pages import ROOT, Block
 
