@@ -8,11 +8,11 @@
 precision highp float; precision highp int; precision highp sampler2D;
 uniform vec3 right, up, back, eye; uniform vec4 lens; uniform vec2 size;
 const vec3 LIGHT = vec3(-.408, .577, .707);
-// Direction or position in the camera's axes: right, up, towards the camera.
+// Axes of the camera (view space): right, up, towards the camera.
 vec3 turned(vec3 v) { return vec3(dot(right, v), dot(up, v), dot(back, v)); }
-vec3 seen(vec3 p) { return turned(p - eye); }
-// Clip coordinates of a position in the camera's axes.
-vec4 clipped(vec3 p) {
+vec3 view(vec3 p) { return turned(p - eye); }
+// Clip coordinates of a position in view space.
+vec4 toClip(vec3 p) {
   float n = lens.z, f = lens.w;
   return vec4(p.xy / lens.xy, (-p.z * (f + n) - 2. * f * n) / (f - n), -p.z);
 }
@@ -37,7 +37,7 @@ void main() {
   vec4 at = fixedAt.w > 0. ? vec4(fixedAt.xyz, 1) : place(gl_InstanceID);
   colour = fixedPaint.w > 0. ? fixedPaint : texelFetch(paint, ivec2(gl_InstanceID, 0), 0);
   centre = at.xyz;
-  vec3 c = seen(centre);
+  vec3 c = view(centre);
   float pixel = 2. * lens.y / size.y, away = length(c);
   axes = shell.x > 0. ? shell : vec3(max(fixedAt.w > 0. ? fixedAt.w : radius, least * pixel * max(-c.z, 0.)));
   float r = max(axes.x, max(axes.y, axes.z));
@@ -49,7 +49,7 @@ void main() {
     // Circle in which the cone of sight around the ball cuts the plane through its centre, and two pixels more.
     vec3 axis = c / away, across = normalize(cross(vec3(0, 1, 0), axis)), along = cross(axis, across);
     float sine = r / away, reach = r / sqrt(1. - sine * sine) + 2. * pixel * away;
-    gl_Position = clipped(c + (across * side.x + along * side.y) * reach);
+    gl_Position = toClip(c + (across * side.x + along * side.y) * reach);
     gl_Position.z = 0.;
   }
 }
@@ -68,14 +68,14 @@ void main() {
   if (edge <= 0. || along < 0.) discard;
   vec3 hit = eye + ray * along, n = normalize((hit - centre) / (axes * axes));
   n = turned(n);
-  vec4 clip = clipped(seen(hit));
+  vec4 clip = toClip(view(hit));
   gl_FragDepth = clamp(clip.z / clip.w * .5 + .5, 0., 1.);
   if (shell.x > 0.) {
-    float rim = 1. - abs(dot(n, normalize(-seen(hit))));
+    float rim = 1. - abs(dot(n, normalize(-view(hit))));
     pixel = vec4(colour.rgb, colour.a * edge * (.1 + .9 * rim * rim * rim));
   } else {
     float lit = .5 + .5 * max(dot(n, LIGHT), 0.);
-    float gloss = .16 * pow(max(dot(n, normalize(LIGHT + normalize(-seen(hit)))), 0.), 48.);
+    float gloss = .16 * pow(max(dot(n, normalize(LIGHT + normalize(-view(hit)))), 0.), 48.);
     pixel = vec4(colour.rgb * lit + gloss, edge);
   }
 }
@@ -109,13 +109,13 @@ void main() {
     colour = vec4(texelFetch(paint, ivec2(k, 0), 0).rgb, .16 + .74 * max(0., 1. - age / fading));
     if (old < 0 || a.w != b.w) a.w = 0.;
   }
-  vec3 p = seen(a.xyz), q = seen(b.xyz);
+  vec3 p = view(a.xyz), q = view(b.xyz);
   float n = lens.z;
   if (a.w * b.w < .5 || (-p.z < n && -q.z < n)) { gl_Position = NOWHERE; return; }
   // The part ahead of the camera.
   if (-p.z < n) p = mix(p, q, (n + p.z) / (p.z - q.z));
   if (-q.z < n) q = mix(q, p, (n + q.z) / (q.z - p.z));
-  vec4 u = clipped(p), v = clipped(q);
+  vec4 u = toClip(p), v = toClip(q);
   vec2 run = (v.xy / v.w - u.xy / u.w) * size;
   vec2 across = dot(run, run) > 0. ? normalize(vec2(-run.y, run.x)) : vec2(0, 1);
   gl_Position = (gl_VertexID & 1) == 1 ? v : u;
@@ -137,11 +137,11 @@ void main() {
       + (place(axis + 3).xyz - c.xyz) * from.z) / length_m;
     colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 0), 0).rgb, tint.a);
   }
-  vec3 s = seen(p);
+  vec3 s = view(p);
   float pixel = 2. * lens.y / size.y * -s.z, r = mark == 0 ? max(size_m, least * pixel) : least * pixel;
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2. - 1.) * (1. + 2. * pixel / r);
   thin = r / pixel;
-  gl_Position = c.w < .5 || -s.z < lens.z ? NOWHERE : clipped(s + vec3(at * r, 0));
+  gl_Position = c.w < .5 || -s.z < lens.z ? NOWHERE : toClip(s + vec3(at * r, 0));
 }
 @ MARK_PIXEL COMMON
 in vec4 colour; in vec2 at; flat in float thin; uniform int mark; uniform float stroke; out vec4 pixel;
@@ -155,7 +155,7 @@ void main() {
 // Triangles: positions and normals; a normal of 0 is not shaded.
 in vec3 from, to; uniform vec3 offset; uniform vec4 tint; out vec4 colour;
 void main() {
-  gl_Position = clipped(seen(from + offset));
+  gl_Position = toClip(view(from + offset));
   vec3 n = turned(to);
   colour = vec4(tint.rgb * (dot(to, to) > 0. ? .62 + .38 * max(dot(n, LIGHT), 0.) : 1.), tint.a);
 }
