@@ -16,7 +16,7 @@ create_exception!(
 );
 
 /// Returns an exception for wrong input.
-pub(crate) fn wrong(message: impl Into<String>) -> PyErr {
+pub(crate) fn wrong_input(message: impl Into<String>) -> PyErr {
     Error::new_err(message.into())
 }
 
@@ -26,48 +26,48 @@ pub(crate) fn wrong_type(message: impl Into<String>) -> PyErr {
 }
 
 /// Returns an exception for an internal error.
-pub(crate) fn broken(what: &str) -> PyErr {
+pub(crate) fn internal_error(what: &str) -> PyErr {
     PyRuntimeError::new_err(format!("internal error of tautline: {what}; please report it"))
 }
 
 /// Conversion into an exception: orphan rules forbid `From` for types of two other crates.
-pub(crate) trait Raised {
+pub(crate) trait IntoException {
     /// Returns the exception with the message of the error.
-    fn raised(self) -> PyErr;
+    fn into_exception(self) -> PyErr;
 }
 
-impl Raised for Failure {
-    fn raised(self) -> PyErr {
+impl IntoException for Failure {
+    fn into_exception(self) -> PyErr {
         let text = self.to_string();
-        coded(if self.is_machine() { PyOSError::new_err(text) } else { wrong(text) }, self.code())
+        with_code(if self.is_machine() { PyOSError::new_err(text) } else { wrong_input(text) }, self.code())
     }
 }
 
 /// Returns an exception for wrong input with a code.
-pub(crate) fn wrong_by(code: &str, message: impl Into<String>) -> PyErr {
-    coded(wrong(message), code)
+pub(crate) fn wrong_input_with_code(code: &str, message: impl Into<String>) -> PyErr {
+    with_code(wrong_input(message), code)
 }
 
 /// Sets the attribute `code` of an exception to the stable code of the problem.
-fn coded(error: PyErr, code: &str) -> PyErr {
+fn with_code(error: PyErr, code: &str) -> PyErr {
     // A failure to set it is ignored: the message is complete without it.
     Python::attach(|py| error.value(py).setattr("code", code).ok());
     error
 }
 
-impl Raised for ScenarioError {
-    fn raised(self) -> PyErr {
-        coded(wrong(self.to_string()), self.code())
+impl IntoException for ScenarioError {
+    fn into_exception(self) -> PyErr {
+        with_code(wrong_input(self.to_string()), self.code())
     }
 }
 
-impl Raised for SimError {
-    fn raised(self) -> PyErr {
-        Failure::from(self).raised()
+impl IntoException for SimError {
+    fn into_exception(self) -> PyErr {
+        Failure::from(self).into_exception()
     }
 }
 
 /// Returns a check as JSON.
 pub(crate) fn json(answer: &Preflight) -> PyResult<String> {
-    serde_json::to_string(answer).map_err(|error| broken(&error.to_string()))
+    serde_json::to_string(answer).map_err(|error| internal_error(&error.to_string()))
 }

@@ -15,12 +15,12 @@ use tautline::request::{OwnRecording, flight_page, run_audit};
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
-use crate::audit::Seen;
-use crate::errors::{Raised as _, broken, wrong};
-use crate::law::{PythonLaw, catching};
+use crate::audit::FlightFindings;
+use crate::errors::{IntoException as _, internal_error, wrong_input};
+use crate::law::{PythonLaw, catch_exception};
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
-use crate::work::{Signals, here};
+use crate::work::{Signals, run_detached};
 
 /// Samples of a flight in memory.
 #[derive(Default)]
@@ -69,7 +69,7 @@ impl Sink for Samples {
 
 /// Result of a flight: its report in words and as JSON, and its samples.
 #[pyclass(frozen, get_all, module = "tautline._native")]
-pub(crate) struct Flown {
+pub(crate) struct FlightData {
     passed: bool,
     headline: String,
     text: String,
@@ -79,35 +79,35 @@ pub(crate) struct Flown {
     velocities: Py<PyArray3<f64>>,
     commands: Py<PyArray3<f64>>,
     separations_m: Py<PyArray1<f64>>,
-    seen: Py<Seen>,
+    findings: Py<FlightFindings>,
 }
 
-impl Flown {
+impl FlightData {
     fn new(py: Python<'_>, report: &Report, samples: Samples, own: OwnRecording) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
             passed: report.verdict.pass,
             headline: report.headline(),
             text: report.text(),
-            report: serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?,
+            report: serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?,
             t: PyArray1::from_vec(py, samples.times_s).unbind(),
             positions: cube(py, samples.positions_m, shape)?.unbind(),
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            seen: Py::new(py, Seen(own))?,
+            findings: Py::new(py, FlightFindings(own))?,
         })
     }
 }
 
 /// Recording and page of a flight.
 #[derive(Default)]
-struct Beside {
+struct OutputFiles {
     recording: Option<McapRecorder>,
     page: Option<FlightLog>,
 }
 
-impl Sink for Beside {
+impl Sink for OutputFiles {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.sample(sample))?;
         self.page.as_mut().map_or(Ok(()), |page| page.sample(sample))
@@ -134,7 +134,7 @@ pub(crate) fn fly(
     html: Option<PathBuf>,
     command: &str,
     keep: bool,
-) -> PyResult<Flown> {
+) -> PyResult<FlightData> {
     let scenario = &scenario.scenario;
     let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
     let is_of_python = law.is_some();
@@ -154,10 +154,10 @@ pub(crate) fn fly(
             McapRecorder::create(path, &header)
         });
         let page = html.is_some().then(|| FlightLog::of(scenario));
-        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
+        let mut sinks = (samples, OutputFiles { recording: recording.transpose()?, page });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, Beside { recording, page }) = sinks;
+        let (samples, OutputFiles { recording, page }) = sinks;
         let closed = recording.map_or(Ok(()), |recording| match &flown {
             Ok((report, _)) => recording.close(run_audit(scenario, report)),
             Err(_) => recording.finish(),
@@ -167,18 +167,18 @@ pub(crate) fn fly(
         let page = page.map(|log| flight_page(scenario, &preflight, log, &report, command));
         Ok((report, ending, samples, page))
     };
-    let (flown, raised) = here(py, || catching(flight))?;
+    let (flown, raised) = run_detached(py, || catch_exception(flight))?;
     if let Some(raised) = signals.raised.or(raised) {
         return Err(raised);
     }
-    let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
+    let (report, ending, samples, page) = flown.map_err(SimError::into_exception)?;
     if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
-        return Err(wrong(format!("{why} (elements of `out` that `control` does not write are NaN)")));
+        return Err(wrong_input(format!("{why} (elements of `out` that `control` does not write are NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
     let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone(), samples.ended_early.clone());
-    Flown::new(py, &report, samples, own)
+    FlightData::new(py, &report, samples, own)
 }

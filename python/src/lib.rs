@@ -26,11 +26,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::audit::{Seen, audit_arrays, audit_files, audit_in_rust};
+    use super::audit::{FlightFindings, audit_arrays, audit_files, audit_in_rust};
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
-    use super::flight::{Flown, fly};
+    use super::flight::{FlightData, fly};
     #[pymodule_export]
     use super::observation::Observation;
     #[pymodule_export]
@@ -50,7 +50,7 @@ mod _native {
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyAnyMethods as _;
-        crate::work::at_home();
+        crate::work::remember_process();
         // Errors that are raised in Python have no code.
         module.getattr("Error")?.setattr("code", module.py().None())?;
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;

@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::prelude::*;
 use tautline::swarm::Rows;
 
-use crate::errors::{wrong, wrong_type};
+use crate::errors::{wrong_input, wrong_type};
 
 /// Borrows an array of doubles with these axes, such as `(T, N, 3)`, in any memory order.
 ///
@@ -35,19 +35,19 @@ pub(crate) fn borrowed<'py, D: Dimension>(
         )));
     }
     let Ok(array) = given.cast::<PyArray<f64, D>>() else {
-        let shape = shown(array.shape());
-        return Err(wrong(format!("{what}: an array of shape {axes} is needed, not of shape {shape}")));
+        let shape = shape_text(array.shape());
+        return Err(wrong_input(format!("{what}: an array of shape {axes} is needed, not of shape {shape}")));
     };
     if !array.is_aligned() {
         return Err(wrong_type(format!(
             "{what}: its numbers are not aligned in memory; give a copy, numpy.array(...)"
         )));
     }
-    array.try_readonly().map_err(|error| wrong(format!("{what}: {error}; give a copy")))
+    array.try_readonly().map_err(|error| wrong_input(format!("{what}: {error}; give a copy")))
 }
 
 /// Returns a shape as Python shows it.
-pub(crate) fn shown(shape: &[usize]) -> String {
+pub(crate) fn shape_text(shape: &[usize]) -> String {
     let lengths: Vec<_> = shape.iter().map(ToString::to_string).collect();
     if lengths.len() == 1 { format!("({},)", lengths[0]) } else { format!("({})", lengths.join(", ")) }
 }

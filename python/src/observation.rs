@@ -48,10 +48,10 @@ impl Observation {
         let pairs = at.near.iter().flat_map(|&(i, j)| [i64::try_from(i), i64::try_from(j)]);
         let near = PyArray1::from_vec(py, pairs.map(|index| index.unwrap_or(i64::MAX)).collect());
         let shared = matches!(at.others, Others::Shared);
-        let heard = (!shared).then(|| Pictures::of(py, at, |i, j| at.heard(i, j))).transpose()?;
-        let seen = (!shared && sees).then(|| Pictures::of(py, at, |i, j| at.seen(i, j))).transpose()?;
-        let (heard_positions, heard_velocities, heard_ages_s) = Pictures::apart(heard);
-        let (seen_positions, seen_velocities, _) = Pictures::apart(seen);
+        let heard = (!shared).then(|| NeighbourTables::of(py, at, |i, j| at.heard(i, j))).transpose()?;
+        let seen = (!shared && sees).then(|| NeighbourTables::of(py, at, |i, j| at.seen(i, j))).transpose()?;
+        let (heard_positions, heard_velocities, heard_ages_s) = NeighbourTables::split(heard);
+        let (seen_positions, seen_velocities, _) = NeighbourTables::split(seen);
         Ok(Self {
             t: at.time_s,
             positions: table(py, &at.own.positions_m)?.unbind(),
@@ -72,15 +72,15 @@ impl Observation {
 }
 
 /// Knowledge of each vehicle about each other vehicle.
-struct Pictures {
+struct NeighbourTables {
     positions: Py<PyArray3<f64>>,
     velocities: Py<PyArray3<f64>>,
     ages_s: Py<PyArray2<f64>>,
 }
 
-type Apart = (Option<Py<PyArray3<f64>>>, Option<Py<PyArray3<f64>>>, Option<Py<PyArray2<f64>>>);
+type SplitTables = (Option<Py<PyArray3<f64>>>, Option<Py<PyArray3<f64>>>, Option<Py<PyArray2<f64>>>);
 
-impl Pictures {
+impl NeighbourTables {
     fn of(
         py: Python<'_>,
         at: &observation::Observation<'_>,
@@ -102,8 +102,8 @@ impl Pictures {
         })
     }
 
-    fn apart(pictures: Option<Self>) -> Apart {
-        match pictures {
+    fn split(tables: Option<Self>) -> SplitTables {
+        match tables {
             Some(Self { positions, velocities, ages_s }) => (Some(positions), Some(velocities), Some(ages_s)),
             None => (None, None, None),
         }

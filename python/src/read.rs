@@ -10,10 +10,10 @@ use tautline::read::ReadError;
 use tautline::request::{Failure, audit};
 use tautline::track::{Item, Piece, Sample};
 
-use crate::errors::{Raised as _, wrong};
+use crate::errors::{IntoException as _, wrong_input};
 use crate::numbers::{cube, vectors};
 use crate::request::ReadOptions;
-use crate::work::away;
+use crate::work::run_in_thread;
 
 /// A recording in memory: M samples and K pieces of curves, both in order of time.
 #[pyclass(frozen, get_all, module = "tautline._native")]
@@ -58,16 +58,16 @@ struct Read {
 #[pyfunction]
 pub(crate) fn read(py: Python<'_>, paths: Vec<PathBuf>, options: &ReadOptions) -> PyResult<Columns> {
     let interrupted = Arc::default();
-    away(py, &interrupted, || all(&paths, &options.0, &interrupted))??.columns(py)
+    run_in_thread(py, &interrupted, || all(&paths, &options.0, &interrupted))??.columns(py)
 }
 
 fn all(paths: &[PathBuf], options: &tautline::read::ReadOptions, interrupted: &AtomicBool) -> PyResult<Read> {
-    let failed = |error: ReadError| Failure::from(error).raised();
+    let failed = |error: ReadError| Failure::from(error).into_exception();
     let mut recording = audit::open(paths, options).map_err(failed)?;
     let (mut read, mut items) = (Read::default(), Vec::new());
     while recording.read(&mut items).map_err(failed)? {
         if interrupted.load(Ordering::Relaxed) {
-            return Err(wrong("interrupted"));
+            return Err(wrong_input("interrupted"));
         }
         for item in items.drain(..) {
             match item {

@@ -8,7 +8,7 @@ use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
-use crate::errors::{wrong, wrong_by};
+use crate::errors::{wrong_input, wrong_input_with_code};
 
 /// Returns the value with this name. The error for an unknown name lists all names.
 pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)]) -> PyResult<Option<T>> {
@@ -16,7 +16,7 @@ pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)
     let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     let known = || all.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
     let message = || format!("{what}: unknown value '{name}' [possible values: {}]", known());
-    found.map(Some).ok_or_else(|| wrong_by("request/unknown-choice", message()))
+    found.map(Some).ok_or_else(|| wrong_input_with_code("request/unknown-choice", message()))
 }
 
 /// Returns all formats with their names.
@@ -25,7 +25,7 @@ fn formats() -> Vec<(&'static str, Format)> {
 }
 
 fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) -> PyResult<Option<T>> {
-    text.map(|text| text.parse()).transpose().map_err(|error| wrong(format!("{what}: {error}")))
+    text.map(|text| text.parse()).transpose().map_err(|error| wrong_input(format!("{what}: {error}")))
 }
 
 /// Options of reading.
@@ -58,13 +58,13 @@ impl ReadOptions {
         allow_unfinished: bool,
     ) -> PyResult<Self> {
         if [fps.is_some(), time_scale.is_some(), time_unit.is_some()].iter().filter(|is_given| **is_given).count() > 1 {
-            return Err(wrong("time_unit, fps and time_scale: one of them is enough"));
+            return Err(wrong_input("time_unit, fps and time_scale: one of them is enough"));
         }
         let mut columns = ColumnNames::default();
         for (role, name) in &column {
             if !columns.set(role, name) {
                 let roles = ColumnNames::ROLES.join(", ");
-                return Err(wrong(format!("column: `{role}` is no column: the columns are {roles}")));
+                return Err(wrong_input(format!("column: `{role}` is no column: the columns are {roles}")));
             }
         }
         let scale = match scale.as_deref() {
@@ -72,7 +72,7 @@ impl ReadOptions {
             Some(&[metres]) => Some(metres.into()),
             Some(&[x, y, z]) => Some([x, y, z].into()),
             Some(numbers) => {
-                return Err(wrong(format!("scale: one number or three are needed, not {}", numbers.len())));
+                return Err(wrong_input(format!("scale: one number or three are needed, not {}", numbers.len())));
             }
         };
         let layout = layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
@@ -88,7 +88,7 @@ impl ReadOptions {
             one_vehicle,
             starts: start.into_iter().collect(),
             columns,
-            layout: layout.map_err(|error| wrong(format!("layout: {error}")))?,
+            layout: layout.map_err(|error| wrong_input(format!("layout: {error}")))?,
             frame,
             topics: topic,
             origin,

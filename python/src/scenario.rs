@@ -6,9 +6,9 @@ use tautline::preflight::Preflight;
 use tautline::request::ScenarioRequest;
 use tautline::scenario::{self, Override, Source};
 
-use crate::errors::{Raised as _, json, wrong};
+use crate::errors::{IntoException as _, json, wrong_input};
 use crate::numbers::table;
-use crate::work::here;
+use crate::work::run_detached;
 
 /// A complete and valid scenario.
 #[pyclass(frozen, module = "tautline._native")]
@@ -33,7 +33,7 @@ impl Scenario {
             let scenario = scenario::Scenario::read(&source, &parsed)?;
             Ok(Self { scenario, request: ScenarioRequest { argument, source, overrides } })
         };
-        here(py, read)?.map_err(scenario::ScenarioError::raised)
+        run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)
     }
 
     #[getter]
@@ -68,7 +68,7 @@ impl Scenario {
 
     #[getter]
     fn law(&self) -> PyResult<String> {
-        let law = self.scenario.law().map_err(|error| wrong(error.to_string()))?;
+        let law = self.scenario.law().map_err(|error| wrong_input(error.to_string()))?;
         Ok(law.name().to_owned())
     }
 
@@ -105,7 +105,8 @@ impl Scenario {
 
     /// Checks the scenario. Returns whether it may fly, a headline, a summary, and the check as JSON.
     fn check(&self, py: Python<'_>) -> PyResult<(bool, String, String, String)> {
-        let found = here(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong(error.to_string()))?;
+        let found =
+            run_detached(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong_input(error.to_string()))?;
         Ok((!found.refuses(), found.headline(), found.text(), json(&found)?))
     }
 }

@@ -10,11 +10,11 @@ use pyo3::prelude::*;
 use tautline::sim::{self, Ending, Parts, SimError};
 use tautline::swarm::{Pair, first_row_not_finite};
 
-use crate::errors::{Raised as _, wrong};
-use crate::law::{PythonLaw, catching};
-use crate::numbers::{borrowed, shown, table, to_rows};
+use crate::errors::{IntoException as _, wrong_input};
+use crate::law::{PythonLaw, catch_exception};
+use crate::numbers::{borrowed, shape_text, table, to_rows};
 use crate::scenario::Scenario;
-use crate::work::here;
+use crate::work::run_detached;
 
 /// Time between two checks for Ctrl-C.
 const AT_ONCE: Duration = Duration::from_millis(50);
@@ -37,14 +37,14 @@ type Closest = ((usize, usize), f64, f64);
 impl Simulation {
     /// Calls `work` with the simulation. Raises `Error` while another call uses it.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
-        let done = here(py, || match self.state.try_lock() {
+        let done = run_detached(py, || match self.state.try_lock() {
             Ok(mut simulation) => Ok(work(&mut simulation)),
             Err(TryLockError::WouldBlock) => {
                 Err("the simulation is being stepped, by another thread or by its own law")
             }
             Err(TryLockError::Poisoned(_)) => Err("the simulation failed before; make a new one"),
         })?;
-        done.map_err(wrong)
+        done.map_err(wrong_input)
     }
 
     /// Raises the exception of the law, or an `Error` for a command that is not finite.
@@ -57,7 +57,7 @@ impl Simulation {
         }
         match self.with(py, |simulation| simulation.ending().cloned())? {
             Some(Ending::BrokeDown(why @ sim::Breakdown::CommandNotFinite { .. })) => {
-                Err(wrong(format!("{why} (elements of `out` that `control` does not write are NaN)")))
+                Err(wrong_input(format!("{why} (elements of `out` that `control` does not write are NaN)")))
             }
             _ => Ok(()),
         }
@@ -79,8 +79,8 @@ impl Simulation {
             };
             sim::Simulation::with(scenario, parts)
         };
-        let (made, raised) = here(py, || catching(begin))?;
-        let state = Mutex::new(made.map_err(SimError::raised)?);
+        let (made, raised) = run_detached(py, || catch_exception(begin))?;
+        let state = Mutex::new(made.map_err(SimError::into_exception)?);
         let simulation = Self { count: scenario.count(), is_of_python, state };
         simulation.raise(py, raised)?;
         Ok(simulation)
@@ -93,8 +93,8 @@ impl Simulation {
             Some(given) => {
                 let given = borrowed::<Ix2>(given, "u", "(N, 3) or (N, 2)")?;
                 if given.shape()[0] != self.count || !matches!(given.shape()[1], 2 | 3) {
-                    let (count, shape) = (self.count, shown(given.shape()));
-                    return Err(wrong(format!("u: accelerations of shape ({count}, 3) are needed, not {shape}")));
+                    let (count, shape) = (self.count, shape_text(given.shape()));
+                    return Err(wrong_input(format!("u: accelerations of shape ({count}, 3) are needed, not {shape}")));
                 }
                 Some(to_rows(given.as_array()))
             }
@@ -102,7 +102,10 @@ impl Simulation {
         let commands = commands.as_ref();
         if let Some(vehicle) = commands.and_then(first_row_not_finite) {
             let step = self.with(py, |simulation| simulation.steps())? + 1;
-            return Err(wrong(format!("step {step}: the command for vehicle {} is not a finite number", vehicle + 1)));
+            return Err(wrong_input(format!(
+                "step {step}: the command for vehicle {} is not a finite number",
+                vehicle + 1
+            )));
         }
         let mut left = steps;
         while left > 0 {
@@ -123,9 +126,9 @@ impl Simulation {
                 }
                 Ok(flown)
             };
-            let (flown, raised) = self.with(py, |simulation| catching(|| some_steps(simulation)))?;
+            let (flown, raised) = self.with(py, |simulation| catch_exception(|| some_steps(simulation)))?;
             self.raise(py, raised)?;
-            left -= flown.map_err(SimError::raised)?;
+            left -= flown.map_err(SimError::into_exception)?;
             py.check_signals()?;
         }
         Ok(())

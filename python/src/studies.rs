@@ -13,10 +13,10 @@ use tautline::studies::{Experiment, Question, Study as _, StudyFiles, StudyReque
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
-use crate::errors::{Raised as _, broken};
+use crate::errors::{IntoException as _, internal_error};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
-use crate::work::away_with_threads;
+use crate::work::run_in_thread_with_pool;
 
 /// Whether a result is good, and the result as JSON.
 type Answer = (bool, String);
@@ -24,16 +24,16 @@ type Answer = (bool, String);
 /// Runs a request without the interpreter's lock.
 fn answered<T: Send>(py: Python<'_>, work: impl FnOnce(&Silent) -> Result<T, Failure> + Send) -> PyResult<T> {
     let monitor = Silent::default();
-    away_with_threads(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::raised)
+    run_in_thread_with_pool(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::into_exception)
 }
 
 /// Returns the result of a study that was not interrupted.
 fn whole<T>(answer: Option<T>) -> PyResult<T> {
-    answer.ok_or_else(|| broken("the work was interrupted"))
+    answer.ok_or_else(|| internal_error("the work was interrupted"))
 }
 
 fn json<E: std::fmt::Display>(text: Result<String, E>) -> PyResult<String> {
-    text.map_err(|error| broken(&error.to_string()))
+    text.map_err(|error| internal_error(&error.to_string()))
 }
 
 /// Returns the names of the built-in scenarios.
@@ -139,7 +139,7 @@ pub(crate) fn sweep(
     outputs: Outputs,
 ) -> PyResult<Answer> {
     let keys = keys.into_iter().map(|(key, values)| SweptKey::new(&key, values)).collect::<Result<_, _>>();
-    let (keys, question) = (keys.map_err(Failure::raised)?, question(verdict)?);
+    let (keys, question) = (keys.map_err(Failure::into_exception)?, question(verdict)?);
     study(py, scenario, tautline::sweep::Options { keys, question, runs, seed }, outputs)
 }
 
@@ -160,7 +160,7 @@ pub(crate) fn attack(
     outputs: Outputs,
 ) -> PyResult<Answer> {
     let vary = vary.iter().map(|(key, low, high)| Variation::new(key, *low, *high)).collect::<Result<_, _>>();
-    let vary = vary.map_err(Failure::raised)?;
+    let vary = vary.map_err(Failure::into_exception)?;
     let (start_m, velocity_m_s, apart_m) = (start, velocity, apart);
     let options = tautline::attack::Options { vary, start_m, velocity_m_s, apart_m, flights, seeds, seed, out };
     study(py, scenario, options, outputs)

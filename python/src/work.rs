@@ -11,20 +11,20 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use crate::errors::broken;
+use crate::errors::internal_error;
 
 /// Time between two checks for Ctrl-C.
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 /// Stack of a worker thread \[bytes\]: that of a main thread on most systems.
 const STACK: usize = 8 << 20;
 
-static HOME: OnceLock<u32> = OnceLock::new();
+static ORIGINAL_PROCESS: OnceLock<u32> = OnceLock::new();
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Runs work in a new thread, without the interpreter's lock.
 ///
 /// Ctrl-C sets `interrupted`, which the work polls, and is raised once the work has ended.
-pub(crate) fn away<T: Send>(
+pub(crate) fn run_in_thread<T: Send>(
     py: Python<'_>,
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
@@ -58,24 +58,24 @@ pub(crate) fn away<T: Send>(
 /// Runs work on this thread, without the interpreter's lock.
 ///
 /// A fork has no threads of rayon's global pool: there the work runs in a pool that the process shares.
-pub(crate) fn here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let with_threads = || if is_at_home() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
+pub(crate) fn run_detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let with_threads = || if is_original_process() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
     started(finished(py.detach(|| catch_unwind(AssertUnwindSafe(with_threads))))?)
 }
 
-/// As [`away`], for work that uses rayon. In a fork it gets its own pool, so that concurrent calls cannot block it.
-pub(crate) fn away_with_threads<T: Send>(
+/// As [`run_in_thread`], for work that uses rayon. A fork gets a new pool, so that concurrent calls cannot block it.
+pub(crate) fn run_in_thread_with_pool<T: Send>(
     py: Python<'_>,
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
-    let with_threads = || if is_at_home() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
-    started(away(py, interrupted, with_threads)?)
+    let with_threads = || if is_original_process() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
+    started(run_in_thread(py, interrupted, with_threads)?)
 }
 
 /// Whether this process imported the package, instead of being a fork of that process.
-fn is_at_home() -> bool {
-    *HOME.get_or_init(process::id) == process::id()
+fn is_original_process() -> bool {
+    *ORIGINAL_PROCESS.get_or_init(process::id) == process::id()
 }
 
 fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
@@ -83,16 +83,16 @@ fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
 }
 
 fn finished<T>(done: thread::Result<T>) -> PyResult<T> {
-    done.map_err(|panic| broken(&words(panic.as_ref())))
+    done.map_err(|panic| internal_error(&words(panic.as_ref())))
 }
 
 fn started<T>(done: Result<T, ThreadPoolBuildError>) -> PyResult<T> {
-    done.map_err(|error| broken(&error.to_string()))
+    done.map_err(|error| internal_error(&error.to_string()))
 }
 
 /// Stores the process that imports the package.
-pub(crate) fn at_home() {
-    HOME.get_or_init(process::id);
+pub(crate) fn remember_process() {
+    ORIGINAL_PROCESS.get_or_init(process::id);
 }
 
 /// Returns the thread pool of this fork.

@@ -239,7 +239,7 @@ def audit(
     max_gap: float | None = None,
     require_presence: bool = False,
     independent: bool = False,
-    _seen: _native.Seen | None = None,
+    _findings: _native.FlightFindings | None = None,
     **read_as: Any,
 ) -> Audit:
     """Audits positions over time, in arrays or in a recording of any format.
@@ -323,7 +323,7 @@ def audit(
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: only for files, but arrays are given")
     command = call_text("t, positions", options)
-    return with_files(files, lambda: audit_arrays(question, command, t, positions, velocities, names, _seen))
+    return with_files(files, lambda: audit_arrays(question, command, t, positions, velocities, names, _findings))
 
 
 def given_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -375,7 +375,7 @@ def audit_arrays(
     positions: Any,
     velocities: Any,
     names: Sequence[str] | None,
-    seen: _native.Seen | None = None,
+    findings: _native.FlightFindings | None = None,
 ) -> Audit:
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
@@ -385,7 +385,7 @@ def audit_arrays(
         raise Error("names: two vehicles have the same name")
 
     def repeat(html: str | None = None) -> Outcome:
-        return _native.audit_arrays(question, command, t, positions, velocities, vehicles, seen, html)
+        return _native.audit_arrays(question, command, t, positions, velocities, vehicles, findings, html)
 
     return Audit(repeat(), repeat)
 

@@ -37,7 +37,7 @@ class Flight:
     #: (T,) smallest separation over the steps since the previous instant [m].
     separations_m: NDArray[np.float64]
 
-    def __init__(self, scenario: Scenario, flown: _native.Flown) -> None:
+    def __init__(self, scenario: Scenario, flown: _native.FlightData) -> None:
         self.scenario = scenario
         #: Verdict in a line, and the summary that the command line prints.
         self.headline, self.text = flown.headline, flown.text
@@ -48,7 +48,7 @@ class Flight:
         self.report: dict[str, Any] = json.loads(flown.report)
         self.t, self.positions, self.velocities = flown.t, flown.positions, flown.velocities
         self.commands, self.separations_m = flown.commands, flown.separations_m
-        self._seen = flown.seen
+        self._findings = flown.findings
         # The run's audit holds for this motion only.
         for array in (self.t, self.positions):
             array.flags.writeable = False
@@ -101,7 +101,7 @@ class Flight:
         audit. Other options are evaluated on the recorded instants. A flight that ended early is ``UNDECIDED`` unless
         a violation was found, or ``to_s`` ends the window earlier.
         """
-        return audit(self.t, self.positions, _seen=self._seen, **options)
+        return audit(self.t, self.positions, _findings=self._findings, **options)
 
     def plot(self) -> Figure:
         """Draws the paths from above, and the smallest separation over time with delta. Imports matplotlib."""

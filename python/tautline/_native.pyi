@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 __all__ = [
     "Columns",
     "Error",
-    "Flown",
+    "FlightData",
     "Observation",
     "Question",
     "ReadOptions",
     "Scenario",
-    "Seen",
+    "FlightFindings",
     "Simulation",
     "attack",
     "audit_arrays",
@@ -140,7 +140,7 @@ class Simulation:
     def copy(self, noise_seed: int | None) -> Simulation: ...
 
 @final
-class Flown:
+class FlightData:
     @property
     def passed(self) -> bool: ...
     @property
@@ -160,10 +160,10 @@ class Flown:
     @property
     def separations_m(self) -> NDArray[np.float64]: ...
     @property
-    def seen(self) -> Seen: ...
+    def findings(self) -> FlightFindings: ...
 
 @final
-class Seen:
+class FlightFindings:
     """Limits, obstacles and audit of a flight."""
 
 @final
@@ -269,7 +269,7 @@ def audit_arrays(
     positions: Any,
     velocities: Any | None,
     names: Sequence[str],
-    seen: Seen | None,
+    findings: FlightFindings | None,
     html: str | None,
 ) -> _AuditOutcome: ...
 def audit_files(
@@ -304,7 +304,7 @@ def export(
 ) -> None: ...
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
-) -> Flown: ...
+) -> FlightData: ...
 def main(arguments: Sequence[str]) -> int: ...
 def margin(
     scenario: Scenario,
