@@ -174,20 +174,24 @@ const play = (root, data) => {
   // Time [s]. `frames` were drawn in `passed` ms; the script took `spent` ms of them. `queued` is the next frame.
   let t = first, playing = false, ended = false, queued = 0, before = 0, frames = 0, passed = 0, spent = 0;
   let current = /** @type {Moment | null} */ (null);
-  const tell = (/** @type {Moment | null} */ moment) => { current = moment; write(said, moment?.said ?? ""); };
+  /** Shows the sentence of a moment, or none. @param {Moment | null} moment */
+  const announce = moment => { current = moment; write(said, moment?.said ?? ""); };
+  /** Requests a frame, unless one is queued. */
   const ask = () => { if (!queued && !ended) queued = requestAnimationFrame(frame); };
+  /** Plays or pauses. */
   const toggle = () => {
     playing = !playing;
     if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play");
     before = frames = passed = spent = 0;
-    tell(null);
+    announce(null);
     ask();
   };
-  const go = (/** @type {number} */ to) => {
+  /** Pauses and shows a time [s]. @param {number} to */
+  const go = to => {
     if (playing) toggle();
     t = clamp(to, first, last);
-    tell(null);
+    announce(null);
     ask();
   };
   /**
@@ -200,7 +204,7 @@ const play = (root, data) => {
     const here = upTo(all.map(moment => moment.at_s), t), next = at >= 0 ? at + way : way > 0 ? here : here - 1;
     const moment = all[(next + all.length) % all.length];
     go(moment.at_s);
-    tell(moment);
+    announce(moment);
     // The camera turns to the vehicles of the moment.
     seek();
     const [a, b = a] = moment.who.map(place).filter(at => at[3]);
@@ -208,7 +212,8 @@ const play = (root, data) => {
     target = [0, 1, 2].map(axis => (a[axis] + b[axis]) / 2);
     distance = Math.min(distance, 40 * (Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + least_m));
   };
-  const frame = (/** @type {number} */ now) => {
+  /** Draws a frame and, while playing, advances the time. @param {number} now Time of the browser [ms]. */
+  const frame = now => {
     queued = 0;
     if (ended) return;
     if (playing) {
@@ -247,6 +252,7 @@ const play = (root, data) => {
       distance = Math.max(distance, 1.04 * (Math.max(Math.abs(x) / across, Math.abs(y)) / TANGENT + z));
     }
   };
+  /** Axes of the camera, and its position. */
   const axes = () => {
     const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
     const back = [cp * cy, cp * sy, sp];
@@ -401,6 +407,7 @@ const play = (root, data) => {
   // the vehicles in red, `shape` is the number of the formation in the meshes.
   const dark = matchMedia("(prefers-color-scheme: dark)");
   let colours = LIGHT, painted = "", shape = -1, row = 0, next = 0, part = 0;
+  /** Applies the colours of the reader's theme. */
   const themed = () => { [colours, painted] = [dark.matches ? DARK : LIGHT, "?"]; ask(); };
   /**
    * Fits a canvas to its size on the page. Returns device pixels per CSS pixel, 0 for a canvas without a size.
@@ -412,6 +419,7 @@ const play = (root, data) => {
     if (of.width !== across || of.height !== high) [of.width, of.height] = [across, high];
     return across && high ? ratio : 0;
   };
+  /** Finds the instants around the time. */
   const seek = () => {
     row = clamp(upTo(times, t) - 1, 0, times.length - 1);
     next = Math.min(row + 1, times.length - 1);
@@ -630,7 +638,8 @@ const play = (root, data) => {
 
 /** The only player: browsers limit the number of contexts. @type {ReturnType<typeof play> | null} */
 let live = null;
-const open = (/** @type {HTMLElement} */ root) => {
+/** Starts the player of a replay in place of the current one. @param {HTMLElement} root */
+const open = root => {
   const old = live;
   live = null;
   old?.end();

@@ -3,7 +3,7 @@
 //! `cargo run --release --example attacks [laws]`
 
 #[path = "../tests/support/attacks.rs"]
-#[allow(dead_code, reason = "the test asks for parts of it")]
+#[allow(dead_code, reason = "the test uses other parts")]
 mod attacks;
 
 fn main() {
