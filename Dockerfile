@@ -1,4 +1,4 @@
-# The program without viewer: docker build -t tautline .
+# Image of the program without the viewer: docker build -t tautline .
 FROM rust:1-bookworm AS build
 WORKDIR /tautline
 COPY . .

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Packs the program for one system: sh .github/package.sh PROGRAM TARGET FOLDER
-# FOLDER gets tautline-VERSION-TARGET.tar.gz and its SHA-256.
+# Writes tautline-VERSION-TARGET.tar.gz and its SHA-256 into FOLDER.
 set -eu
 [ $# = 3 ] || { echo "usage: package.sh PROGRAM TARGET FOLDER" >&2; exit 2; }
 program=$1 target=$2 folder=$3
@@ -15,5 +15,9 @@ mkdir "$work/$name"
 cp "$program" "$root/README.md" "$root/CHANGELOG.md" "$root/LICENSE-MIT" "$root/LICENSE-APACHE" "$work/$name/"
 tar -czf "$folder/$name.tar.gz" -C "$work" "$name"
 cd "$folder"
-if command -v sha256sum >/dev/null; then sha256sum "$name.tar.gz"; else shasum -a 256 "$name.tar.gz"; fi >"$name.tar.gz.sha256"
+if command -v sha256sum >/dev/null; then
+    sha256sum "$name.tar.gz"
+else
+    shasum -a 256 "$name.tar.gz"
+fi >"$name.tar.gz.sha256"
 echo "$folder/$name.tar.gz"

@@ -1,6 +1,6 @@
-//! One step of the audit, against the plain sweep of all pairs.
+//! Time of a step of the audit, and of a plain sweep of all pairs for comparison.
 //!
-//! A square lattice of spacing 5 m and delta = 2 m drifts apart and together again by 1 cm a step (240 Hz: 2.4 m/s).
+//! A square lattice with 5 m spacing and delta = 2 m drifts apart and back by 1 cm per step (2.4 m/s at 240 Hz).
 
 use std::hint::black_box;
 
@@ -11,10 +11,10 @@ use tautline::swarm::{Rows, row};
 const DELTA_M: f64 = 2.0;
 const SPACING_M: f64 = 5.0;
 const STEP_M: f64 = 0.01;
-/// Steps from one turn to the next.
+/// Steps between two turning points.
 const LEG: usize = 100;
 
-/// The lattice, and where it is after each step of one lap to and fro; every vehicle goes its own way.
+/// Returns the positions at each step of a lap. Every vehicle moves in its own direction and back.
 fn lap(n: usize) -> Vec<Rows> {
     let side = n.isqrt().max(1);
     let at = |step: usize| {
@@ -49,7 +49,7 @@ fn judged_step(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The floor for a judge that looks at every pair: the closed form alone, no list and no second detector.
+/// Lower bound for an audit of all pairs: the closed form alone, without a neighbour list and a second detector.
 fn plain_sweep(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("plain sweep of all pairs");
     for n in [5, 100, 1000] {

@@ -1,4 +1,4 @@
-//! Runs of a campaign beside a bare loop of the same flights, on one thread and on two. Their ratio says what the campaign costs.
+//! Time of a campaign on one and two threads, and of a plain loop of the same flights: their ratio is the overhead.
 
 use std::hint::black_box;
 use std::path::Path;

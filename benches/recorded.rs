@@ -1,7 +1,7 @@
-//! The judge of recordings against the straightforward sweep of every pair over every interval, on the same items.
+//! Time of an audit of a recording, and of a plain sweep of all pairs and intervals for comparison.
 //!
-//! The show: vehicles stand on a grid 2.5 m apart, take off row by row, bend into half a cylinder that breathes, unroll into
-//! a wall that waves, and land again, on smooth paths seen at 10 Hz. Neighbours stay neighbours, most pairs are far apart.
+//! The recording is a show with samples at 10 Hz. Vehicles start on a grid with 2.5 m spacing and take off row by row.
+//! They form half a cylinder that pulsates, then a wall that waves, and land. Neighbours stay neighbours.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 use tautline::audit::recorded::{Approach, ObjectPair, Settings, audit};
 use tautline::track::{Item, Sample};
 
-/// The show keeps this.
+/// Limit that the show keeps.
 const DELTA_M: f64 = 1.5;
-/// It does not keep this.
+/// Limit that the show violates.
 const TOO_MUCH_M: f64 = 2.2;
 const COLUMNS: usize = 40;
 const SAMPLES: usize = 2000;
@@ -25,7 +25,7 @@ const LONGEST_INTERVAL_S: f64 = 1.5 / RATE_HZ;
 /// Closest pairs that are listed.
 const KEPT: usize = 10;
 
-/// From 0 to 1 between two times, with no speed at either.
+/// Returns a smooth step from 0 to 1 between two times, with zero slope at both.
 fn smooth(time_s: f64, from_s: f64, to_s: f64) -> f64 {
     let x = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
     x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
@@ -60,7 +60,7 @@ fn show(vehicles: usize) -> Vec<Item> {
         .collect()
 }
 
-/// What both answer: the ten closest pairs, when pairs were below delta, and how often somebody was away.
+/// Result of both: number of gaps, the ten closest pairs, and the intervals of pairs below delta.
 #[derive(Debug)]
 struct Answer {
     gaps: usize,
@@ -89,8 +89,9 @@ fn ours(names: &[String], items: &[Item], delta_m: f64) -> Answer {
     Answer { gaps: outcome.gaps.len(), closest: outcome.closest.iter().map(closest).collect(), below }
 }
 
-/// Every pair over every interval, of vehicles that are in every sample; there is no second detector. Numbers must be
-/// finite and times increase, and gaps are counted: without that nothing is proved.
+/// Sweeps every pair over every interval, for vehicles that are in every sample, without a second detector.
+///
+/// Also checks that numbers are finite and times increase, and counts gaps: an audit needs these as well.
 fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
     let mut places: Vec<Vector3<f64>> = Vec::with_capacity(items.len());
     let mut times_s = Vec::with_capacity(items.len() / vehicles);
@@ -125,7 +126,7 @@ fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
                     least[pair] = (squared, from_s + length_s * at);
                 }
                 if squared < delta_m * delta_m {
-                    // Both times at which the line through the interval is delta away.
+                    // Times at which the separation on the line of the interval is delta.
                     let foot = -start.dot(&by) / length;
                     let half = ((delta_m * delta_m - (start + by * foot).norm_squared()) / length).sqrt();
                     let span = [foot - half, foot + half].map(|u| from_s + length_s * u.clamp(0.0, 1.0));
@@ -147,10 +148,10 @@ fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
     Answer { gaps, closest, below }
 }
 
-/// Largest difference of two distances \[m\] or two times \[s\]: both are rounded in their own order.
+/// Largest difference of two distances \[m\] or times \[s\], whose rounding differs.
 const ROUNDING: f64 = 1e-9;
 
-/// Pairs that are equally close may be listed in any order, each at any of the times at which it is.
+/// Asserts that two results agree. Equally close pairs may have any order and any of their closest times.
 fn agree(mine: &Answer, theirs: &Answer) {
     assert_eq!(mine.gaps, theirs.gaps);
     assert_eq!(mine.closest.len(), theirs.closest.len());
@@ -170,7 +171,7 @@ fn agree(mine: &Answer, theirs: &Answer) {
     }
 }
 
-/// How far apart two are at a time, on straight lines between samples.
+/// Returns the separation of a pair at a time, on straight lines between samples.
 fn distance_m((i, j): (usize, usize), time_s: f64) -> f64 {
     let from = (time_s * RATE_HZ).floor();
     let apart_m = |k: f64| place(j, k / RATE_HZ) - place(i, k / RATE_HZ);

@@ -1,6 +1,6 @@
-//! Time of a search for the pairs within a range, against the full sweep of all pairs.
+//! Time of a search for the pairs within a range, and of a sweep of all pairs for comparison.
 //!
-//! Run with `cargo bench --bench space`; compare within one run.
+//! Run with `cargo bench --bench space`; compare times of one run only.
 
 use std::hint::black_box;
 
@@ -8,10 +8,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use tautline::space::NearPairs;
 use tautline::swarm::{Rows, separation};
 
-/// Range in units of the distance at which points spread evenly would keep.
+/// Range \[m\]; evenly spread points are about 1 m apart.
 const RANGE_M: f64 = 1.3;
 
-/// Points spread over a square, or over a cube, one a square or cubic metre.
+/// Returns points in a square or cube, with one point per square or cubic metre.
 fn spread(count: u32, axes: i32) -> Rows {
     let side_m = f64::from(count).powf(1.0 / f64::from(axes));
     let place = |k: u32| {

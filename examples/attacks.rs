@@ -1,9 +1,9 @@
-//! Prints the tables of docs/attack.md: CMA-ES beside random search, and with `laws` the worst start found for each law.
+//! Prints the tables of docs/attack.md: CMA-ES and random search, or with `laws` the worst start of each law.
 //!
 //! `cargo run --release --example attacks [laws]`
 
 #[path = "../tests/support/attacks.rs"]
-#[allow(dead_code, reason = "the test asks for parts of it")]
+#[allow(dead_code, reason = "the test uses other parts")]
 mod attacks;
 
 fn main() {

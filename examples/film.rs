@@ -1,4 +1,4 @@
-//! A film of the built-in circle, flown and filmed without a file in between: `cargo run --release --example film`
+//! Flies the built-in circle and writes a film, without a recording: `cargo run --release --example film`.
 
 use std::error::Error;
 use std::fs::File;

@@ -1,7 +1,7 @@
-//! A control law of your own, flown in Rapier and judged like the built-in ones.
+//! A control law of your own, flown in Rapier and audited like the built-in laws.
 //!
-//! Each vehicle is pulled to its slot and pushed away from every other vehicle by 1/r^3, with damping. Nothing proves
-//! that this law keeps vehicles apart; the audit says whether it did on this flight.
+//! Damped springs pull each vehicle to its slot, and all other vehicles repel it by 1/r^3. The law has no certificate;
+//! the audit shows whether it kept vehicles apart on this flight.
 //!
 //! Run with `cargo run --release --example own_law`.
 

@@ -1,4 +1,4 @@
-//! A picture of a recorded flight: `cargo run --example snapshot -- out/pentagon/run.mcap 2.15 closest.png`
+//! Draws a picture of a recording: `cargo run --example snapshot -- out/pentagon/run.mcap 2.15 closest.png`.
 
 use std::error::Error;
 use std::path::Path;
@@ -8,7 +8,7 @@ use tautline::render::{AdapterChoice, CameraSpec, Renderer, Theme, Timeline, Vie
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [recording, time_s, picture] = arguments.as_slice() else {
-        return Err("give a recording, a time in seconds and the name of the picture".into());
+        return Err("usage: snapshot RECORDING TIME_S PICTURE".into());
     };
     let timeline = Timeline::read_mcap(Path::new(recording))?;
     let view = View { camera: CameraSpec::Top, theme: Theme::Paper, size_px: [1600, 900], ..View::default() };

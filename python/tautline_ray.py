@@ -1,7 +1,7 @@
-"""Flies what is missing of a campaign on a Ray cluster: ``python tautline_ray.py camp/``.
+"""Flies the missing shards of a campaign on a Ray cluster: ``python tautline_ray.py camp/``.
 
-Every node needs the same program and sees the campaign's folder under the same path. Given again after whatever stopped it,
-the command goes on. docs/clusters.md says how to start a cluster.
+Every node needs the same program, and the campaign's folder under the same path. After an interruption the same command
+continues. docs/clusters.md shows how to start a cluster.
 """
 
 from __future__ import annotations
@@ -19,42 +19,41 @@ import ray
 
 
 def tautline(program: str, verb: str, camp: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    """Runs ``tautline campaign VERB camp`` to its end and keeps what it says."""
+    """Runs ``tautline campaign VERB camp`` to its end and captures its output."""
     return subprocess.run([program, "campaign", verb, str(camp), *more], capture_output=True, text=True, check=False)
 
 
 def missing(program: str, camp: Path) -> list[int]:
-    """Shards that are not flown, in order; exits with 2 or 3 where the program says that something is wrong."""
-    asked = tautline(program, "missing", camp)
-    if asked.returncode not in (0, 1):
-        print(asked.stderr, file=sys.stderr, end="")
-        raise SystemExit(2 if asked.returncode == 2 else 3)
-    spans = [span.split("-") for span in asked.stdout.strip().split(",") if span]
+    """Returns the missing shards in order. Exits with 2 or 3 where the program fails."""
+    listed = tautline(program, "missing", camp)
+    if listed.returncode not in (0, 1):
+        print(listed.stderr, file=sys.stderr, end="")
+        raise SystemExit(2 if listed.returncode == 2 else 3)
+    spans = [span.split("-") for span in listed.stdout.strip().split(",") if span]
     return [shard for span in spans for shard in range(int(span[0]), int(span[-1]) + 1)]
 
 
 def fly(program: str, camp: Path, shard: int, threads: int) -> tuple[float, str]:
-    """Flies a shard: seconds that it took, and what is wrong with the input, if anything; raises where a retry may help."""
+    """Flies a shard. Returns its duration [s] and an error of the input, or "". Raises where a retry may help."""
     began = time.monotonic()
     flown = tautline(program, "shard", camp, "--shard", str(shard), "--threads", str(threads), "--quiet")
-    said = f"shard {shard} on {os.uname().nodename}: exit code {flown.returncode}\n{flown.stderr}"
+    message = f"shard {shard} on {os.uname().nodename}: exit code {flown.returncode}\n{flown.stderr}"
     if flown.returncode not in (0, 2):
-        raise RuntimeError(said)
-    return time.monotonic() - began, said if flown.returncode == 2 else ""
+        raise RuntimeError(message)
+    return time.monotonic() - began, message if flown.returncode == 2 else ""
 
 
 def fly_all(program: str, camp: Path, shards: list[int], threads: int = 1, hedge_after_s: float = 10.0) -> int:
-    """Flies ``shards`` on the cluster that Ray is connected to: 0 once each is done, else 2 or 3, and the reason is printed.
+    """Flies ``shards`` on the cluster that Ray is connected to. Returns 0, or prints the reason and returns 2 or 3.
 
-    A shard that is not done after ``hedge_after_s`` seconds and three times the slowest one so far is submitted once more,
-    and again where that does not help: a frozen node keeps for ever what it has and what Ray sends it next. The first
-    attempt to end counts, and nobody waits for the others.
+    A shard is submitted again after the larger of ``hedge_after_s`` and three times the slowest shard so far. Further
+    attempts follow if needed, because a frozen node never returns its tasks. The first attempt that ends counts.
     """
-    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])  # Nodes need not have this file.
+    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])  # Nodes do not need this file.
     task = ray.remote(num_cpus=threads, max_retries=5, retry_exceptions=True)(fly)
-    waiting, began, said = shards[::-1], time.monotonic(), -10.0
-    attempts: dict[ray.ObjectRef[tuple[float, str]], int] = {}  # under way, each with its shard
-    submitted: dict[int, list[float]] = {}  # shards that are not done, and when each was submitted
+    waiting, began, reported = shards[::-1], time.monotonic(), -10.0
+    attempts: dict[ray.ObjectRef[tuple[float, str]], int] = {}  # Running attempts with their shards.
+    submitted: dict[int, list[float]] = {}  # Unfinished shards with the times of their submissions.
     done = failed = hedged = 0
     slowest_s = 0.0
 
@@ -84,43 +83,46 @@ def fly_all(program: str, camp: Path, shards: list[int], threads: int = 1, hedge
                 done += 1
         now, left = time.monotonic(), len(shards) - done - failed
         for shard, times in list(submitted.items()):
-            # Each attempt has longer than the one before, so that a long queue does not grow for ever.
+            # The patience grows with each attempt: otherwise a long queue would grow without end.
             if done and now - times[-1] > max(hedge_after_s, 3.0 * slowest_s) * len(times):
                 submit(shard)
                 hedged += 1
-        if now - said >= 10.0 or not left:
-            said, minutes = now, (now - began) / max(done, 1) * left / 60.0
+        if now - reported >= 10.0 or not left:
+            reported, minutes = now, (now - began) / max(done, 1) * left / 60.0
             time_left = f", {minutes:.1f} min left" if done and left else ""
-            print(f"{done} of {len(shards)} shards, {slots} slots, {hedged} submitted again{time_left}", file=sys.stderr)
+            progress = f"{done} of {len(shards)} shards, {slots} slots, {hedged} submitted again{time_left}"
+            print(progress, file=sys.stderr)
     return 3 if failed else 0
 
 
 def main() -> int:
-    """Reads the command line: 0 once nothing is missing, 2 for wrong input, 3 where shards stayed missing."""
+    """Runs the command line. Returns 0 if no shard is missing, 2 for wrong input, 3 if shards are missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("camp", type=Path, help="the folder of the campaign, from tautline campaign plan")
-    parser.add_argument("--address", default="auto", help="HOST:PORT of the cluster, or local; by default this machine's")
-    parser.add_argument("--tautline", default="tautline", metavar="PATH", help="the program, as every node finds it")
-    parser.add_argument("--threads", type=int, default=1, metavar="N", help="threads a shard, by default 1")
-    parser.add_argument("--hedge-after", type=float, default=10.0, metavar="S", help="seconds a slow shard has, at least")
-    asked = parser.parse_args()
-    program, camp = shutil.which(asked.tautline), asked.camp.resolve()
+    parser.add_argument("camp", type=Path, help="folder of the campaign, from tautline campaign plan")
+    parser.add_argument("--address", default="auto", help="HOST:PORT of the cluster, or local [this machine's cluster]")
+    parser.add_argument("--tautline", default="tautline", metavar="PATH", help="path of the program on all nodes")
+    parser.add_argument("--threads", type=int, default=1, metavar="N", help="threads of a shard, by default 1")
+    parser.add_argument(
+        "--hedge-after", type=float, default=10.0, metavar="S", help="shortest time before another attempt [s]"
+    )
+    options = parser.parse_args()
+    program, camp = shutil.which(options.tautline), options.camp.resolve()
     if program is None:
-        parser.error(f"there is no program {asked.tautline}: give its place with --tautline")
-    if asked.threads < 1:
-        parser.error("--threads is 1 at least")
+        parser.error(f"--tautline: there is no program {options.tautline}; give its path")
+    if options.threads < 1:
+        parser.error(f"--threads: must be at least 1, got {options.threads}")
     program = os.path.abspath(program)
     shards = missing(program, camp)
     if shards:
         try:
-            ray.init(address=asked.address, log_to_driver=False, logging_level=logging.WARNING)
+            ray.init(address=options.address, log_to_driver=False, logging_level=logging.WARNING)
         except (ConnectionError, ValueError) as error:
-            print(f"{error}\nstart a cluster as docs/clusters.md shows, or give --address local", file=sys.stderr)
+            print(f"{error}; start a cluster (docs/clusters.md), or give --address local", file=sys.stderr)
             return 3
         try:
-            code = fly_all(program, camp, shards, asked.threads, asked.hedge_after)
+            code = fly_all(program, camp, shards, options.threads, options.hedge_after)
         except KeyboardInterrupt:
-            print("interrupted: what was flown is kept, and the same command goes on", file=sys.stderr)
+            print("interrupted; the flown shards are kept, and the same command continues", file=sys.stderr)
             return 3
         finally:
             ray.shutdown()

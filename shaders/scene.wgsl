@@ -1,20 +1,22 @@
-// What every shader knows of a picture. Coordinates "seen" are the camera's: right, up, towards it, in metres.
+// Shaders of the scene: balls, shells, lines and discs.
+//
+// View space has the camera's axes: right, up, towards the camera [m].
 
 struct Camera {
     right: vec4<f32>,
     up: vec4<f32>,
     back: vec4<f32>,
     eye: vec4<f32>,
-    // Half of width and height (tangents in perspective, metres in parallel projection), 1 in perspective, height of shells over
-    // their width.
+    // Half of width and height (tangents in perspective, metres in parallel projection), 1 in perspective, height of
+    // shells over their width.
     lens: vec4<f32>,
-    // Nearest and farthest depth in metres, width and height in pixels.
+    // Nearest and farthest depth [m], width and height [px].
     range: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
 
-fn seen(point: vec3<f32>) -> vec3<f32> {
+fn to_view(point: vec3<f32>) -> vec3<f32> {
     let from_eye = point - camera.eye.xyz;
     return vec3(dot(camera.right.xyz, from_eye), dot(camera.up.xyz, from_eye), dot(camera.back.xyz, from_eye));
 }
@@ -23,8 +25,9 @@ fn is_perspective() -> bool {
     return camera.lens.z > 0.5;
 }
 
-// Depth is 1 at the nearest and 0 at the farthest, so that floating point is as fine as the view is near.
-fn clipped(at: vec3<f32>) -> vec4<f32> {
+// Clip coordinates of a position in view space. Depth is 1 at the nearest and 0 at the farthest plane: reversed depth
+// keeps the precision of floating point over the whole range.
+fn to_clip(at: vec3<f32>) -> vec4<f32> {
     let near = camera.range.x;
     let far = camera.range.y;
     let flat = at.xy / camera.lens.xy;
@@ -35,14 +38,14 @@ fn clipped(at: vec3<f32>) -> vec4<f32> {
     return vec4(flat, depth, 1.0);
 }
 
-// IEC 61966-2-1.
-fn light_of(srgb: vec4<f32>) -> vec4<f32> {
+// Converts sRGB to linear light (IEC 61966-2-1).
+fn to_linear(srgb: vec4<f32>) -> vec4<f32> {
     let low = srgb.rgb / 12.92;
     let high = pow((srgb.rgb + 0.055) / 1.055, vec3(2.4));
     return vec4(select(high, low, srgb.rgb <= vec3(0.04045)), srgb.a);
 }
 
-// Balls as flat pieces on which every pixel finds its own point of the sphere.
+// Balls: quads on which each pixel computes its point of the sphere.
 
 struct Ball {
     @location(0) centre: vec3<f32>,
@@ -68,7 +71,7 @@ const LIGHT = vec3(-0.408, 0.577, 0.707);
 const AMBIENT = 0.38;
 const GLOSS = 0.16;
 
-// Whether a ball is outside of one of the four planes through the eye that bound what a camera in perspective sees.
+// Whether a ball is outside of one of the four side planes of the view frustum.
 fn is_aside(centre: vec3<f32>, radius: f32) -> bool {
     let outside = abs(centre.xy) + camera.lens.xy * centre.z;
     return any(outside > radius * sqrt(1.0 + camera.lens.xy * camera.lens.xy));
@@ -76,41 +79,42 @@ fn is_aside(centre: vec3<f32>, radius: f32) -> bool {
 
 @vertex
 fn ball_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
-    return BallCorner(corner_around(index, ball, ball.radius), seen(ball.centre), ball.radius, light_of(ball.colour));
+    let position = corner_around(index, ball, ball.radius);
+    return BallCorner(position, to_view(ball.centre), ball.radius, to_linear(ball.colour));
 }
 
-// An upright ellipsoid on the flat piece of the ball around it.
+// An upright ellipsoid, on the quad of the ball around it.
 @vertex
 fn shell_corner(@builtin(vertex_index) index: u32, ball: Ball) -> BallCorner {
     let around = ball.radius * max(1.0, camera.lens.w);
-    return BallCorner(corner_around(index, ball, around), seen(ball.centre), ball.radius, light_of(ball.colour));
+    return BallCorner(corner_around(index, ball, around), to_view(ball.centre), ball.radius, to_linear(ball.colour));
 }
 
 fn corner_around(index: u32, ball: Ball, radius: f32) -> vec4<f32> {
     let side = vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0;
-    let centre = seen(ball.centre);
+    let centre = to_view(ball.centre);
     let distance = length(centre);
     var position: vec4<f32>;
     if is_perspective() && (centre.z >= radius || is_aside(centre, 1.001 * radius + 1e-5 * distance)) {
-        // All of it is behind the camera or beside what it sees: outside the picture.
+        // Behind the camera or outside the frustum: outside the picture.
         position = vec4(2.0, 2.0, 2.0, 1.0);
     } else if is_perspective() && (distance < 1.001 * radius || -centre.z < radius) {
-        // The camera is within the ball or beside it.
+        // The camera is within the ball or beside it: the whole picture.
         position = vec4(side, 0.5, 1.0);
     } else if is_perspective() {
-        // The circle in which the cone of sight around the ball cuts the plane through its centre, and a pixel more.
+        // Circle in which the cone of sight around the ball cuts the plane through its centre, and a pixel more.
         let pixel = 2.0 * camera.lens.y * distance / camera.range.w;
         let axis = centre / distance;
         let across = normalize(cross(vec3(0.0, 1.0, 0.0), axis));
         let along = cross(axis, across);
         let sine = radius / distance;
         let reach = radius / sqrt(1.0 - sine * sine) + pixel;
-        position = clipped(centre + (across * side.x + along * side.y) * reach);
+        position = to_clip(centre + (across * side.x + along * side.y) * reach);
     } else {
         let pixel = 2.0 * camera.lens.y / camera.range.w;
-        position = clipped(centre + vec3(side * (radius + pixel), 0.0));
+        position = to_clip(centre + vec3(side * (radius + pixel), 0.0));
     }
-    // The depth is that of the sphere and found for each pixel.
+    // Each pixel computes the depth of the sphere.
     position.z = 0.5 * position.w;
     return position;
 }
@@ -128,17 +132,17 @@ fn ray_at(pixel: vec2<f32>) -> Ray {
     return Ray(vec3(flat, 0.0), vec3(0.0, 0.0, -1.0));
 }
 
-// What is seen of a vector in lengths in which upright ellipsoids of this height over width are balls.
-fn levelled(v: vec3<f32>, ratio: f32) -> vec3<f32> {
+// Scales a vector of view space along the vertical: upright ellipsoids with this height over width become balls.
+fn to_sphere(v: vec3<f32>, ratio: f32) -> vec3<f32> {
     let up = vec3(camera.right.z, camera.up.z, camera.back.z);
     return v + up * (dot(v, up) * (1.0 / ratio - 1.0));
 }
 
-// Squared half of the chord that a ball cuts from a ray. The vector from the centre to the ray is formed first:
-// subtracting squares of distances would lose small balls far away.
+// Squared half of the chord that a ball cuts from a ray, negative for a miss. The difference of squared distances would
+// lose small balls far away, so the vector from the centre to the ray comes first.
 fn chord(ray: Ray, centre: vec3<f32>, radius: f32, ratio: f32) -> f32 {
-    let to_origin = levelled(ray.origin - centre, ratio);
-    let direction = levelled(ray.direction, ratio);
+    let to_origin = to_sphere(ray.origin - centre, ratio);
+    let direction = to_sphere(ray.direction, ratio);
     let foot = to_origin - direction * (dot(to_origin, direction) / dot(direction, direction));
     return radius * radius - dot(foot, foot);
 }
@@ -153,7 +157,7 @@ struct Hit {
 }
 
 fn hit(corner: BallCorner, ratio: f32) -> Hit {
-    // Where the four samples of a pixel are.
+    // Positions of the four samples of a pixel.
     var offsets = array(vec2(0.375, 0.125), vec2(0.875, 0.375), vec2(0.125, 0.625), vec2(0.625, 0.875));
     let pixel = floor(corner.position.xy);
     var samples = 0u;
@@ -163,9 +167,9 @@ fn hit(corner: BallCorner, ratio: f32) -> Hit {
         }
     }
     let ray = ray_at(pixel + 0.5);
-    let direction = levelled(ray.direction, ratio);
+    let direction = to_sphere(ray.direction, ratio);
     let squared = dot(direction, direction);
-    let middle = -dot(levelled(ray.origin - corner.centre, ratio), direction) / squared;
+    let middle = -dot(to_sphere(ray.origin - corner.centre, ratio), direction) / squared;
     let half = sqrt(max(chord(ray, corner.centre, corner.radius, ratio), 0.0) / squared);
     var along = middle - half;
     let inside = along < 0.0;
@@ -176,8 +180,8 @@ fn hit(corner: BallCorner, ratio: f32) -> Hit {
         samples = 0u;
     }
     let at = ray.origin + ray.direction * along;
-    let clip = clipped(at);
-    let normal = normalize(levelled(levelled(at - corner.centre, ratio), ratio));
+    let clip = to_clip(at);
+    let normal = normalize(to_sphere(to_sphere(at - corner.centre, ratio), ratio));
     return Hit(at, normal, -normalize(ray.direction), clamp(clip.z / clip.w, 0.0, 1.0), samples, inside);
 }
 
@@ -203,7 +207,7 @@ fn shell(corner: BallCorner) -> Shade {
     return Shade(vec4(corner.colour.rgb, opacity), hit.depth, hit.samples);
 }
 
-// Straight lines of a width in pixels.
+// Straight lines with a width in pixels.
 
 struct Line {
     @location(0) first: vec3<f32>,
@@ -218,7 +222,7 @@ struct LineCorner {
     @location(0) colour: vec4<f32>,
 }
 
-// The part of the line that is ahead of the camera.
+// End of the part of a line that is ahead of the camera.
 fn ahead(point: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
     let near = camera.range.x;
     if !is_perspective() || -point.z >= near || -other.z <= near {
@@ -229,9 +233,9 @@ fn ahead(point: vec3<f32>, other: vec3<f32>) -> vec3<f32> {
 
 @vertex
 fn line_corner(@builtin(vertex_index) index: u32, line: Line) -> LineCorner {
-    let first = seen(line.first);
-    let second = seen(line.second);
-    let ends = array(clipped(ahead(first, second)), clipped(ahead(second, first)));
+    let first = to_view(line.first);
+    let second = to_view(line.second);
+    let ends = array(to_clip(ahead(first, second)), to_clip(ahead(second, first)));
     let half_size = camera.range.zw / 2.0;
     let run = (ends[1].xy / ends[1].w - ends[0].xy / ends[0].w) * half_size;
     var across = vec2(0.0, 1.0);
@@ -247,7 +251,7 @@ fn line_corner(@builtin(vertex_index) index: u32, line: Line) -> LineCorner {
         colour = line.second_colour;
     }
     position += vec4(across * side * line.width / half_size * position.w, 0.0, 0.0);
-    return LineCorner(position, light_of(colour));
+    return LineCorner(position, to_linear(colour));
 }
 
 @fragment
@@ -255,7 +259,7 @@ fn stroke(corner: LineCorner) -> @location(0) vec4<f32> {
     return corner.colour;
 }
 
-// Discs as flat pieces with a smooth rim.
+// Discs: quads with a smooth rim.
 
 struct Disc {
     @location(0) centre: vec3<f32>,
@@ -266,12 +270,12 @@ struct Disc {
 
 struct DiscCorner {
     @builtin(position) position: vec4<f32>,
-    // In units of the radius from the centre.
+    // Offset from the centre, in units of the radius.
     @location(0) at: vec2<f32>,
     @location(1) @interpolate(flat) colour: vec4<f32>,
 }
 
-// Room for the smooth rim, in units of the radius.
+// Half the side of the quad, in units of the radius: room for the smooth rim.
 const RIM_ROOM = 1.2;
 
 @vertex
@@ -284,7 +288,7 @@ fn disc_corner(@builtin(vertex_index) index: u32, disc: Disc) -> DiscCorner {
     let across = normalize(cross(disc.normal, helper));
     let along = cross(disc.normal, across);
     let corner = disc.centre + (across * at.x + along * at.y) * disc.radius;
-    return DiscCorner(clipped(seen(corner)), at, light_of(disc.colour));
+    return DiscCorner(to_clip(to_view(corner)), at, to_linear(disc.colour));
 }
 
 @fragment

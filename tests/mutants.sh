@@ -1,6 +1,6 @@
 #!/bin/sh
-# Breaks the program on purpose, one way at a time, in a copy of the tree, and expects the test that guards against it to
-# fail. Each file of tests/mutants/ is one way: a line of one source file and what it becomes, and the test.
+# Tests the tests: applies one mutant at a time to a copy of the tree and expects that its test fails.
+# A file of tests/mutants/ describes a mutant: the source file, a part of a line, its replacement, and the test.
 # From anywhere: sh tests/mutants.sh [NAME...], for example 01-sign. All ten take half an hour on two cores.
 set -eu
 cd "$(dirname "$0")/.."
@@ -18,7 +18,7 @@ field() {
     sed -n "s/^$2: *//p" "tests/mutants/$1"
 }
 
-# Replaces a text that must occur exactly once in a file, byte by byte.
+# Replaces a text, which must occur in exactly one line of a file.
 replace() {
     FROM=$2 TO=$3 awk '
         { at = index($0, ENVIRON["FROM"]) }
@@ -34,21 +34,21 @@ for mutant in ${*:-$(ls tests/mutants)}; do
     test=$(field "$mutant" test)
     copy
     replace "$scratch/tree/$(field "$mutant" file)" "$(field "$mutant" from)" "$(field "$mutant" to)" || {
-        echo "$mutant: the line to break is not in $(field "$mutant" file) exactly once"
+        echo "$mutant: $(field "$mutant" file) must have the line to replace exactly once"
         exit 2
     }
-    # Both trees share what is built; touching the file makes cargo build it anew for the tree at hand.
+    # Both trees share the target folder: a touched file makes cargo rebuild it for the current tree.
     touch "$(field "$mutant" file)"
-    # Without the break the test must run and pass, and with it the program must still be a program.
+    # The test must pass without the mutant, and the mutant must compile.
     # shellcheck disable=SC2086
     cargo test $test > "$scratch/log" 2>&1 && grep -q '^test .* ok$' "$scratch/log" || {
-        echo "$mutant: the test does not pass on the unbroken program: $test"
+        echo "$mutant: the test fails without the mutant: $test"
         exit 2
     }
     touch "$scratch/tree/$(field "$mutant" file)"
     # shellcheck disable=SC2086
     (cd "$scratch/tree" && cargo test --no-run $test) > "$scratch/log" 2>&1 || {
-        echo "$mutant: the broken program does not compile"
+        echo "$mutant: does not compile"
         cat "$scratch/log"
         exit 2
     }
@@ -59,7 +59,7 @@ for mutant in ${*:-$(ls tests/mutants)}; do
     else
         echo "$mutant: caught by $test"
     fi
-    # The broken program must not be taken for this tree's.
+    # Makes cargo rebuild the file without the mutant.
     touch "$(field "$mutant" file)"
 done
 exit $failed

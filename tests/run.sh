@@ -1,7 +1,8 @@
 #!/bin/sh
-# All set-up that the tests need, and the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
-# --long adds what takes minutes: the tests that are marked as ignored, release bits, MP4 films, two of tests/mutants, clusters,
-# notebooks, and the commands of the docs. TAUTLINE_LONG=1 beside it tries more random cases, and the slowest of those commands.
+# Sets up and runs the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
+#
+# --long adds tests that take minutes: ignored tests, release bits, MP4 films, two of tests/mutants, clusters, notebooks
+# and the commands of the docs. TAUTLINE_LONG=1 adds random cases, and the slowest commands of the docs.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -13,27 +14,26 @@ fi
 
 sh tests/setup.sh
 
-# Flies the golden scenarios in debug; with --long the release build is compared with the same hashes.
-asked=$#
+# The debug build flies the golden scenarios; with --long the release build must have the same hashes.
+arguments=$#
 if [ "$long" ]; then
     case " $* " in *" -- "*) set -- "$@" --include-ignored ;; *) set -- "$@" -- --include-ignored ;; esac
 fi
 cargo test "$@"
-if [ "$asked" != 0 ]; then exit; fi
+if [ "$arguments" != 0 ]; then exit; fi
 if [ "$long" ]; then
     cargo test --release -p tautline-sim --test bits
-    # The encoder that is not built in by default.
+    # The H.264 encoder, which is not a default feature.
     cargo test -p tautline-render --features mp4 film
-    # Two of the deliberate breaks, one of the law and one of the judge.
+    # Two mutants, one of the law and one of the audit.
     sh tests/mutants.sh 03-a22 07-sweep-off
 fi
 
-# What is offered to others' continuous integration; campaigns on clusters and every command of the docs, with the program that
-# was just built.
+# With the debug build: the GitHub action, hook and archives; with --long also clusters and every command of the docs.
 for tests in tests/ci ${long:+tests/cluster tests/docs}; do
     target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
 done
 
-# The Python package, as its users build it but for the optimisation.
+# The Python package, in a debug build.
 VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
 TAUTLINE_NOTEBOOKS=$long target/python/bin/python -m unittest discover --verbose --start-directory tests/python

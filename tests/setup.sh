@@ -1,24 +1,23 @@
 #!/bin/sh
-# Installs what building and testing need beside the Rust toolchain, where it is not there. From anywhere:
-# sh tests/setup.sh
+# Installs the missing requirements of builds and tests, except for the Rust toolchain. From anywhere: sh tests/setup.sh
 set -eu
 cd "$(dirname "$0")/.."
 
-# The C and C++ toolchain that linking and the H.264 encoder need; everything else comes with cargo.
+# The C and C++ toolchain, for linking and for the H.264 encoder.
 if ! command -v cc >/dev/null 2>&1 || ! command -v c++ >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends gcc g++ libc6-dev
 fi
 
-# The browser that tests/reports opens reports in.
+# The browser for tests/reports.
 if ! command -v chromium >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends chromium fonts-dejavu-core
 fi
 
-# The compiler that checks the types of the script of replays.
+# The compiler that checks the types of assets/replay.js.
 if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
     if ! command -v npm >/dev/null 2>&1; then
         sudo=$([ "$(id -u)" = 0 ] || echo sudo)
@@ -36,14 +35,14 @@ if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
     rm -rf target/mdbook/build
 fi
 
-# A driver in software where no graphics driver is installed: tests/viewer fails without one.
+# A software driver if there is no graphics driver, for tests/viewer.
 if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
 fi
 
-# The screen, the hand and the libraries of windows that tests/window needs.
+# Virtual screen, virtual input and window libraries for tests/window.
 if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
@@ -51,7 +50,7 @@ if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; th
         libxkbcommon-x11-0
 fi
 
-# A virtual environment below target/ that can import MODULES, with PACKAGES: environment NAME MODULES PACKAGE...
+# Creates target/NAME with packages, unless it can import MODULES: environment NAME MODULES PACKAGE...
 environment() {
     folder=target/$1
     modules=$2
@@ -66,20 +65,22 @@ environment() {
     mkdir -p target
     python3 -m venv "$folder"
     if ! "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"; then
-        echo "$folder needs $*, which cannot be installed for $(python3 --version) here" >&2
+        echo "$folder: cannot install $* for $(python3 --version)" >&2
         exit 1
     fi
 }
 
-# Ray, for tests/cluster; and what reads hooks, for tests/ci.
+# Ray for tests/cluster, pre-commit and YAML for tests/ci.
 environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
 
-# What builds the Python package, and what tests/python runs it with.
+# Build tool of the Python package, and packages for tests/python.
 environment python 'gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-    gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo pyarrow
+    gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo \
+    pyarrow
 
-# Slurm, of which tests/cluster starts a node of its own.
-if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) >/dev/null; then
+# Slurm for tests/cluster, which starts a node.
+if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) \
+    >/dev/null; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends munge slurmctld slurmd slurm-client

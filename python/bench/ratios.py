@@ -1,7 +1,7 @@
-"""What the package costs beside the library: ``python python/bench/ratios.py``. Build it for release first (``pip install ./python``).
+"""Measures the overhead of the package over the library: ``python python/bench/ratios.py``.
 
-Prints ratios of times that are taken in turn in one process, the best of many each: a machine that others share is slower at
-times, never faster.
+Needs a release build (``pip install ./python``). Prints ratios of times, each the best of many, measured in turn in one
+process. On a shared machine times vary upwards only.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ ROUNDS = 15
 
 
 def took_s(work: Callable[[], object]) -> float:
-    """How long a call takes [s]."""
+    """Returns the duration of a call [s]."""
     began = time.perf_counter()
     work()
     return time.perf_counter() - began
 
 
 def best_s(*works: Callable[[], object]) -> list[float]:
-    """The shortest time of each [s], taken in turn."""
+    """Returns the shortest duration of each call [s], measured in turn."""
     return [min(times) for times in zip(*([took_s(work) for work in works] for _ in range(ROUNDS)))]
 
 
 def show(instants: int, vehicles: int) -> tuple[np.ndarray, np.ndarray]:
-    """Vehicles on a grid 2.5 m apart that waves: t (T,), p (T, N, 3)."""
+    """Returns times (T,) and positions (T, N, 3) of a grid with 2.5 m spacing that waves."""
     t = np.arange(instants) * 0.1
     k = np.arange(vehicles)
     p = np.empty((instants, vehicles, 3))
@@ -41,36 +41,40 @@ def show(instants: int, vehicles: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def audits() -> None:
-    """An audit of (2000, 1000, 3) against the same call in Rust."""
+    """Compares an audit of (2000, 1000, 3) with the same audit in Rust."""
     t, p = show(2000, 1000)
-    ours, judged, with_items = [], [], []
+    python_s, rust_s, with_items_s = [], [], []
     for _ in range(ROUNDS):
-        ours.append(took_s(lambda: tl.audit(t, p, delta=1.5)))
+        python_s.append(took_s(lambda: tl.audit(t, p, delta=1.5)))
         rust = _native.audit_in_rust(t, p, 1.5)
-        judged.append(rust[0])
-        with_items.append(rust[1])
-    print(f"tl.audit (2000, 1000, 3)       {min(ours) * 1e3:8.1f} ms")
-    print(f"  of the Rust call on items    {min(judged) * 1e3:8.1f} ms, ratio {min(ours) / min(judged):.2f}")
-    print(f"  and the making of the items  {min(with_items) * 1e3:8.1f} ms, ratio {min(ours) / min(with_items):.2f}")
+        rust_s.append(rust[0])
+        with_items_s.append(rust[1])
+    best = min(python_s)
+    print(f"tl.audit (2000, 1000, 3)       {best * 1e3:8.1f} ms")
+    print(f"  audit in Rust                {min(rust_s) * 1e3:8.1f} ms, ratio {best / min(rust_s):.2f}")
+    print(f"  with conversion of arrays    {min(with_items_s) * 1e3:8.1f} ms, ratio {best / min(with_items_s):.2f}")
 
 
 class Springs(tl.Law):
-    """The cheapest law that does something."""
+    """A cheap law: damped springs."""
 
     def control(self, obs, out):  # type: ignore[no-untyped-def]
         out[:] = obs.slots_m - obs.positions - 2 * obs.velocities
 
 
 def laws() -> None:
-    """Steps a second of a law in Python at N = 100."""
+    """Compares a law in Python with one in Rust, in steps per second at N = 100."""
     scenario = tl.Scenario("show", set={"time.duration_s": 20})
     steps = scenario.steps
-    own, ours = best_s(lambda: tl.fly(scenario, keep=False), lambda: tl.fly(scenario, law=Springs(), keep=False))
-    print(f"N = {len(scenario)}: a law in Python      {steps / ours:8.0f} steps/s; {scenario.law} in Rust {steps / own:.0f} steps/s")
+    rust_s, python_s = best_s(
+        lambda: tl.fly(scenario, keep=False), lambda: tl.fly(scenario, law=Springs(), keep=False)
+    )
+    print(f"N = {len(scenario)}: a law in Python      {steps / python_s:8.0f} steps/s")
+    print(f"  {scenario.law} in Rust       {steps / rust_s:8.0f} steps/s")
 
 
 def threads() -> None:
-    """Two threads fly two flights, against one that flies both."""
+    """Compares two flights in two threads with two flights in one."""
     scenario = tl.Scenario("pentagon", set={"time.duration_s": 300})
 
     def fly() -> None:
@@ -78,13 +82,13 @@ def threads() -> None:
 
     def side_by_side() -> None:
         both = [threading.Thread(target=fly) for _ in range(2)]
-        for one in both:
-            one.start()
-        for one in both:
-            one.join()
+        for thread in both:
+            thread.start()
+        for thread in both:
+            thread.join()
 
-    after, beside = best_s(lambda: (fly(), fly()), side_by_side)
-    print(f"two threads fly                {after / beside:8.2f} times as fast as one")
+    serial_s, parallel_s = best_s(lambda: (fly(), fly()), side_by_side)
+    print(f"two threads fly                {serial_s / parallel_s:8.2f} times as fast as one")
 
 
 if __name__ == "__main__":

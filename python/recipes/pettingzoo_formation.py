@@ -1,10 +1,8 @@
-"""A PettingZoo ``ParallelEnv`` on :class:`tautline.Simulation`: agents command accelerations and form up without coming too close.
+"""PettingZoo ``ParallelEnv`` on :class:`tautline.Simulation`: agents command accelerations to reach their slots.
 
-    env = FormationEnv("pentagon")
-    observations, infos = env.reset(seed=0)
-    observations, rewards, terminations, truncations, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+Use: `env = FormationEnv("pentagon")`, `env.reset(seed=0)`, then `env.step(actions)` until `env.agents` is empty.
 
-An episode ends for all where the judge finds a violation, at or between steps, and is truncated where the flight ends.
+A violation, at or between steps, terminates the episode of all agents. The end of the flight truncates it.
 """
 
 from __future__ import annotations
@@ -18,19 +16,21 @@ import tautline as tl
 from gymnasium.spaces import Box
 from pettingzoo import ParallelEnv
 
-#: What a violation costs.
+#: Penalty of a violation.
 VIOLATION = 100.0
-#: Start positions are moved by so much along each axis of the plane [m].
+#: Largest random offset of start positions along each axis of the plane [m].
 JITTER_M = 0.1
 
 
 class FormationEnv(ParallelEnv):
-    """Each agent sees its own velocity, the way to its slot and the ways to all others; it commands x and y [m/s^2]."""
+    """An agent observes its velocity and the vectors to its slot and to all others. It commands x and y [m/s^2]."""
 
     metadata = {"name": "tautline_formation_v0"}
 
-    def __init__(self, scenario: str = "pentagon", hz: float = 20.0, most_m_s2: float = 5.0, duration_s: float = 20.0) -> None:
-        self.name, self.hz, self.most_m_s2, self.duration_s = scenario, hz, most_m_s2, duration_s
+    def __init__(
+        self, scenario: str = "pentagon", hz: float = 20.0, max_accel_m_s2: float = 5.0, duration_s: float = 20.0
+    ) -> None:
+        self.name, self.hz, self.max_accel_m_s2, self.duration_s = scenario, hz, max_accel_m_s2, duration_s
         self.possible_agents = [f"vehicle_{number}" for number in range(1, len(tl.Scenario(scenario)) + 1)]
         self.agents: list[str] = []
         self.render_mode = None
@@ -44,7 +44,9 @@ class FormationEnv(ParallelEnv):
     def action_space(self, agent: str) -> Box:
         return Box(-1.0, 1.0, shape=(2,), dtype=np.float32)
 
-    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         if seed is not None:
             self.np_random, _ = gymnasium.utils.seeding.np_random(seed)
         start = {"start.jitter_m": JITTER_M, "start.seed": int(self.np_random.integers(2**31))}
@@ -56,29 +58,30 @@ class FormationEnv(ParallelEnv):
     def step(self, actions: dict[str, Any]) -> tuple[dict[str, Any], ...]:
         u = np.zeros((len(self.possible_agents), 3))
         for number, agent in enumerate(self.possible_agents):
-            u[number, :2] = self.most_m_s2 * np.clip(actions[agent], -1, 1)
+            u[number, :2] = self.max_accel_m_s2 * np.clip(actions[agent], -1, 1)
         self.sim.step(u, steps=self.steps)
         clearance = self.sim.least_clearance_m
         violated = clearance is not None and clearance < 0
-        away = np.linalg.norm(self.sim.scenario.slots_m - self.sim.positions, axis=1)
-        rewards = {agent: -float(away[k]) - VIOLATION * violated for k, agent in enumerate(self.agents)}
+        errors_m = np.linalg.norm(self.sim.scenario.slots_m - self.sim.positions, axis=1)
+        rewards = {agent: -float(errors_m[k]) - VIOLATION * violated for k, agent in enumerate(self.agents)}
         over = self.sim.is_over
-        every = list(self.agents)
+        agents = list(self.agents)
         observations = self._observe()
         if violated or over:
             self.agents = []
-        told = {"separation_m": self.sim.separation_m}
+        info = {"separation_m": self.sim.separation_m}
         return (
             observations,
             rewards,
-            {agent: violated for agent in every},
-            {agent: over and not violated for agent in every},
-            {agent: dict(told) for agent in every},
+            {agent: violated for agent in agents},
+            {agent: over and not violated for agent in agents},
+            {agent: dict(info) for agent in agents},
         )
 
     def _observe(self) -> dict[str, Any]:
         positions, velocities, slots = self.sim.positions, self.sim.velocities, self.sim.scenario.slots_m
-        return {
-            agent: np.concatenate([velocities[k], slots[k] - positions[k], np.delete(positions - positions[k], k, axis=0).ravel()])
-            for k, agent in enumerate(self.possible_agents)
-        }
+        observations = {}
+        for k, agent in enumerate(self.possible_agents):
+            others = np.delete(positions - positions[k], k, axis=0)
+            observations[agent] = np.concatenate([velocities[k], slots[k] - positions[k], others.ravel()])
+        return observations

@@ -1,29 +1,29 @@
-//! Arrays of positions as a recording: borrowed, looked at an instant at a time.
+//! A recording in borrowed arrays, read one instant after the other.
 
 use numpy::ndarray::{ArrayView1, ArrayView3};
 use tautline::read::{Fault, Place, ReadError};
 use tautline::track::{Item, Metadata, Sample, Tracks};
 
-/// Items that are made at a time, about: few enough to stay near the processor.
+/// Approximate number of items of a batch, small enough for the processor's cache.
 const BATCH: usize = 4096;
-/// Vehicles that a note names at most.
+/// Largest number of vehicles that a note names.
 const MOST_NAMED: usize = 8;
-/// Code of the error where a number is infinite or not a number.
+/// Error code of a number that is not finite.
 const NOT_FINITE: &str = "recording/not-finite";
 
-/// Positions, and velocities where there are any, of N vehicles at T instants.
+/// Positions and optional velocities of N vehicles at T instants.
 #[derive(Clone)]
 pub(crate) struct Arrays<'a> {
     /// T times \[s\].
     pub(crate) times_s: ArrayView1<'a, f64>,
-    /// T x N x 3 (or x 2, in the plane z = 0) \[m\]; NaN where a vehicle was not seen.
+    /// T x N x 3, or T x N x 2 in the plane z = 0 \[m\]; NaN where a vehicle was not seen.
     pub(crate) positions_m: ArrayView3<'a, f64>,
-    /// As positions \[m/s\]; NaN where not known.
+    /// Velocities in the shape of the positions \[m/s\]; NaN where unknown.
     pub(crate) velocities_m_s: Option<ArrayView3<'a, f64>>,
-    /// A name for each vehicle.
+    /// Name of each vehicle.
     pub(crate) names: &'a [String],
     metadata: Metadata,
-    /// The next instant.
+    /// Number of the next instant.
     at: usize,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Arrays<'a> {
         Self { times_s, positions_m, velocities_m_s, names, metadata, at: 0 }
     }
 
-    /// The next instant, appended to `items`.
+    /// Appends the samples of the next instant to `items`.
     fn instant(&mut self, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let (k, time_s) = (self.at, self.times_s[self.at]);
         let wrong = |code, place: String, problem: String, remedy: &str| ReadError {
@@ -87,19 +87,19 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// The vector of a vehicle at an instant; what a plane lacks is 0.
+/// Returns the vector of a vehicle at an instant; z is 0 in a plane.
 #[inline]
 fn vector(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> [f64; 3] {
     let z = if of.shape()[2] == 3 { of[(instant, vehicle, 2)] } else { 0.0 };
     [of[(instant, vehicle, 0)], of[(instant, vehicle, 1)], z]
 }
 
-/// Whether it is NaN in every axis.
+/// Whether a vector is NaN in every axis.
 fn is_unseen(of: &ArrayView3<'_, f64>, instant: usize, vehicle: usize) -> bool {
     (0..of.shape()[2]).all(|axis| of[(instant, vehicle, axis)].is_nan())
 }
 
-/// Who is never seen, and who is not there from the first instant to the last, a sentence each.
+/// Returns notes on vehicles that are never seen, or not from the first instant to the last.
 pub(crate) fn notes_of_absence(positions_m: ArrayView3<'_, f64>, names: &[String]) -> Vec<String> {
     let (instants, vehicles) = (positions_m.shape()[0], positions_m.shape()[1]);
     let is_seen = |instant, vehicle| !is_unseen(&positions_m, instant, vehicle);
@@ -112,8 +112,8 @@ pub(crate) fn notes_of_absence(positions_m: ArrayView3<'_, f64>, names: &[String
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         (!who.is_empty()).then(|| format!("{}{more} {what}", shown.join(", ")))
     };
-    let never = note(&never, "are NaN at every instant: nothing is said of them");
-    let there = note(&there, "are not seen from the first instant to the last: they are judged while they are there");
+    let never = note(&never, "are NaN at every instant and are not audited");
+    let there = note(&there, "are not seen from the first instant to the last; they are audited while present");
     never.into_iter().chain(there).collect()
 }
 

@@ -1,4 +1,4 @@
-//! Audits of arrays and of files.
+//! Audits of arrays and files.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -13,31 +13,31 @@ use tautline::request::{self, Failure, Monitor as _, OwnRecording, Silent, Subje
 use tautline::track::Tracks as _;
 
 use crate::arrays::{Arrays, notes_of_absence};
-use crate::errors::{Raised as _, broken, wrong};
-use crate::numbers::{borrowed, shown};
+use crate::errors::{IntoException as _, internal_error, wrong_input};
+use crate::numbers::{borrowed, shape_text};
 use crate::request::{Question, ReadOptions};
-use crate::work::away;
+use crate::work::run_in_thread;
 
-/// The verdict in words, the headline, the summary, and the report as JSON.
+/// Verdict in words, headline, summary, and report as JSON.
 type Judged = (String, String, String, String);
 
 fn judged(report: &RecordedReport) -> PyResult<Judged> {
-    let json = serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?;
+    let json = serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?;
     Ok((report.verdict(), report.headline(), report.text(), json))
 }
 
-/// Limits, obstacles and audit of a flight, as its recording holds them.
+/// Limits, obstacles and audit of a flight, as in its recording.
 #[pyclass(frozen, module = "tautline._native")]
-pub(crate) struct Seen(pub(crate) OwnRecording);
+pub(crate) struct FlightFindings(pub(crate) OwnRecording);
 
-/// The arrays that are judged.
-struct Given<'py> {
+/// Arrays of an audit.
+struct AuditArrays<'py> {
     times: PyReadonlyArray1<'py, f64>,
     positions: PyReadonlyArray3<'py, f64>,
     velocities: Option<PyReadonlyArray3<'py, f64>>,
 }
 
-impl<'py> Given<'py> {
+impl<'py> AuditArrays<'py> {
     fn new(
         times: &Bound<'py, PyAny>,
         positions: &Bound<'py, PyAny>,
@@ -55,26 +55,33 @@ impl<'py> Given<'py> {
     fn check(&self) -> PyResult<()> {
         let (instants, shape) = (self.times.len(), self.positions.shape());
         if !matches!(shape[2], 2 | 3) {
-            let shape = shown(shape);
-            return Err(wrong(format!("positions: the last axis is x, y and z, or x and y; the shape is {shape}")));
+            let shape = shape_text(shape);
+            return Err(wrong_input(format!(
+                "positions: the last axis is x, y and z, or x and y; the shape is {shape}"
+            )));
         }
         if shape[0] != instants {
             let help = if shape[1] == instants { "; the first axis is time: give .swapaxes(0, 1)" } else { "" };
-            return Err(wrong(format!("positions: they are of shape {} for {instants} times{help}", shown(shape))));
+            return Err(wrong_input(format!(
+                "positions: they are of shape {} for {instants} times{help}",
+                shape_text(shape)
+            )));
         }
         if let Some(velocities) = self.velocities.as_ref().filter(|of| of.shape() != shape) {
-            let (found, expected) = (shown(velocities.shape()), shown(shape));
-            return Err(wrong(format!("velocities: they are of shape {found}, and positions of shape {expected}")));
+            let (found, expected) = (shape_text(velocities.shape()), shape_text(shape));
+            return Err(wrong_input(format!(
+                "velocities: they are of shape {found}, and positions of shape {expected}"
+            )));
         }
         if self.positions.len() == 0 {
-            let shape = shown(shape);
-            return Err(wrong(format!("positions: they are of shape {shape}, which holds nothing to judge")));
+            let shape = shape_text(shape);
+            return Err(wrong_input(format!("positions: they are of shape {shape}, which holds nothing to judge")));
         }
         Ok(())
     }
 }
 
-/// Judges a recording; several paths are one, with a vehicle in each. A page is written where `html` names one.
+/// Audits a recording, in one file or in a file for each vehicle. Writes a page to `html`, if given.
 #[pyfunction]
 pub(crate) fn audit_files(
     py: Python<'_>,
@@ -87,13 +94,13 @@ pub(crate) fn audit_files(
     let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
     let request = question.request(subject, command, html);
-    let audited = away(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
-    judged(&audited.map_err(Failure::raised)?.report)
+    let audited = run_in_thread(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
+    judged(&audited.map_err(Failure::into_exception)?.report)
 }
 
-/// Judges arrays of positions.
+/// Audits arrays of positions. Writes a page to `html`, if given.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn audit_arrays<'py>(
     py: Python<'py>,
     question: &Question,
@@ -102,12 +109,12 @@ pub(crate) fn audit_arrays<'py>(
     positions: &Bound<'py, PyAny>,
     velocities: Option<&Bound<'py, PyAny>>,
     names: Vec<String>,
-    seen: Option<&Seen>,
+    findings: Option<&FlightFindings>,
     html: Option<PathBuf>,
 ) -> PyResult<Judged> {
-    let given = Given::new(times, positions, velocities)?;
+    let given = AuditArrays::new(times, positions, velocities)?;
     if names.len() != given.positions.shape()[1] {
-        return Err(wrong(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));
+        return Err(wrong_input(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));
     }
     let (times, positions) = (given.times.as_array(), given.positions.as_array());
     let velocities = given.velocities.as_ref().map(PyReadonlyArray3::as_array);
@@ -116,35 +123,36 @@ pub(crate) fn audit_arrays<'py>(
         .then(|| "positions have two axes and no height: the recording is judged in the plane of x and y".to_owned());
     let notes: Vec<String> = plane.into_iter().chain(notes_of_absence(positions, &names)).collect();
     let arrays = Arrays::new(times, positions, velocities, &names, &notes);
-    let own = seen.map(|seen| &seen.0);
+    let own = findings.map(|findings| &findings.0);
     let monitor = Silent::default();
     let work = || {
         let open: &Open<'_> = &|| Ok(Box::new(arrays.clone()));
         let subject = Subject::Held { name: "arrays", own, open };
         request::audit_files(&question.request(subject, command, html), &monitor)
     };
-    let audited = away(py, monitor.interruption(), work)?;
-    judged(&audited.map_err(Failure::raised)?.report)
+    let audited = run_in_thread(py, monitor.interruption(), work)?;
+    judged(&audited.map_err(Failure::into_exception)?.report)
 }
 
-/// How long the library takes in Rust \[s\] to judge the same positions, at first as items that it made before, then with the
-/// time to make them: what `bench/ratios.py` compares `audit` with.
+/// Measures an audit in Rust \[s\], without and with the conversion of the arrays into items.
+///
+/// `bench/ratios.py` compares `audit` with it.
 #[pyfunction]
 pub(crate) fn audit_in_rust(
     times: &Bound<'_, PyAny>,
     positions: &Bound<'_, PyAny>,
     delta_m: f64,
 ) -> PyResult<(f64, f64)> {
-    let given = Given::new(times, positions, None)?;
+    let given = AuditArrays::new(times, positions, None)?;
     let names: Vec<_> = (1..=given.positions.shape()[1]).map(|number| number.to_string()).collect();
     let began = Instant::now();
     let mut items = Vec::with_capacity(given.positions.len() / 3);
     let mut arrays = Arrays::new(given.times.as_array(), given.positions.as_array(), None, &names, &[]);
-    while arrays.read(&mut items).map_err(|error| wrong(error.to_string()))? {}
+    while arrays.read(&mut items).map_err(|error| wrong_input(error.to_string()))? {}
     let made_s = began.elapsed().as_secs_f64();
     let began = Instant::now();
     let outcome =
-        recorded::audit(&names, &items, Settings::delta(delta_m)).map_err(|error| wrong(error.to_string()))?;
+        recorded::audit(&names, &items, Settings::delta(delta_m)).map_err(|error| wrong_input(error.to_string()))?;
     let judged_s = began.elapsed().as_secs_f64();
     drop(outcome);
     Ok((judged_s, made_s + judged_s))

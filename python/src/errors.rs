@@ -1,4 +1,4 @@
-//! Errors of the library as exceptions.
+//! Converts errors of the library into exceptions.
 
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
@@ -12,62 +12,62 @@ create_exception!(
     tautline,
     Error,
     PyValueError,
-    "The input is wrong: the message names the place, the value and the remedy, as the command line does."
+    "Wrong input. The message has the place, the problem, the value and the remedy."
 );
 
-/// The input is wrong.
-pub(crate) fn wrong(message: impl Into<String>) -> PyErr {
+/// Returns an exception for wrong input.
+pub(crate) fn wrong_input(message: impl Into<String>) -> PyErr {
     Error::new_err(message.into())
 }
 
-/// Something is not of the type that it must be.
+/// Returns an exception for an argument of a wrong type.
 pub(crate) fn wrong_type(message: impl Into<String>) -> PyErr {
     PyTypeError::new_err(message.into())
 }
 
-/// The library broke a promise.
-pub(crate) fn broken(what: &str) -> PyErr {
-    PyRuntimeError::new_err(format!("tautline failed inside, please report it: {what}"))
+/// Returns an exception for an internal error.
+pub(crate) fn internal_error(what: &str) -> PyErr {
+    PyRuntimeError::new_err(format!("internal error of tautline: {what}; please report it"))
 }
 
-/// The library's errors, which another crate's exceptions cannot be made of by `From`.
-pub(crate) trait Raised {
-    /// The exception that says the same.
-    fn raised(self) -> PyErr;
+/// Conversion into an exception: orphan rules forbid `From` for types of two other crates.
+pub(crate) trait IntoException {
+    /// Returns the exception with the message of the error.
+    fn into_exception(self) -> PyErr;
 }
 
-impl Raised for Failure {
-    fn raised(self) -> PyErr {
+impl IntoException for Failure {
+    fn into_exception(self) -> PyErr {
         let text = self.to_string();
-        coded(if self.is_machine() { PyOSError::new_err(text) } else { wrong(text) }, self.code())
+        with_code(if self.is_machine() { PyOSError::new_err(text) } else { wrong_input(text) }, self.code())
     }
 }
 
-/// The input is wrong, with a code.
-pub(crate) fn wrong_by(code: &str, message: impl Into<String>) -> PyErr {
-    coded(wrong(message), code)
+/// Returns an exception for wrong input with a code.
+pub(crate) fn wrong_input_with_code(code: &str, message: impl Into<String>) -> PyErr {
+    with_code(wrong_input(message), code)
 }
 
-/// The exception with the stable name of the problem as its attribute `code`.
-fn coded(error: PyErr, code: &str) -> PyErr {
-    // Without the attribute the exception says the same in words.
+/// Sets the attribute `code` of an exception to the stable code of the problem.
+fn with_code(error: PyErr, code: &str) -> PyErr {
+    // A failure to set it is ignored: the message is complete without it.
     Python::attach(|py| error.value(py).setattr("code", code).ok());
     error
 }
 
-impl Raised for ScenarioError {
-    fn raised(self) -> PyErr {
-        coded(wrong(self.to_string()), self.code())
+impl IntoException for ScenarioError {
+    fn into_exception(self) -> PyErr {
+        with_code(wrong_input(self.to_string()), self.code())
     }
 }
 
-impl Raised for SimError {
-    fn raised(self) -> PyErr {
-        Failure::from(self).raised()
+impl IntoException for SimError {
+    fn into_exception(self) -> PyErr {
+        Failure::from(self).into_exception()
     }
 }
 
-/// What is known before the first step, as JSON.
+/// Returns a check as JSON.
 pub(crate) fn json(answer: &Preflight) -> PyResult<String> {
-    serde_json::to_string(answer).map_err(|error| broken(&error.to_string()))
+    serde_json::to_string(answer).map_err(|error| internal_error(&error.to_string()))
 }

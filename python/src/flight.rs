@@ -1,4 +1,4 @@
-//! Whole flights.
+//! Flights from start to end.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -15,14 +15,14 @@ use tautline::request::{OwnRecording, flight_page, run_audit};
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Ending, Parts, SimError};
 
-use crate::audit::Seen;
-use crate::errors::{Raised as _, broken, wrong};
-use crate::law::{PythonLaw, catching};
+use crate::audit::FlightFindings;
+use crate::errors::{IntoException as _, internal_error, wrong_input};
+use crate::law::{PythonLaw, catch_exception};
 use crate::numbers::{by_row, cube};
 use crate::scenario::Scenario;
-use crate::work::{Signals, here};
+use crate::work::{Signals, run_detached};
 
-/// The samples of a flight, in memory.
+/// Samples of a flight in memory.
 #[derive(Default)]
 struct Samples {
     is_kept: bool,
@@ -32,7 +32,7 @@ struct Samples {
     velocities_m_s: Vec<f64>,
     commands_m_s2: Vec<f64>,
     separations_m: Vec<f64>,
-    /// The law that was flown, where it is not the scenario's.
+    /// Name of the law, if it differs from the scenario's.
     other_law: Option<String>,
     /// Reason of an early end.
     ended_early: Option<String>,
@@ -47,7 +47,7 @@ impl Sink for Samples {
         self.positions_m.extend(by_row(&sample.swarm.positions_m));
         self.velocities_m_s.extend(by_row(&sample.swarm.velocities_m_s));
         self.commands_m_s2.extend(by_row(sample.control));
-        // There is no command where the law had none.
+        // The law failed: the missing commands are NaN.
         self.commands_m_s2.resize(self.positions_m.len(), f64::NAN);
         self.separations_m.push(sample.separation.map_or(f64::NAN, |closest| closest.separation_m));
         Ok(())
@@ -67,9 +67,9 @@ impl Sink for Samples {
     }
 }
 
-/// What a flight gives back: its report in words and as JSON, and its samples.
+/// Result of a flight: its report in words and as JSON, and its samples.
 #[pyclass(frozen, get_all, module = "tautline._native")]
-pub(crate) struct Flown {
+pub(crate) struct FlightData {
     passed: bool,
     headline: String,
     text: String,
@@ -79,35 +79,35 @@ pub(crate) struct Flown {
     velocities: Py<PyArray3<f64>>,
     commands: Py<PyArray3<f64>>,
     separations_m: Py<PyArray1<f64>>,
-    seen: Py<Seen>,
+    findings: Py<FlightFindings>,
 }
 
-impl Flown {
+impl FlightData {
     fn new(py: Python<'_>, report: &Report, samples: Samples, own: OwnRecording) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
             passed: report.verdict.pass,
             headline: report.headline(),
             text: report.text(),
-            report: serde_json::to_string(report).map_err(|error| broken(&error.to_string()))?,
+            report: serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?,
             t: PyArray1::from_vec(py, samples.times_s).unbind(),
             positions: cube(py, samples.positions_m, shape)?.unbind(),
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            seen: Py::new(py, Seen(own))?,
+            findings: Py::new(py, FlightFindings(own))?,
         })
     }
 }
 
-/// Where what is recorded goes beside memory.
+/// Recording and page of a flight.
 #[derive(Default)]
-struct Beside {
+struct OutputFiles {
     recording: Option<McapRecorder>,
     page: Option<FlightLog>,
 }
 
-impl Sink for Beside {
+impl Sink for OutputFiles {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.recording.as_mut().map_or(Ok(()), |recording| recording.sample(sample))?;
         self.page.as_mut().map_or(Ok(()), |page| page.sample(sample))
@@ -123,7 +123,7 @@ impl Sink for Beside {
     }
 }
 
-/// Flies a scenario to its end, under a law in Python where one is given.
+/// Flies a scenario to its end, under a law in Python if given.
 #[pyfunction]
 #[pyo3(signature = (scenario, law, record, html, command, keep))]
 pub(crate) fn fly(
@@ -134,7 +134,7 @@ pub(crate) fn fly(
     html: Option<PathBuf>,
     command: &str,
     keep: bool,
-) -> PyResult<Flown> {
+) -> PyResult<FlightData> {
     let scenario = &scenario.scenario;
     let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
     let is_of_python = law.is_some();
@@ -154,10 +154,10 @@ pub(crate) fn fly(
             McapRecorder::create(path, &header)
         });
         let page = html.is_some().then(|| FlightLog::of(scenario));
-        let mut sinks = (samples, Beside { recording: recording.transpose()?, page });
+        let mut sinks = (samples, OutputFiles { recording: recording.transpose()?, page });
         let mut carry_on = |_| if signals.are_silent() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
         let flown = run_with(scenario, &preflight, parts, &mut sinks, &mut carry_on);
-        let (samples, Beside { recording, page }) = sinks;
+        let (samples, OutputFiles { recording, page }) = sinks;
         let closed = recording.map_or(Ok(()), |recording| match &flown {
             Ok((report, _)) => recording.close(run_audit(scenario, report)),
             Err(_) => recording.finish(),
@@ -167,18 +167,18 @@ pub(crate) fn fly(
         let page = page.map(|log| flight_page(scenario, &preflight, log, &report, command));
         Ok((report, ending, samples, page))
     };
-    let (flown, raised) = here(py, || catching(flight))?;
+    let (flown, raised) = run_detached(py, || catch_exception(flight))?;
     if let Some(raised) = signals.raised.or(raised) {
         return Err(raised);
     }
-    let (report, ending, samples, page) = flown.map_err(SimError::raised)?;
+    let (report, ending, samples, page) = flown.map_err(SimError::into_exception)?;
     if let (Ending::BrokeDown(why @ Breakdown::CommandNotFinite { .. }), true) = (&ending, is_of_python) {
-        return Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")));
+        return Err(wrong_input(format!("{why} (elements of `out` that `control` does not write are NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
     let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone(), samples.ended_early.clone());
-    Flown::new(py, &report, samples, own)
+    FlightData::new(py, &report, samples, own)
 }

@@ -1,4 +1,4 @@
-//! Laws that are written in Python.
+//! Control laws in Python.
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use tautline::observation;
 use tautline::scenario::Scenario;
 use tautline::swarm::Rows;
 
-use crate::errors::{wrong, wrong_type};
-use crate::numbers::{borrowed, shown};
+use crate::errors::{wrong_input, wrong_type};
+use crate::numbers::{borrowed, shape_text};
 use crate::observation::Observation;
 
-/// A law whose answers come from an object's method `control(obs, out)`.
+/// A law that calls the method `control(obs, out)` of an object.
 ///
-/// Clones ask the same object: what it remembers is its own, and no simulation saves it.
+/// Clones share the object: its state belongs to no simulation and is not saved.
 #[derive(Clone)]
 pub(crate) struct PythonLaw {
     name: String,
@@ -28,22 +28,22 @@ pub(crate) struct PythonLaw {
 }
 
 thread_local! {
-    /// Exception of a law in the innermost [`catching`] of this thread.
+    /// Exception of a law within the innermost [`catch_exception`] of this thread.
     static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
 }
 
-/// Does work that may ask laws, in this thread, and returns the exception that one of them raised beside what was done.
+/// Runs work that calls laws on this thread. Returns its result and the exception that a law raised.
 ///
-/// The law runs on the calling thread ([`Capabilities::requires_calling_thread`]), so an exception belongs to the work of its own thread, and no
-/// other simulation finds it. Calls may lie within each other: a law may step another simulation.
-pub(crate) fn catching<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
+/// A law runs on the calling thread ([`Capabilities::requires_calling_thread`]), so its exception cannot reach another
+/// simulation. Calls may be nested, because a law may step another simulation.
+pub(crate) fn catch_exception<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>) {
     let outer = RAISED.take();
     let done = work();
     (done, RAISED.replace(outer))
 }
 
 impl PythonLaw {
-    /// The law of an object that has a method `control`, and may have `name`, `sensing_range_m` and `reaches`.
+    /// Wraps an object with a method `control` and optional attributes `name`, `sensing_range_m` and `reaches`.
     pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
         let py = object.py();
         let control = object.getattr_opt(intern!(py, "control"))?.filter(PyAnyMethods::is_callable);
@@ -59,11 +59,15 @@ impl PythonLaw {
             None => object.get_type().qualname()?.to_string(),
         };
         if scenario.law().is_ok_and(|own| own.name() == name) {
-            return Err(wrong(format!("law: `{name}` is the name of the scenario's own law; give it another `name`")));
+            return Err(wrong_input(format!(
+                "law: `{name}` is the name of the scenario's own law; give it another `name`"
+            )));
         }
         let sensing_range_m = given("sensing_range_m")?.map(|range| range.extract::<f64>()).transpose()?;
         if let Some(range_m) = sensing_range_m.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0)) {
-            return Err(wrong(format!("law: sensing_range_m is {range_m}; it must be a positive number of metres")));
+            return Err(wrong_input(format!(
+                "law: sensing_range_m is {range_m}; it must be a positive number of metres"
+            )));
         }
         let controls = match given("reaches")?.map(|reaches| reaches.extract::<String>()).transpose()?.as_deref() {
             None | Some("displacements") => Controls::Displacements,
@@ -71,13 +75,13 @@ impl PythonLaw {
             Some("places") => Controls::Places,
             Some(other) => {
                 let message = format!("law: reaches is `{other}`; it is `places`, `displacements` or `distances`");
-                return Err(wrong(message));
+                return Err(wrong_input(message));
             }
         };
         Ok(Self { name, sensing_range_m, controls, control: Arc::new(control.unbind()) })
     }
 
-    fn ask(&self, py: Python<'_>, at: &observation::Observation<'_>, command: &mut Rows) -> PyResult<()> {
+    fn call(&self, py: Python<'_>, at: &observation::Observation<'_>, command: &mut Rows) -> PyResult<()> {
         let count = at.own.count();
         let out = PyArray1::from_vec(py, vec![f64::NAN; 3 * count]).reshape([count, 3])?;
         let seen = Observation::new(py, at, self.sensing_range_m.is_some())?;
@@ -88,7 +92,10 @@ impl PythonLaw {
         }
         let written = borrowed::<Ix2>(out.as_any(), "out", "(N, 3)")?;
         if written.shape() != [count, 3] {
-            return Err(wrong(format!("out: it was made an array of shape {}", shown(written.shape()))));
+            return Err(wrong_input(format!(
+                "out: must keep its shape ({count}, 3), got {}",
+                shape_text(written.shape())
+            )));
         }
         let written = written.as_array();
         command.iter_mut().enumerate().for_each(|(k, x)| *x = written[(k % count, k / count)]);
@@ -102,7 +109,7 @@ impl Law for PythonLaw {
     }
 
     fn command(&mut self, at: &observation::Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        Python::attach(|py| self.ask(py, at, command)).map_err(|raised| {
+        Python::attach(|py| self.call(py, at, command)).map_err(|raised| {
             RAISED.set(Some(raised));
             LawError::Failed
         })

@@ -1,10 +1,9 @@
-//! The native half of the Python package: arrays in and out, calls without the interpreter's lock, laws that are asked in
-//! Python. What a user sees is in `tautline/*.py`.
+//! The native module of the Python package: converts arrays, releases the interpreter's lock, and calls laws in Python.
 //!
-//! Nothing here judges, flies or reads: `tautline` does, and this crate translates.
+//! `tautline/*.py` is the public interface. The crate `tautline` audits, flies and reads; this crate only translates.
 
-#![allow(rustdoc::broken_intra_doc_links, reason = "a comment is a docstring of Python, where [m] is a unit")]
-#![expect(clippy::needless_pass_by_value, reason = "Python gives what it hands over")]
+#![allow(rustdoc::broken_intra_doc_links, reason = "comments are docstrings of Python, where [m] is a unit")]
+#![expect(clippy::needless_pass_by_value, reason = "Python passes arguments by value")]
 
 mod arrays;
 mod audit;
@@ -23,15 +22,15 @@ mod work;
 
 use pyo3::prelude::*;
 
-/// What `tautline/*.py` is built on.
+/// Native module of `tautline/*.py`.
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::audit::{Seen, audit_arrays, audit_files, audit_in_rust};
+    use super::audit::{FlightFindings, audit_arrays, audit_files, audit_in_rust};
     #[pymodule_export]
     use super::errors::Error;
     #[pymodule_export]
-    use super::flight::{Flown, fly};
+    use super::flight::{FlightData, fly};
     #[pymodule_export]
     use super::observation::Observation;
     #[pymodule_export]
@@ -47,12 +46,12 @@ mod _native {
     #[pymodule_export]
     use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
 
-    /// A campaign knows by this file what flew it, and not by the interpreter's.
+    /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyAnyMethods as _;
-        crate::work::at_home();
-        // Errors of Python's own checks have no code.
+        crate::work::remember_process();
+        // Errors that are raised in Python have no code.
         module.getattr("Error")?.setattr("code", module.py().None())?;
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;
         tautline::campaign::Program::is_in(origin);

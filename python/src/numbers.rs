@@ -1,4 +1,4 @@
-//! Arrays of `NumPy` as numbers of ours, and back.
+//! Converts arrays of `NumPy` into tables, and back.
 
 use numpy::ndarray::{ArrayView2, Dimension};
 use numpy::{
@@ -8,11 +8,12 @@ use numpy::{
 use pyo3::prelude::*;
 use tautline::swarm::Rows;
 
-use crate::errors::{wrong, wrong_type};
+use crate::errors::{wrong_input, wrong_type};
 
-/// Borrows an array of doubles with these axes, such as `(T, N, 3)`, whatever its order in memory.
+/// Borrows an array of doubles with these axes, such as `(T, N, 3)`, in any memory order.
 ///
-/// What is no array of doubles is a `TypeError`, another number of axes an `Error`.
+/// # Errors
+/// `TypeError` for anything but an array of doubles, `Error` for another number of axes.
 pub(crate) fn borrowed<'py, D: Dimension>(
     given: &Bound<'py, PyAny>,
     what: &str,
@@ -25,9 +26,7 @@ pub(crate) fn borrowed<'py, D: Dimension>(
         )));
     };
     if given.hasattr("mask")? {
-        return Err(wrong_type(format!(
-            "{what}: a masked array says nothing of what it hides; give it as .filled(numpy.nan)"
-        )));
+        return Err(wrong_type(format!("{what}: a masked array has unknown numbers; give it as .filled(numpy.nan)")));
     }
     if !array.dtype().is_equiv_to(&dtype::<f64>(given.py())) {
         let kind = array.dtype();
@@ -36,45 +35,45 @@ pub(crate) fn borrowed<'py, D: Dimension>(
         )));
     }
     let Ok(array) = given.cast::<PyArray<f64, D>>() else {
-        let shape = shown(array.shape());
-        return Err(wrong(format!("{what}: an array of shape {axes} is needed, not of shape {shape}")));
+        let shape = shape_text(array.shape());
+        return Err(wrong_input(format!("{what}: an array of shape {axes} is needed, not of shape {shape}")));
     };
     if !array.is_aligned() {
         return Err(wrong_type(format!(
             "{what}: its numbers are not aligned in memory; give a copy, numpy.array(...)"
         )));
     }
-    array.try_readonly().map_err(|error| wrong(format!("{what}: {error}; give a copy")))
+    array.try_readonly().map_err(|error| wrong_input(format!("{what}: {error}; give a copy")))
 }
 
-/// A shape as Python shows it.
-pub(crate) fn shown(shape: &[usize]) -> String {
+/// Returns a shape as Python shows it.
+pub(crate) fn shape_text(shape: &[usize]) -> String {
     let lengths: Vec<_> = shape.iter().map(ToString::to_string).collect();
     if lengths.len() == 1 { format!("({},)", lengths[0]) } else { format!("({})", lengths.join(", ")) }
 }
 
-/// N x 3 numbers of an array of N x 2, whose third column is 0, or of N x 3.
+/// Returns the rows of an array N x 3 or N x 2; the third column of the latter is 0.
 pub(crate) fn to_rows(array: ArrayView2<'_, f64>) -> Rows {
     Rows::from_fn(array.nrows(), |i, axis| array.get((i, axis)).copied().unwrap_or(0.0))
 }
 
-/// The rows of a table, one after the other.
+/// Returns the numbers of a table row by row.
 pub(crate) fn by_row(rows: &Rows) -> impl Iterator<Item = f64> + '_ {
     (0..rows.nrows()).flat_map(move |i| (0..3).map(move |axis| rows[(i, axis)]))
 }
 
-/// A table as an array of N x 3.
+/// Returns a table as an array N x 3.
 pub(crate) fn table<'py>(py: Python<'py>, rows: &Rows) -> PyResult<Bound<'py, PyArray2<f64>>> {
     vectors(py, by_row(rows).collect())
 }
 
-/// Vectors one after the other as an array of M x 3.
+/// Returns consecutive vectors as an array M x 3.
 pub(crate) fn vectors(py: Python<'_>, numbers: Vec<f64>) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let count = numbers.len() / 3;
     PyArray1::from_vec(py, numbers).reshape([count, 3])
 }
 
-/// Numbers one after the other as an array of three axes.
+/// Returns consecutive numbers as an array with three axes.
 pub(crate) fn cube<T: Element>(py: Python<'_>, numbers: Vec<T>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<T>>> {
     PyArray1::from_vec(py, numbers).reshape(shape)
 }

@@ -1,4 +1,4 @@
-//! What a law in Python is told.
+//! Observations of laws in Python.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
@@ -6,36 +6,36 @@ use tautline::observation::{self, Neighbour, Others};
 
 use crate::numbers::{cube, table, vectors};
 
-/// What a law is told at one instant; the arrays are its own and may be kept.
+/// Observation of a law at an instant. The arrays are copies, which the law may keep.
 #[pyclass(frozen, get_all, module = "tautline")]
 pub(crate) struct Observation {
     /// Time of the flight [s].
     t: f64,
-    /// (N, 3) positions [m]: row i is what vehicle i knows of itself.
+    /// (N, 3) positions [m]; row i is the own position that vehicle i measures.
     positions: Py<PyArray2<f64>>,
     /// (N, 3) velocities [m/s].
     velocities: Py<PyArray2<f64>>,
-    /// (N, 3) where the vehicles shall be now [m]: the slots of the leg, carried along with the reference.
+    /// (N, 3) slots of the leg [m], moved with the reference.
     slots_m: Py<PyArray2<f64>>,
-    /// The leg, from 0.
+    /// Number of the leg, from 0.
     leg: usize,
     /// (3,) velocity of the reference [m/s].
     reference_velocity_m_s: (f64, f64, f64),
     /// (3,) acceleration of the reference [m/s^2].
     reference_acceleration_m_s2: (f64, f64, f64),
-    /// (K, 2) pairs i < j of vehicles that are near each other; none unless the law has a sensing range.
+    /// (K, 2) pairs i < j, from 0, within the sensing range of the law; empty without a range.
     near: Py<PyArray2<i64>>,
-    /// Whether all know of each other what each knows of itself, `positions` and `velocities`; what follows is None then.
+    /// Whether every vehicle knows all `positions` and `velocities`; the arrays below are then None.
     shared: bool,
-    /// (N, N, 3) positions [m]: row j of page i is what vehicle i last heard of vehicle j.
+    /// (N, N, 3) positions [m]; `[i, j]` is the last position of vehicle j that vehicle i received.
     heard_positions: Option<Py<PyArray3<f64>>>,
-    /// (N, N, 3) velocities [m/s], in the same way.
+    /// (N, N, 3) velocities [m/s], with the same indices.
     heard_velocities: Option<Py<PyArray3<f64>>>,
-    /// (N, N) how old that is [s].
+    /// (N, N) ages of these positions and velocities [s].
     heard_ages_s: Option<Py<PyArray2<f64>>>,
-    /// (N, N, 3) positions [m] that vehicle i sees of vehicle j with its own sensor, where the law has a sensing range.
+    /// (N, N, 3) positions [m] of vehicle j from a sensor of vehicle i; None without a sensing range.
     seen_positions: Option<Py<PyArray3<f64>>>,
-    /// (N, N, 3) velocities [m/s], in the same way.
+    /// (N, N, 3) velocities [m/s], with the same indices.
     seen_velocities: Option<Py<PyArray3<f64>>>,
 }
 
@@ -48,10 +48,10 @@ impl Observation {
         let pairs = at.near.iter().flat_map(|&(i, j)| [i64::try_from(i), i64::try_from(j)]);
         let near = PyArray1::from_vec(py, pairs.map(|index| index.unwrap_or(i64::MAX)).collect());
         let shared = matches!(at.others, Others::Shared);
-        let heard = (!shared).then(|| Pictures::of(py, at, |i, j| at.heard(i, j))).transpose()?;
-        let seen = (!shared && sees).then(|| Pictures::of(py, at, |i, j| at.seen(i, j))).transpose()?;
-        let (heard_positions, heard_velocities, heard_ages_s) = Pictures::apart(heard);
-        let (seen_positions, seen_velocities, _) = Pictures::apart(seen);
+        let heard = (!shared).then(|| NeighbourTables::of(py, at, |i, j| at.heard(i, j))).transpose()?;
+        let seen = (!shared && sees).then(|| NeighbourTables::of(py, at, |i, j| at.seen(i, j))).transpose()?;
+        let (heard_positions, heard_velocities, heard_ages_s) = NeighbourTables::split(heard);
+        let (seen_positions, seen_velocities, _) = NeighbourTables::split(seen);
         Ok(Self {
             t: at.time_s,
             positions: table(py, &at.own.positions_m)?.unbind(),
@@ -71,16 +71,16 @@ impl Observation {
     }
 }
 
-/// What each vehicle knows of each other.
-struct Pictures {
+/// Knowledge of each vehicle about each other vehicle.
+struct NeighbourTables {
     positions: Py<PyArray3<f64>>,
     velocities: Py<PyArray3<f64>>,
     ages_s: Py<PyArray2<f64>>,
 }
 
-type Apart = (Option<Py<PyArray3<f64>>>, Option<Py<PyArray3<f64>>>, Option<Py<PyArray2<f64>>>);
+type SplitTables = (Option<Py<PyArray3<f64>>>, Option<Py<PyArray3<f64>>>, Option<Py<PyArray2<f64>>>);
 
-impl Pictures {
+impl NeighbourTables {
     fn of(
         py: Python<'_>,
         at: &observation::Observation<'_>,
@@ -102,15 +102,15 @@ impl Pictures {
         })
     }
 
-    fn apart(pictures: Option<Self>) -> Apart {
-        match pictures {
+    fn split(tables: Option<Self>) -> SplitTables {
+        match tables {
             Some(Self { positions, velocities, ages_s }) => (Some(positions), Some(velocities), Some(ages_s)),
             None => (None, None, None),
         }
     }
 }
 
-/// What a vehicle knows of itself.
+/// Returns the own state of a vehicle.
 fn own(at: &observation::Observation<'_>, i: usize) -> Neighbour {
     let row = tautline::swarm::row;
     Neighbour { position_m: row(&at.own.positions_m, i), velocity_m_s: row(&at.own.velocities_m_s, i), age_s: 0.0 }

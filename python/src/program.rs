@@ -1,15 +1,14 @@
-//! The command line as a process of it would be.
+//! The command line.
 
 use std::ffi::OsString;
 
 use pyo3::prelude::*;
 use tautline::cli;
 
-use crate::work::here;
+use crate::work::run_detached;
 
-/// Runs the program with these arguments, the first of which is its own name, as a process of it would, and gives its exit
-/// code.
+/// Runs the program and returns its exit code. The first argument is the program's name.
 #[pyfunction]
 pub(crate) fn main(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
-    here(py, || cli::entry(&arguments))
+    run_detached(py, || cli::entry(&arguments))
 }

@@ -10,39 +10,39 @@ use tautline::read::ReadError;
 use tautline::request::{Failure, audit};
 use tautline::track::{Item, Piece, Sample};
 
-use crate::errors::{Raised as _, wrong};
+use crate::errors::{IntoException as _, wrong_input};
 use crate::numbers::{cube, vectors};
 use crate::request::ReadOptions;
-use crate::work::away;
+use crate::work::run_in_thread;
 
-/// A recording in memory: M samples and K pieces of curves, each in order of time.
+/// A recording in memory: M samples and K pieces of curves, both in order of time.
 #[pyclass(frozen, get_all, module = "tautline._native")]
 pub(crate) struct Columns {
     vehicles: Vec<String>,
     notes: Vec<String>,
-    /// Whether some height is not known: z is 0 then, and means nothing.
+    /// Whether the height of a vehicle is unknown; z is then 0 and has no meaning.
     planar: bool,
     unit: String,
     epoch_ns: i64,
-    /// (M,) which vehicle, from 0.
+    /// (M,) vehicle, from 0.
     vehicle: Py<PyArray1<i64>>,
-    /// (M,) when [s].
+    /// (M,) time [s].
     t: Py<PyArray1<f64>>,
-    /// (M, 3) where [m].
+    /// (M, 3) position [m].
     position: Py<PyArray2<f64>>,
-    /// (M, 3) how fast [m/s]; NaN where that is not known.
+    /// (M, 3) velocity [m/s]; NaN where unknown.
     velocity: Py<PyArray2<f64>>,
-    /// (M,) how large [m]; NaN where that is not known.
+    /// (M,) radius [m]; NaN where unknown.
     radius: Py<PyArray1<f64>>,
-    /// (K,) whose piece, from 0.
+    /// (K,) vehicle of the piece, from 0.
     piece_vehicle: Py<PyArray1<i64>>,
-    /// (K, 2) from when to when [s].
+    /// (K, 2) begin and end of the piece [s].
     piece_span: Py<PyArray2<f64>>,
-    /// (K, D, 3) coefficients [m/s^k] of the time since the piece began.
+    /// (K, D, 3) coefficients [m/s^k] of the polynomial in the time since the begin of the piece.
     piece_coefficients: Py<PyArray3<f64>>,
 }
 
-/// What was read so far.
+/// Items and metadata of a recording.
 #[derive(Default)]
 struct Read {
     vehicles: Vec<String>,
@@ -54,20 +54,20 @@ struct Read {
     pieces: Vec<Piece>,
 }
 
-/// Reads a recording; several paths are one, with a vehicle in each.
+/// Reads a recording, in one file or in a file for each vehicle.
 #[pyfunction]
 pub(crate) fn read(py: Python<'_>, paths: Vec<PathBuf>, options: &ReadOptions) -> PyResult<Columns> {
     let interrupted = Arc::default();
-    away(py, &interrupted, || all(&paths, &options.0, &interrupted))??.columns(py)
+    run_in_thread(py, &interrupted, || all(&paths, &options.0, &interrupted))??.columns(py)
 }
 
 fn all(paths: &[PathBuf], options: &tautline::read::ReadOptions, interrupted: &AtomicBool) -> PyResult<Read> {
-    let failed = |error: ReadError| Failure::from(error).raised();
+    let failed = |error: ReadError| Failure::from(error).into_exception();
     let mut recording = audit::open(paths, options).map_err(failed)?;
     let (mut read, mut items) = (Read::default(), Vec::new());
     while recording.read(&mut items).map_err(failed)? {
         if interrupted.load(Ordering::Relaxed) {
-            return Err(wrong("interrupted"));
+            return Err(wrong_input("interrupted"));
         }
         for item in items.drain(..) {
             match item {

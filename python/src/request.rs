@@ -1,4 +1,4 @@
-//! Keyword arguments of Python as parts of requests.
+//! Converts keyword arguments of Python into parts of requests.
 
 use std::path::PathBuf;
 
@@ -8,36 +8,36 @@ use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
-use crate::errors::{wrong, wrong_by};
+use crate::errors::{wrong_input, wrong_input_with_code};
 
-/// The value of this name; an error names all values.
+/// Returns the value with this name. The error for an unknown name lists all names.
 pub(crate) fn choice<T: Copy>(what: &str, name: Option<String>, all: &[(&str, T)]) -> PyResult<Option<T>> {
     let Some(name) = name else { return Ok(None) };
     let found = all.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     let known = || all.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
     let message = || format!("{what}: unknown value '{name}' [possible values: {}]", known());
-    found.map(Some).ok_or_else(|| wrong_by("request/unknown-choice", message()))
+    found.map(Some).ok_or_else(|| wrong_input_with_code("request/unknown-choice", message()))
 }
 
-/// Formats by their names.
+/// Returns all formats with their names.
 fn formats() -> Vec<(&'static str, Format)> {
     Format::all().map(|format| (format.name, format)).collect()
 }
 
 fn parsed<T: std::str::FromStr<Err = String>>(what: &str, text: Option<String>) -> PyResult<Option<T>> {
-    text.map(|text| text.parse()).transpose().map_err(|error| wrong(format!("{what}: {error}")))
+    text.map(|text| text.parse()).transpose().map_err(|error| wrong_input(format!("{what}: {error}")))
 }
 
-/// How a recording is read.
+/// Options of reading.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct ReadOptions(pub(crate) read::ReadOptions);
 
 #[pymethods]
 impl ReadOptions {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
-    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions, column,
-                        start, layout, frame, topic, origin, allow_unfinished))]
+    #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
+    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions,
+                        column, start, layout, frame, topic, origin, allow_unfinished))]
     fn new(
         format: Option<String>,
         time_unit: Option<String>,
@@ -58,13 +58,13 @@ impl ReadOptions {
         allow_unfinished: bool,
     ) -> PyResult<Self> {
         if [fps.is_some(), time_scale.is_some(), time_unit.is_some()].iter().filter(|is_given| **is_given).count() > 1 {
-            return Err(wrong("time_unit, fps and time_scale: one of them is enough"));
+            return Err(wrong_input("time_unit, fps and time_scale: one of them is enough"));
         }
         let mut columns = ColumnNames::default();
         for (role, name) in &column {
             if !columns.set(role, name) {
                 let roles = ColumnNames::ROLES.join(", ");
-                return Err(wrong(format!("column: `{role}` is no column: the columns are {roles}")));
+                return Err(wrong_input(format!("column: `{role}` is no column: the columns are {roles}")));
             }
         }
         let scale = match scale.as_deref() {
@@ -72,7 +72,7 @@ impl ReadOptions {
             Some(&[metres]) => Some(metres.into()),
             Some(&[x, y, z]) => Some([x, y, z].into()),
             Some(numbers) => {
-                return Err(wrong(format!("scale: one number or three are needed, not {}", numbers.len())));
+                return Err(wrong_input(format!("scale: one number or three are needed, not {}", numbers.len())));
             }
         };
         let layout = layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
@@ -88,7 +88,7 @@ impl ReadOptions {
             one_vehicle,
             starts: start.into_iter().collect(),
             columns,
-            layout: layout.map_err(|error| wrong(format!("layout: {error}")))?,
+            layout: layout.map_err(|error| wrong_input(format!("layout: {error}")))?,
             frame,
             topics: topic,
             origin,
@@ -98,7 +98,7 @@ impl ReadOptions {
     }
 }
 
-/// The question of an audit.
+/// Options of an audit.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Question {
     settings: recorded::Settings,
@@ -109,15 +109,16 @@ pub(crate) struct Question {
     independent: bool,
 }
 
-/// The values of one quantity: of all vehicles, and of vehicles by name.
+/// Value of a quantity for all vehicles, and values by name.
 type OfVehicles = (Option<f64>, Vec<(String, f64)>);
 
 #[pymethods]
 impl Question {
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+    #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
-                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence, independent))]
+                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence,
+                        independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
@@ -183,7 +184,7 @@ impl Question {
 }
 
 impl Question {
-    /// The request about a recording, which `command` makes again.
+    /// Returns the request for an audit. `command` is the call that repeats it.
     pub(crate) fn request<'a>(&self, subject: Subject<'a>, command: &str, html: Option<PathBuf>) -> AuditRequest<'a> {
         AuditRequest {
             settings: self.settings.clone(),

@@ -6,21 +6,21 @@ use tautline::preflight::Preflight;
 use tautline::request::ScenarioRequest;
 use tautline::scenario::{self, Override, Source};
 
-use crate::errors::{Raised as _, json, wrong};
+use crate::errors::{IntoException as _, json, wrong_input};
 use crate::numbers::table;
-use crate::work::here;
+use crate::work::run_detached;
 
-/// What is to be flown, complete and checked.
+/// A complete and valid scenario.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Scenario {
     pub(crate) scenario: scenario::Scenario,
-    /// Where it comes from, for studies that vary it.
+    /// Source of the scenario, for studies that vary it.
     pub(crate) request: ScenarioRequest,
 }
 
 #[pymethods]
 impl Scenario {
-    /// The built-in scenario or the file of this name, or a text of TOML; with overrides as `--set` takes them.
+    /// Reads a built-in scenario, a file, or a TOML text, with overrides in the form of `--set`.
     #[new]
     fn new(py: Python<'_>, source: String, is_text: bool, overrides: Vec<String>) -> PyResult<Self> {
         let read = || {
@@ -33,7 +33,7 @@ impl Scenario {
             let scenario = scenario::Scenario::read(&source, &parsed)?;
             Ok(Self { scenario, request: ScenarioRequest { argument, source, overrides } })
         };
-        here(py, read)?.map_err(scenario::ScenarioError::raised)
+        run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)
     }
 
     #[getter]
@@ -68,7 +68,7 @@ impl Scenario {
 
     #[getter]
     fn law(&self) -> PyResult<String> {
-        let law = self.scenario.law().map_err(|error| wrong(error.to_string()))?;
+        let law = self.scenario.law().map_err(|error| wrong_input(error.to_string()))?;
         Ok(law.name().to_owned())
     }
 
@@ -87,7 +87,7 @@ impl Scenario {
         table(py, &self.scenario.formation().slots_m)
     }
 
-    /// Pairs of vehicles, from 0, that hear each other.
+    /// Linked vehicles, from 0.
     #[getter]
     fn links(&self) -> Vec<(usize, usize)> {
         self.scenario.graph.edges().collect()
@@ -103,9 +103,10 @@ impl Scenario {
         self.scenario.sha256_hex()
     }
 
-    /// What is known before the first step: whether nothing refuses the flight, a headline, a summary, and all as JSON.
+    /// Checks the scenario. Returns whether it may fly, a headline, a summary, and the check as JSON.
     fn check(&self, py: Python<'_>) -> PyResult<(bool, String, String, String)> {
-        let found = here(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong(error.to_string()))?;
+        let found =
+            run_detached(py, || Preflight::of(&self.scenario))?.map_err(|error| wrong_input(error.to_string()))?;
         Ok((!found.refuses(), found.headline(), found.text(), json(&found)?))
     }
 }

@@ -1,4 +1,4 @@
-//! A flight that the caller steps.
+//! Simulations that the caller steps.
 
 use std::sync::{Mutex, TryLockError};
 use std::time::{Duration, Instant};
@@ -10,44 +10,44 @@ use pyo3::prelude::*;
 use tautline::sim::{self, Ending, Parts, SimError};
 use tautline::swarm::{Pair, first_row_not_finite};
 
-use crate::errors::{Raised as _, wrong};
-use crate::law::{PythonLaw, catching};
-use crate::numbers::{borrowed, shown, table, to_rows};
+use crate::errors::{IntoException as _, wrong_input};
+use crate::law::{PythonLaw, catch_exception};
+use crate::numbers::{borrowed, shape_text, table, to_rows};
 use crate::scenario::Scenario;
-use crate::work::here;
+use crate::work::run_detached;
 
-/// Steps are flown for so long between two looks at Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const AT_ONCE: Duration = Duration::from_millis(50);
 
-/// A flight under way.
+/// A flight in progress.
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Simulation {
     count: usize,
-    /// Whether its law is written in Python.
+    /// Whether the law is written in Python.
     is_of_python: bool,
     state: Mutex<sim::Simulation>,
 }
 
-/// Someone closer than delta: the pair, from 1, from when to when \[s\], and how close \[m\].
+/// Numbers of a pair in violation, begin and end \[s\], and smallest separation \[m\].
 type Violation = ((usize, usize), f64, f64, f64);
 
-/// The closest two: the pair, from 1, how far apart \[m\], and when \[s\].
+/// Numbers of the closest pair, separation \[m\] and time \[s\].
 type Closest = ((usize, usize), f64, f64);
 
 impl Simulation {
-    /// Does something with the simulation, unless somebody else does.
+    /// Calls `work` with the simulation. Raises `Error` while another call uses it.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
-        let done = here(py, || match self.state.try_lock() {
+        let done = run_detached(py, || match self.state.try_lock() {
             Ok(mut simulation) => Ok(work(&mut simulation)),
             Err(TryLockError::WouldBlock) => {
-                Err("the simulation is being stepped, by another thread or by this law's own")
+                Err("the simulation is being stepped, by another thread or by its own law")
             }
             Err(TryLockError::Poisoned(_)) => Err("the simulation failed before; make a new one"),
         })?;
-        done.map_err(wrong)
+        done.map_err(wrong_input)
     }
 
-    /// Raises what the law raised, and what it wrote that is no number.
+    /// Raises the exception of the law, or an `Error` for a command that is not finite.
     fn raise(&self, py: Python<'_>, raised: Option<PyErr>) -> PyResult<()> {
         if let Some(raised) = raised {
             return Err(raised);
@@ -57,7 +57,7 @@ impl Simulation {
         }
         match self.with(py, |simulation| simulation.ending().cloned())? {
             Some(Ending::BrokeDown(why @ sim::Breakdown::CommandNotFinite { .. })) => {
-                Err(wrong(format!("{why} (what `control` does not write into `out` is NaN)")))
+                Err(wrong_input(format!("{why} (elements of `out` that `control` does not write are NaN)")))
             }
             _ => Ok(()),
         }
@@ -79,22 +79,22 @@ impl Simulation {
             };
             sim::Simulation::with(scenario, parts)
         };
-        let (made, raised) = here(py, || catching(begin))?;
-        let state = Mutex::new(made.map_err(SimError::raised)?);
+        let (made, raised) = run_detached(py, || catch_exception(begin))?;
+        let state = Mutex::new(made.map_err(SimError::into_exception)?);
         let simulation = Self { count: scenario.count(), is_of_python, state };
         simulation.raise(py, raised)?;
         Ok(simulation)
     }
 
-    /// Flies so many steps, with these accelerations where there are any; fewer where the flight ends.
+    /// Flies a number of steps, fewer where the flight ends, with these accelerations if given.
     fn step(&self, py: Python<'_>, commands: Option<&Bound<'_, PyAny>>, steps: u64) -> PyResult<()> {
         let commands = match commands {
             None => None,
             Some(given) => {
                 let given = borrowed::<Ix2>(given, "u", "(N, 3) or (N, 2)")?;
                 if given.shape()[0] != self.count || !matches!(given.shape()[1], 2 | 3) {
-                    let (count, shape) = (self.count, shown(given.shape()));
-                    return Err(wrong(format!("u: accelerations of shape ({count}, 3) are needed, not {shape}")));
+                    let (count, shape) = (self.count, shape_text(given.shape()));
+                    return Err(wrong_input(format!("u: accelerations of shape ({count}, 3) are needed, not {shape}")));
                 }
                 Some(to_rows(given.as_array()))
             }
@@ -102,7 +102,10 @@ impl Simulation {
         let commands = commands.as_ref();
         if let Some(vehicle) = commands.and_then(first_row_not_finite) {
             let step = self.with(py, |simulation| simulation.steps())? + 1;
-            return Err(wrong(format!("step {step}: the command for vehicle {} is not a finite number", vehicle + 1)));
+            return Err(wrong_input(format!(
+                "step {step}: the command for vehicle {} is not a finite number",
+                vehicle + 1
+            )));
         }
         let mut left = steps;
         while left > 0 {
@@ -116,16 +119,16 @@ impl Simulation {
                         Some(commands) => simulation.step_with(commands)?,
                         None => simulation.step(),
                     }
-                    // What is recorded elsewhere is for nobody here.
+                    // Events and samples are not recorded here.
                     simulation.events().for_each(drop);
                     simulation.sample();
                     flown += 1;
                 }
                 Ok(flown)
             };
-            let (flown, raised) = self.with(py, |simulation| catching(|| some_steps(simulation)))?;
+            let (flown, raised) = self.with(py, |simulation| catch_exception(|| some_steps(simulation)))?;
             self.raise(py, raised)?;
-            left -= flown.map_err(SimError::raised)?;
+            left -= flown.map_err(SimError::into_exception)?;
             py.check_signals()?;
         }
         Ok(())
@@ -151,19 +154,19 @@ impl Simulation {
         table(py, &self.with(py, |simulation| simulation.state().velocities_m_s.clone())?)
     }
 
-    /// The accelerations that are held from now on; none where the law had no answer.
+    /// Current commands; empty where the law failed.
     #[getter]
     fn commands<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         table(py, &self.with(py, |simulation| simulation.control().clone())?)
     }
 
-    /// The smallest distance of two vehicles over the last stretch that was judged.
+    /// Smallest separation over the last audited interval.
     #[getter]
     fn separation_m(&self, py: Python<'_>) -> PyResult<Option<f64>> {
         self.with(py, |simulation| simulation.closest().map(|_| simulation.separation_m()))
     }
 
-    /// The closest pair so far, from 1, how far apart, and when.
+    /// Closest approach so far.
     #[getter]
     fn closest(&self, py: Python<'_>) -> PyResult<Option<Closest>> {
         let closest = self.with(py, |simulation| simulation.closest())?;
@@ -175,8 +178,7 @@ impl Simulation {
         self.with(py, |simulation| simulation.least_clearance_m())
     }
 
-    /// What the judge has found so far, of a flight that has ended of all of it: `clear`, `violation` or `undecided`, and the
-    /// violations of two vehicles.
+    /// Verdict so far, or of the whole flight after its end, and violations of pairs.
     fn judged(&self, py: Python<'_>) -> PyResult<(String, Vec<Violation>)> {
         let (flight, is_over) =
             self.with(py, |simulation| (simulation.clone().finish(), simulation.ending().is_some()))?;
@@ -185,14 +187,14 @@ impl Simulation {
         Ok((status.name().to_owned(), found.collect()))
     }
 
-    /// How the flight ended, once it has: `completed`, or why before its time.
+    /// `completed`, or the reason of an early end; `None` before the end.
     #[getter]
     fn ending(&self, py: Python<'_>) -> PyResult<Option<String>> {
         let ending = self.with(py, |simulation| simulation.ending().cloned())?;
         Ok(ending.map(|ending| ending.reason().unwrap_or_else(|| "completed".to_owned())))
     }
 
-    /// A simulation that goes on from here by itself, with other random numbers where a seed is given.
+    /// Returns an independent copy, with other random numbers if a seed is given.
     fn copy(&self, py: Python<'_>, noise_seed: Option<u64>) -> PyResult<Self> {
         let copied = self.with(py, |simulation| {
             let mut copy = simulation.clone();

@@ -1,4 +1,4 @@
-//! Requests of studies, exports and the validation.
+//! Studies, exports and the validation.
 
 use std::path::PathBuf;
 
@@ -13,30 +13,30 @@ use tautline::studies::{Experiment, Question, Study as _, StudyFiles, StudyReque
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
-use crate::errors::{Raised as _, broken};
+use crate::errors::{IntoException as _, internal_error};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
-use crate::work::away_with_threads;
+use crate::work::run_in_thread_with_pool;
 
-/// Whether an answer is good, and the answer as JSON.
+/// Whether a result is good, and the result as JSON.
 type Answer = (bool, String);
 
-/// Works on a request without the interpreter's lock.
+/// Runs a request without the interpreter's lock.
 fn answered<T: Send>(py: Python<'_>, work: impl FnOnce(&Silent) -> Result<T, Failure> + Send) -> PyResult<T> {
     let monitor = Silent::default();
-    away_with_threads(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::raised)
+    run_in_thread_with_pool(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::into_exception)
 }
 
-/// The answer of a study that was not interrupted.
+/// Returns the result of a study that was not interrupted.
 fn whole<T>(answer: Option<T>) -> PyResult<T> {
-    answer.ok_or_else(|| broken("the work was interrupted"))
+    answer.ok_or_else(|| internal_error("the work was interrupted"))
 }
 
 fn json<E: std::fmt::Display>(text: Result<String, E>) -> PyResult<String> {
-    text.map_err(|error| broken(&error.to_string()))
+    text.map_err(|error| internal_error(&error.to_string()))
 }
 
-/// Names of the built-in scenarios.
+/// Returns the names of the built-in scenarios.
 #[pyfunction]
 pub(crate) fn scenarios() -> Vec<&'static str> {
     builtin::all().iter().map(|builtin| builtin.name).collect()
@@ -59,7 +59,7 @@ pub(crate) fn export(
     answered(py, |monitor| export_file(&request, monitor))
 }
 
-/// Files and threads of a study, as keyword arguments give them.
+/// Files and threads of a study.
 #[derive(FromPyObject)]
 pub(crate) struct Outputs {
     #[pyo3(item)]
@@ -104,9 +104,9 @@ pub(crate) fn compare(
     study(py, scenario, tautline::compare::Options { laws, runs, seed }, outputs)
 }
 
-/// Searches for the values of a key between which a verdict turns.
+/// Searches for the two values of a key between which a verdict turns.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn margin(
     py: Python<'_>,
     scenario: &Scenario,
@@ -139,13 +139,13 @@ pub(crate) fn sweep(
     outputs: Outputs,
 ) -> PyResult<Answer> {
     let keys = keys.into_iter().map(|(key, values)| SweptKey::new(&key, values)).collect::<Result<_, _>>();
-    let (keys, question) = (keys.map_err(Failure::raised)?, question(verdict)?);
+    let (keys, question) = (keys.map_err(Failure::into_exception)?, question(verdict)?);
     study(py, scenario, tautline::sweep::Options { keys, question, runs, seed }, outputs)
 }
 
 /// Searches for the worst flight within bounds.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn attack(
     py: Python<'_>,
     scenario: &Scenario,
@@ -160,13 +160,13 @@ pub(crate) fn attack(
     outputs: Outputs,
 ) -> PyResult<Answer> {
     let vary = vary.iter().map(|(key, low, high)| Bound::new(key, *low, *high)).collect::<Result<_, _>>();
-    let vary = vary.map_err(Failure::raised)?;
+    let vary = vary.map_err(Failure::into_exception)?;
     let (start_m, velocity_m_s, apart_m) = (start, velocity, apart);
     let options = tautline::attack::Options { vary, start_m, velocity_m_s, apart_m, flights, seeds, seed, out };
     study(py, scenario, options, outputs)
 }
 
-/// Judges the claims of the paper and ours.
+/// Measures the claims of the paper and of tautline.
 #[pyfunction]
 pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Option<usize>) -> PyResult<Answer> {
     let request = ValidateRequest { out, force, threads };
@@ -174,9 +174,9 @@ pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Optio
     Ok((validation.pass, json(validation.to_json())?))
 }
 
-/// Flies a campaign: whether no flight violated, its answer as JSON, and its folder.
+/// Flies a campaign. Returns whether no flight had a violation, the result as JSON, and the folder.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "each is one that Python gives")]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn campaign(
     py: Python<'_>,
     spec: PathBuf,

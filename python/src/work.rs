@@ -1,4 +1,4 @@
-//! Work that the interpreter does not wait for, and that Ctrl-C ends.
+//! Runs work without the interpreter's lock, and ends it at Ctrl-C.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,19 +11,20 @@ use std::time::{Duration, Instant};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-use crate::errors::broken;
+use crate::errors::internal_error;
 
-/// How often it is looked whether somebody pressed Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
-/// Stack of a thread that works: as much as a program's own has on most systems \[bytes\].
+/// Stack of a worker thread \[bytes\]: that of a main thread on most systems.
 const STACK: usize = 8 << 20;
 
-static HOME: OnceLock<u32> = OnceLock::new();
+static ORIGINAL_PROCESS: OnceLock<u32> = OnceLock::new();
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Does work in a thread of its own, without the interpreter's lock. Ctrl-C sets `interrupted`, which the work is to look at,
-/// and is raised once it has come to its end.
-pub(crate) fn away<T: Send>(
+/// Runs work in a new thread, without the interpreter's lock.
+///
+/// Ctrl-C sets `interrupted`, which the work polls, and is raised once the work has ended.
+pub(crate) fn run_in_thread<T: Send>(
     py: Python<'_>,
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
@@ -54,26 +55,27 @@ pub(crate) fn away<T: Send>(
     }
 }
 
-/// Does work while this thread waits, without the interpreter's lock. Threads that large swarms share are gone in a process that
-/// was forked: there it gets some that all of it share.
-pub(crate) fn here<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let with_threads = || if is_at_home() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
+/// Runs work on this thread, without the interpreter's lock.
+///
+/// A fork has no threads of rayon's global pool: there the work runs in a pool that the process shares.
+pub(crate) fn run_detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let with_threads = || if is_original_process() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
     started(finished(py.detach(|| catch_unwind(AssertUnwindSafe(with_threads))))?)
 }
 
-/// As [`away`], for work that shares threads. In a process that was forked it gets some that nobody else waits for.
-pub(crate) fn away_with_threads<T: Send>(
+/// As [`run_in_thread`], for work that uses rayon. A fork gets a new pool, so that concurrent calls cannot block it.
+pub(crate) fn run_in_thread_with_pool<T: Send>(
     py: Python<'_>,
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
-    let with_threads = || if is_at_home() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
-    started(away(py, interrupted, with_threads)?)
+    let with_threads = || if is_original_process() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
+    started(run_in_thread(py, interrupted, with_threads)?)
 }
 
-/// Whether this process is the one that the package was imported in, and not one that it was forked into.
-fn is_at_home() -> bool {
-    *HOME.get_or_init(process::id) == process::id()
+/// Whether this process imported the package, instead of being a fork of that process.
+fn is_original_process() -> bool {
+    *ORIGINAL_PROCESS.get_or_init(process::id) == process::id()
 }
 
 fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
@@ -81,42 +83,42 @@ fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
 }
 
 fn finished<T>(done: thread::Result<T>) -> PyResult<T> {
-    done.map_err(|panic| broken(&words(panic.as_ref())))
+    done.map_err(|panic| internal_error(&words(panic.as_ref())))
 }
 
 fn started<T>(done: Result<T, ThreadPoolBuildError>) -> PyResult<T> {
-    done.map_err(|error| broken(&error.to_string()))
+    done.map_err(|error| internal_error(&error.to_string()))
 }
 
-/// Takes note of the process that the package was imported in.
-pub(crate) fn at_home() {
-    HOME.get_or_init(process::id);
+/// Stores the process that imports the package.
+pub(crate) fn remember_process() {
+    ORIGINAL_PROCESS.get_or_init(process::id);
 }
 
-/// The threads of this process, which was forked.
+/// Returns the thread pool of this fork.
 fn own_pool() -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
     let mut pools = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     match &*pools {
         Some((process, pool)) if *process == process::id() => Ok(Arc::clone(pool)),
         _ => {
             let pool = Arc::new(new_pool()?);
-            // That of the process before has no threads here that could be waited for.
+            // The pool of the parent process has no threads here: its destructor would wait for ever.
             std::mem::forget(pools.replace((process::id(), Arc::clone(&pool))));
             Ok(pool)
         }
     }
 }
 
-/// What a panic said.
+/// Returns the message of a panic.
 fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".to_owned())
 }
 
-/// Looks for signals now and then, from a thread that does not hold the lock.
+/// Periodic check for signals, on a thread without the lock.
 pub(crate) struct Signals {
     looked: Instant,
-    /// What a signal raised.
+    /// Exception that a signal raised.
     pub(crate) raised: Option<PyErr>,
 }
 
@@ -125,7 +127,7 @@ impl Signals {
         Self { looked: Instant::now(), raised: None }
     }
 
-    /// Whether none has been raised.
+    /// Whether no signal has raised an exception.
     pub(crate) fn are_silent(&mut self) -> bool {
         if self.looked.elapsed() >= SIGNALS_EVERY {
             self.raised = Python::attach(|py| py.check_signals().err());

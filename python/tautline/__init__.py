@@ -1,13 +1,15 @@
-"""Judge recorded swarms, fly scenarios into formation, write control laws.
+"""Audits recordings of swarms, flies scenarios and control laws.
+
+Example::
 
     import numpy as np, tautline as tl
-    a = tl.audit(t, p, delta=1.5)          # did any two come closer than 1.5 m, between samples too?
-    f = tl.fly("pentagon")                 # a flight in a rigid-body engine, every step judged
+    a = tl.audit(t, p, delta=1.5)          # Audits positions.
+    f = tl.fly("pentagon")                 # Flies and audits a scenario.
 
-SI units, one inertial frame with z up. Tables of vectors are (N, 3), a row per vehicle; vehicles are counted from 0 in
-arrays and from 1 in names, pairs and messages. What is wrong with the input is a :class:`Error` (a ``ValueError``) that says
-what the command line says; a wrong dtype is a ``TypeError``, a missing file a ``FileNotFoundError``. The interpreter's lock
-is free while anything is read, judged or flown.
+Units are SI, in one inertial frame with z up. Tables of vectors have the shape (N, 3), with a row for each vehicle.
+Vehicle numbers start at 0 in arrays, and at 1 in names, pairs and messages. Wrong input raises :class:`Error` (a
+``ValueError``) with the message of the command line, a wrong dtype ``TypeError``, a missing file
+``FileNotFoundError``. Reading, audits and flights release the interpreter's lock.
 """
 
 from ._audit import Audit, ViolationError, audit

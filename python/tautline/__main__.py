@@ -9,8 +9,8 @@ from . import _native
 
 
 def main() -> int:
-    """Runs the command of the process's arguments and gives its exit code."""
-    # Ctrl-C is the program's own business, as in a process without Python.
+    """Runs the command in ``sys.argv`` and returns its exit code."""
+    # The program handles Ctrl-C itself.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _native.main(["tautline", *sys.argv[1:]])
 

@@ -1,4 +1,4 @@
-"""Audits: did any two vehicles come closer than they may, between samples too?"""
+"""Audits of arrays and recordings: is every pair far enough apart, also between samples?"""
 
 from __future__ import annotations
 
@@ -13,60 +13,60 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _display, _native
-from ._native import Error
-from ._tables import Findings
-from ._words import (
+from ._arguments import (
     PathLike,
-    by_vehicle,
-    flag,
-    listed,
-    maybe,
-    maybe_count,
-    maybe_path,
-    of_vehicles,
-    one_recording,
+    boolean,
+    name_list,
+    number_or_by_name,
+    numbers_by_name,
+    optional_count,
+    optional_number,
+    optional_path,
+    optional_text,
+    optional_vector,
     path,
     paths,
-    reading,
-    text,
-    three,
+    read_options,
+    single_recording,
     with_files,
 )
+from ._native import Error
+from ._tables import Findings
 
-Judged = tuple[str, str, str, str]
+#: Verdict, headline, summary, and the report as JSON.
+Outcome = tuple[str, str, str, str]
 
-#: Arguments of a question, in the order in which a page repeats them.
+#: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
-    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "accel_window", "config", "from_s",
-    "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap", "require_presence", "independent",
+    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "accel_window", "config",
+    "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap", "require_presence", "independent",
 )  # fmt: skip
 
 
 class ViolationError(Error):
-    """A judgement that is not clear, where clear was asked for; ``audit`` is the judgement."""
+    """Raised by :meth:`Audit.raise_for_violation` for an audit that is not clear; ``audit`` is that audit."""
 
-    def __init__(self, judgement: Audit) -> None:
-        super().__init__(judgement.headline)
-        self.audit = judgement
+    def __init__(self, audit: Audit) -> None:
+        super().__init__(audit.headline)
+        self.audit = audit
 
     def __reduce__(self) -> tuple[type[ViolationError], tuple[Audit]]:
         return ViolationError, (self.audit,)
 
 
 class Audit:
-    """What the judge says of a recording."""
+    """Result of an audit."""
 
-    #: ``PROVED CLEAR``, ``PROVED CLEAR by the run's audit of every step``, ``CLEAR if straight between samples`` (or as was asked),
-    #: ``VIOLATION`` or ``UNDECIDED``.
+    #: Verdict in words: ``PROVED CLEAR``, ``CLEAR if straight between samples``, ``VIOLATION``, ``UNDECIDED``, ...
     verdict: str
-    #: The verdict and what it rests on, in a line.
+    #: Verdict with its reason, in a line.
     headline: str
-    #: The summary that the command line prints.
+    #: Summary that the command line prints.
     text: str
 
-    def __init__(self, judged: Judged, again: Callable[..., Judged]) -> None:
-        self.verdict, self.headline, self.text, self._json = judged
-        self._again = again
+    def __init__(self, outcome: Outcome, repeat: Callable[..., Outcome]) -> None:
+        self.verdict, self.headline, self.text, self._json = outcome
+        self._repeat = repeat
 
     @functools.cached_property
     def _report(self) -> dict[str, Any]:
@@ -75,78 +75,79 @@ class Audit:
 
     @property
     def status(self) -> str:
-        """``clear``, ``violation`` or ``undecided``, as in the JSON."""
+        """``clear``, ``violation`` or ``undecided``."""
         return str(self._report["status"])
 
     @property
     def is_clear(self) -> bool:
-        """Whether nothing came too close: proved, or as assumed between samples."""
+        """Whether the recording is clear: proved, or under an assumption on the motion between samples."""
         return self.status == "clear"
 
     @property
     def is_proved(self) -> bool:
-        """Whether it is clear and nothing was assumed of the time between samples."""
+        """Whether the recording is clear without an assumption on the motion between samples."""
         return bool(self._report["audit"]["proved"])
 
     @property
     def assumes(self) -> str | None:
-        """What was assumed of the motion between samples; None where the recording says it itself."""
-        assumed: str | None = self._report["audit"]["assumes"]
-        return assumed
+        """Assumed motion between samples; None where the recording defines it."""
+        assumption: str | None = self._report["audit"]["assumes"]
+        return assumption
 
     @property
     def is_planar(self) -> bool:
-        """Whether the height of some vehicle is not known: distances and speeds are those in the plane of x and y then."""
+        """Whether the height of a vehicle is unknown; distances and speeds are then those in the plane of x and y."""
         return bool(self._report["planar"])
 
     @property
     def delta_m(self) -> float | None:
-        """The safety distance asked about [m] (a scaled distance with an ellipsoid); None where radii alone were."""
+        """Safety distance [m], a scaled distance with an ellipsoid; None where only radii are given."""
         delta: float | None = self._report["separation"]["delta_m"]
         return delta
 
     @property
     def separation_m(self) -> float | None:
-        """The smallest distance of two vehicles [m] (scaled with an ellipsoid), of curves and bounds a lower bound of it; None
-        where there never were two."""
+        """Smallest separation [m], scaled with an ellipsoid; a lower bound for curves and bounded motion. None where
+        two vehicles are never present together."""
         smallest: float | None = self._report["separation"]["min_m"]
         return smallest
 
     @property
     def closest(self) -> Findings:
-        """The ten closest pairs: ``pair``, ``lower_m``, ``upper_m``, ``time_s``, ``limit_m``."""
+        """Ten closest pairs: ``pair``, ``lower_m``, ``upper_m``, ``time_s``, ``limit_m``."""
         return Findings(self._report["closest"])
 
     @property
     def violations(self) -> Findings:
-        """Violations in order of time, of many the worst and the first of each pair: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``."""
+        """Violations in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``. If there
+        are many, the worst ones and the first one of each pair."""
         return Findings(self._report["violations"])
 
     @property
     def undecided(self) -> Findings:
-        """When it cannot be told: ``pair``, ``from_s``, ``to_s``, ``lower_m``, ``upper_m``, ``limit_m``, ``rate_hz``."""
+        """Undecided intervals: ``pair``, ``from_s``, ``to_s``, ``lower_m``, ``upper_m``, ``limit_m``, ``rate_hz``."""
         return Findings(self._report["undecided"])
 
     @property
     def gaps(self) -> Findings:
-        """When vehicles were not seen: ``vehicle``, ``from_s``, ``to_s``."""
+        """Gaps, in which a vehicle is not seen: ``vehicle``, ``from_s``, ``to_s``."""
         return Findings(self._report["gaps"])
 
     @property
     def ended_early(self) -> dict[str, Any] | None:
-        """Where a flight ended before its time: ``at_s``, ``duration_s`` of the scenario and ``reason``. None where what was asked about
+        """Early end of a flight: ``at_s``, ``duration_s`` of the scenario and ``reason``. None where the whole window
         was flown."""
         end: dict[str, Any] | None = self._report["ended_early"]
         return end
 
     @property
     def obstacles(self) -> Findings:
-        """The closest approaches to obstacles: as :attr:`closest`."""
+        """Closest approaches to obstacles, with the keys of :attr:`closest`."""
         return Findings(self._report["obstacles"]["closest"])
 
     @property
     def limits(self) -> Findings:
-        """What vehicles did by themselves, where ``limit`` or ``fence`` asked: each limit with its verdict, as in the JSON."""
+        """Limits on single vehicles (``limit``, ``fence``), each with its verdict."""
         return Findings(self._report["limits"])
 
     @property
@@ -156,7 +157,7 @@ class Audit:
 
     @property
     def notes(self) -> list[str]:
-        """What should be known of how it was read, a sentence each."""
+        """Notes on how the recording was read, a sentence each."""
         return list(self._report["notes"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,28 +166,30 @@ class Audit:
         return report
 
     def to_html(self, file: PathLike) -> None:
-        """Writes the report for people, with figures. The recording is judged again for them.
+        """Writes a page with figures. Repeats the audit for them.
 
-        Raises :class:`Error` where it has changed since, and leaves the file as it is; ``OSError`` where it cannot be written.
+        Raises :class:`Error` where the recording has changed, and keeps the file then; ``OSError`` where the file
+        cannot be written.
         """
-        changed = "the recording is not what it was when it was judged: audit it again"
+        changed = "the recording has changed since its audit; audit it again"
         page = path(file, "file")
-        # At first without a page: that of another verdict must not take the place of this one's.
-        if self._again()[3] != self._json:
+        # The first repetition writes no page: a page of another verdict must not replace this one's.
+        if self._repeat()[3] != self._json:
             raise Error(changed)
-        if self._again(page)[3] != self._json:
-            raise Error(f"{changed}; {page} is of what it has become")
+        if self._repeat(page)[3] != self._json:
+            raise Error(f"{changed}; {page} shows the changed recording")
 
     def raise_for_violation(self, allow_undecided: bool = False) -> None:
-        """Raises :class:`ViolationError` unless it is clear: of a violation, and of what cannot be told unless that is allowed."""
+        """Raises :class:`ViolationError` for a violation, and for an undecided audit unless ``allow_undecided`` is
+        True."""
         if not (self.is_clear or (allow_undecided and self.status == "undecided")):
             raise ViolationError(self)
 
     def __bool__(self) -> bool:
-        raise TypeError("an audit is neither true nor false: ask is_clear, or call raise_for_violation()")
+        raise TypeError("an audit is neither true nor false; use is_clear or raise_for_violation()")
 
-    def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Judged]]:
-        return elsewhere, ((self.verdict, self.headline, self.text, self._json),)
+    def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Outcome]]:
+        return unpickle, ((self.verdict, self.headline, self.text, self._json),)
 
     def __repr__(self) -> str:
         return f"<Audit {self.headline}>"
@@ -199,16 +202,16 @@ class Audit:
         closest = self._report["closest"]
         rows = [
             ("finding", self.headline.partition(": ")[2]),
-            ("vehicles judged", str(self._report["judged"])),
+            ("vehicles", str(self._report["judged"])),
             *((kind, str(self._report["findings"][kind]["count"])) for kind in ("violations", "undecided", "gaps")),
         ]
-        drawing = _display.bars(
+        drawing = _display.draw_bars(
             [" ".join(near["who"]) for near in closest],
             [near["lower_m"] for near in closest],
             [near["limit_m"] for near in closest],
-            "Smallest distances of the closest pairs, and their limits",
+            "Separations of the closest pairs, with their limits",
         )
-        return _display.card(tone, self.verdict, rows, drawing)
+        return _display.make_card(tone, self.verdict, rows, drawing)
 
 
 def audit(
@@ -236,137 +239,161 @@ def audit(
     max_gap: float | None = None,
     require_presence: bool = False,
     independent: bool = False,
-    _seen: _native.Seen | None = None,
+    _findings: _native.FlightFindings | None = None,
     **read_as: Any,
 ) -> Audit:
-    """Judges positions over time, of arrays or of a recording of any format.
+    """Audits positions over time, in arrays or in a recording of any format.
 
-    ``tl.audit(t, positions, delta=1.5)``: ``t`` (T,) times [s], ``positions`` (T, N, 3) or (T, N, 2) [m], both float64 in any
-    order of memory, or laid out as ``layout`` says (``"time,axis,vehicle"``); they are borrowed, not copied, and must not be written to until this returns. NaN in every axis: the
-    vehicle was not seen; ``notes`` names whoever was not seen from the first instant to the last. ``velocities`` (T, N, 3) [m/s] sharpen ``motion="bounded"``; ``names`` are N names, else numbers from 1.
+    ``tl.audit(t, positions, delta=1.5)`` audits arrays.
 
-    ``tl.audit("flight.mcap")``: a file or folder, or with ``join=True`` a list of files with a vehicle each. ``read_as`` says how
-    it is read: ``format``, ``time_unit``, ``fps``, ``time_scale``, ``sort``, ``duplicates``, ``one_vehicle``, ``scale``, ``axes``, ``dimensions``, ``column``, ``start``, ``layout``,
-    ``frame``, ``topic``, ``origin``, ``allow_unfinished``.
+    * ``t``: (T,) times [s], float64 in any memory order.
+    * ``positions``: (T, N, 3) or (T, N, 2) [m], float64. NaN in every axis means that the vehicle was not seen. The
+      arrays are borrowed, not copied: do not write to them during the call. ``notes`` names vehicles that were not
+      seen from the first instant to the last.
+    * ``layout``: order of the axes of ``positions`` and ``velocities``, such as ``"time,axis,vehicle"``.
+    * ``velocities``: (T, N, 3) [m/s], which make ``motion="bounded"`` tighter.
+    * ``names``: N names; numbers from 1 unless given.
 
-    ``delta`` [m] is the safety distance between two centres; ``radius`` [m] of all vehicles, or by name: two must keep
-    max(delta, r1 + r2). ``ellipsoid`` (3,) [m] are half axes of what must stay empty, with delta scaled by them. ``motion`` says what
-    happens between samples: ``linear``, ``hold``, ``polynomial``, ``bounded`` (with ``max_accel`` [m/s^2]). ``obstacles`` is a TOML
-    file. ``limit`` asks what each may do by itself: ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2] (with ``accel_window`` [s] its mean over windows of that
-    length), ``height`` [m]; ``fence`` is a TOML file of
-    what each must stay within. Of a file, ``config`` is a ``tautline.toml`` that fills what is not asked here; the one beside the
-    recording unless given, and none where it is False. ``from_s``, ``to_s`` [s] are the window that is judged, ``above`` [m] leaves out pairs on the ground, ``ids`` names who is
-    judged, ``offset`` [s] corrects clocks by name, ``max_gap`` [s] is the longest time between samples that is no gap. With ``require_presence`` it is undecided where a vehicle is not seen over the
-    whole window; with ``independent`` a recording of a flight is judged by its samples alone.
+    ``tl.audit("flight.mcap")`` audits a file or folder, or with ``join=True`` a list of files with one vehicle each.
+    These options control reading: `format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes,
+    dimensions, column, start, layout, frame, topic, origin, allow_unfinished`.
 
-    Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for anything else that is
-    wrong with the input. docs/audit.md says what each verdict means.
+    * ``delta``: safety distance of two centres [m].
+    * ``radius``: radius of all vehicles, or by name [m]; the limit of a pair is max(delta, r1 + r2).
+    * ``ellipsoid``: (3,) half axes [m] of an ellipsoid around each vehicle; they scale separations and delta.
+    * ``motion``: motion between samples: ``linear``, ``hold``, ``polynomial``, or ``bounded`` by ``max_accel`` [m/s^2].
+    * ``obstacles``: TOML file of obstacles.
+    * ``limit``: limits on single vehicles, such as ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height``
+      [m].
+    * ``accel_window``: ``accel`` then limits means over windows of this length [s].
+    * ``fence``: TOML file of a region that no vehicle may leave.
+    * ``config``: ``tautline.toml`` with defaults for arguments that are not given. For a recording the default is the
+      ``tautline.toml`` beside it. False reads no file.
+    * ``from_s``, ``to_s``: window of the audit [s].
+    * ``above``: leaves out pairs while both vehicles are at or below this height [m].
+    * ``ids``: names of the vehicles to audit.
+    * ``offset``: clock corrections by name [s].
+    * ``expect_vehicles``: number of vehicles; another number is an error.
+    * ``max_gap``: longest interval between two samples that is not a gap [s].
+    * ``require_presence``: the audit is undecided where a vehicle is not seen over the whole window.
+    * ``independent``: audits a recording of a flight from its samples, without the run's own audit.
+
+    Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for other
+    wrong input. docs/audit.md explains the verdicts.
     """
-    ids = None if ids is None else listed(ids, "ids")
-    asked = shown(locals()) | read_as
-    if unknown := [word for word in read_as if word not in inspect.signature(reading).parameters]:
+    ids = None if ids is None else name_list(ids, "ids")
+    options = given_arguments(locals()) | read_as
+    if unknown := [word for word in read_as if word not in inspect.signature(read_options).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
     if ids is not None and not ids:
-        raise Error("ids: no vehicle is named; leave it out to judge all")
-    # Beside arrays there is no folder to find a file of settings in.
+        raise Error("ids: no vehicle is named; leave it out to audit all")
+    # Arrays have no folder that could hold a tautline.toml.
     looks_for_config = config is None and positions is None
     question = _native.Question(
-        delta=maybe(delta, "delta"),
-        motion=text(motion, "motion"),
-        max_accel=of_vehicles(max_accel, "max_accel"),
-        radius=of_vehicles(radius, "radius"),
-        ellipsoid=three(ellipsoid, "ellipsoid"),
-        obstacles=maybe_path(obstacles, "obstacles"),
-        limit=by_vehicle(limit, "limit"),
-        fence=maybe_path(fence, "fence"),
-        accel_window=maybe(accel_window, "accel_window"),
-        config=None if config is False else maybe_path(config, "config"),
+        delta=optional_number(delta, "delta"),
+        motion=optional_text(motion, "motion"),
+        max_accel=number_or_by_name(max_accel, "max_accel"),
+        radius=number_or_by_name(radius, "radius"),
+        ellipsoid=optional_vector(ellipsoid, "ellipsoid"),
+        obstacles=optional_path(obstacles, "obstacles"),
+        limit=numbers_by_name(limit, "limit"),
+        fence=optional_path(fence, "fence"),
+        accel_window=optional_number(accel_window, "accel_window"),
+        config=None if config is False else optional_path(config, "config"),
         has_config=looks_for_config,
-        from_s=maybe(from_s, "from_s"),
-        to_s=maybe(to_s, "to_s"),
-        above=maybe(above, "above"),
+        from_s=optional_number(from_s, "from_s"),
+        to_s=optional_number(to_s, "to_s"),
+        above=optional_number(above, "above"),
         ids=ids,
-        offset=by_vehicle(offset, "offset"),
-        expect_vehicles=maybe_count(expect_vehicles, "expect_vehicles"),
-        max_gap=maybe(max_gap, "max_gap"),
-        require_presence=flag(require_presence, "require_presence"),
-        independent=flag(independent, "independent"),
+        offset=numbers_by_name(offset, "offset"),
+        expect_vehicles=optional_count(expect_vehicles, "expect_vehicles"),
+        max_gap=optional_number(max_gap, "max_gap"),
+        require_presence=boolean(require_presence, "require_presence"),
+        independent=boolean(independent, "independent"),
     )
-    given = [os.fspath(file) for file in (obstacles, fence, None if config is False else config) if file is not None]
+    files = [os.fspath(file) for file in (obstacles, fence, None if config is False else config) if file is not None]
     if positions is None:
-        return of_files(question, call(repr(t), asked), t, read_as, given, velocities is not None or names is not None)
+        has_arrays = velocities is not None or names is not None
+        return audit_files(question, call_text(repr(t), options), t, read_as, files, has_arrays)
     layout = read_as.pop("layout", None)
     if layout is not None:
-        positions, velocities = (of if of is None else laid_out(of, layout) for of in (positions, velocities))
+        positions, velocities = (
+            array if array is None else transposed(array, layout) for array in (positions, velocities)
+        )
     if read_as:
-        raise TypeError(f"{', '.join(read_as)}: says how a file is read, and arrays are given")
-    command = call("t, positions", asked)
-    return with_files(given, lambda: of_arrays(question, command, t, positions, velocities, names, _seen))
+        raise TypeError(f"{', '.join(read_as)}: only for files, but arrays are given")
+    command = call_text("t, positions", options)
+    return with_files(files, lambda: audit_arrays(question, command, t, positions, velocities, names, _findings))
 
 
-def shown(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments of a question that are given."""
+def given_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the arguments of `SHOWN` that differ from their defaults."""
     given = {name: arguments[name] for name in SHOWN if arguments[name] is not None}
     return {name: value for name, value in given.items() if value is not False or name == "config"}
 
 
-def call(first: str, asked: Mapping[str, Any]) -> str:
-    """The call that judges again, for a page."""
-    return f"tautline.audit({first}{''.join(f', {name}={value!r}' for name, value in asked.items())})"
+def call_text(first: str, options: Mapping[str, Any]) -> str:
+    """Returns the call that repeats an audit, for a page."""
+    return f"tautline.audit({first}{''.join(f', {name}={value!r}' for name, value in options.items())})"
 
 
-def laid_out(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
-    """A view (T, N, 3) of an array whose axes count these, such as ``time,axis,vehicle``."""
+def transposed(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
+    """Returns a view (T, N, 3) of an array with the axes of a layout, such as ``time,axis,vehicle``."""
     usual = ("time", "vehicle", "axis")
     axes = layout.split(",")
     if sorted(axes) != sorted(usual):
-        raise Error(f"layout: '{layout}' is not time, vehicle and axis between commas, such as 'time,axis,vehicle'")
+        raise Error(f"layout: must list time, vehicle and axis, such as 'time,axis,vehicle', got '{layout}'")
     if not isinstance(array, np.ndarray) or array.ndim != len(usual):
-        raise TypeError("layout: it says what the three axes of an array count")
+        raise TypeError("layout: needs an array with three axes")
     return array.transpose([axes.index(axis) for axis in usual])
 
 
-def of_files(
-    question: _native.Question, command: str, t: object, read_as: Mapping[str, Any], beside: list[str], has_more: bool
+def audit_files(
+    question: _native.Question,
+    command: str,
+    t: object,
+    read_as: Mapping[str, Any],
+    more_files: list[str],
+    has_arrays: bool,
 ) -> Audit:
     if isinstance(t, np.ndarray):
         raise TypeError("positions: an array (T, N, 3) is needed beside the times, or a path in their place")
-    if has_more:
-        raise TypeError("velocities and names belong to arrays, and a recording is given")
-    files, options = one_recording(paths(t, "t"), read_as), reading(**read_as)
+    if has_arrays:
+        raise TypeError("velocities, names: only for arrays, but a recording is given")
+    files, options = single_recording(paths(t, "t"), read_as), read_options(**read_as)
 
-    def judged(html: str | None = None) -> Judged:
-        return with_files(files + beside, lambda: _native.audit_files(question, command, files, options, html))
+    def repeat(html: str | None = None) -> Outcome:
+        return with_files(files + more_files, lambda: _native.audit_files(question, command, files, options, html))
 
-    return Audit(judged(), judged)
+    return Audit(repeat(), repeat)
 
 
-def of_arrays(
+def audit_arrays(
     question: _native.Question,
     command: str,
     t: Any,
     positions: Any,
     velocities: Any,
     names: Sequence[str] | None,
-    seen: _native.Seen | None = None,
+    findings: _native.FlightFindings | None = None,
 ) -> Audit:
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
     count = positions.shape[1] if isinstance(positions, np.ndarray) and positions.ndim == 3 else 0
-    called = [str(number) for number in range(1, count + 1)] if names is None else listed(names, "names")
-    if len(set(called)) < len(called):
+    vehicles = [str(number) for number in range(1, count + 1)] if names is None else name_list(names, "names")
+    if len(set(vehicles)) < len(vehicles):
         raise Error("names: two vehicles have the same name")
 
-    def judged(html: str | None = None) -> Judged:
-        return _native.audit_arrays(question, command, t, positions, velocities, called, seen, html)
+    def repeat(html: str | None = None) -> Outcome:
+        return _native.audit_arrays(question, command, t, positions, velocities, vehicles, findings, html)
 
-    return Audit(judged(), judged)
+    return Audit(repeat(), repeat)
 
 
-def elsewhere(judged: Judged) -> Audit:
-    """A judgement that was made in another process, or before."""
+def unpickle(outcome: Outcome) -> Audit:
+    """Returns an audit of another process, which cannot be repeated."""
 
-    def again(html: str | None = None) -> Judged:
-        raise Error("what was judged is not at hand here: write the page where it was judged")
+    def repeat(html: str | None = None) -> Outcome:
+        raise Error("to_html: the recording is not at hand here; write the page in the process of the audit")
 
-    return Audit(judged, again)
+    return Audit(outcome, repeat)

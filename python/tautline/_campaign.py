@@ -1,4 +1,4 @@
-"""Campaigns: thousands of flights, one answer with an error bar."""
+"""Campaigns: thousands of flights, and shares with confidence intervals."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import _native
+from ._arguments import PathLike, count, optional_count, optional_number, optional_path, path, with_files
 from ._program import Answer
-from ._words import PathLike, count, maybe, maybe_count, maybe_path, path, with_files
 
 if TYPE_CHECKING:
     import pandas
 
 
 class Campaign(Answer):
-    """The answer of a campaign: the keys of ``campaign.json``, and its folder."""
+    """Result of a campaign: the keys of ``campaign.json``, and its folder."""
 
     def __init__(self, is_good: bool, text: str, folder: Path) -> None:
         super().__init__(is_good, text)
@@ -22,11 +22,11 @@ class Campaign(Answer):
 
     @property
     def folder(self) -> Path:
-        """Where its parts, ``results.parquet``, ``campaign.json`` and ``campaign.html`` are."""
+        """Folder with the parts, ``results.parquet``, ``campaign.json`` and ``campaign.html``."""
         return self._folder
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row a flight. Imports pandas, and pyarrow, which reads Parquet."""
+        """Returns a table with a row for each flight. Imports pandas, and pyarrow, which reads Parquet."""
         try:
             import pandas
         except ImportError:
@@ -44,14 +44,17 @@ def campaign(
     until_decided: float | None = None,
     worst: int = 10,
 ) -> Campaign:
-    """Flies a campaign (docs/campaigns.md) on all cores into a folder, by default ``out/NAME`` of the specification's name. Called again, also
-    after Ctrl-C, it goes on from where it was. The ``worst`` flights are flown again, with recordings and reports.
+    """Flies a campaign (docs/campaigns.md) on all cores into a folder, by default ``out/NAME`` after the name of the
+    file.
 
-    Raises ``FileNotFoundError`` for a missing specification, :class:`Error` for what is wrong in it.
+    A further call continues an interrupted campaign. The ``worst`` flights are flown again, with recordings and
+    reports.
+
+    Raises ``FileNotFoundError`` for a missing specification and :class:`Error` for a wrong one.
     """
     file = path(spec, "spec")
-    folder, many = maybe_path(out, "out"), (maybe_count(shards, "shards"), maybe_count(threads, "threads"))
-    until = maybe(until_width, "until_width"), maybe(until_decided, "until_decided")
-    flown = with_files([file], lambda: _native.campaign(file, folder, *many, *until, count(worst, "worst")))
-    is_good, text, at = flown
+    folder, many = optional_path(out, "out"), (optional_count(shards, "shards"), optional_count(threads, "threads"))
+    until = optional_number(until_width, "until_width"), optional_number(until_decided, "until_decided")
+    answer = with_files([file], lambda: _native.campaign(file, folder, *many, *until, count(worst, "worst")))
+    is_good, text, at = answer
     return Campaign(is_good, text, Path(at).absolute())

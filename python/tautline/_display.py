@@ -1,4 +1,4 @@
-"""What a notebook shows: a verdict, a small table and a drawing, without scripts and without anything from elsewhere."""
+"""HTML for notebooks: a verdict, a small table and a drawing, without scripts and without links."""
 
 from __future__ import annotations
 
@@ -11,29 +11,31 @@ from numpy.typing import NDArray
 COLOURS = {"good": "#1a7f37", "bad": "#cf222e", "open": "#9a6700"}
 PATHS = ("#0969da", "#bf3989", "#1a7f37", "#9a6700", "#8250df", "#cf222e", "#1b7c83", "#57606a")
 WIDTH, HEIGHT, EDGE = 360, 240, 14
-#: Vehicles and points a vehicle that are drawn at most.
-MOST_VEHICLES, MOST_POINTS = 200, 200
+#: Largest number of vehicles, and of points for each, that are drawn.
+MAX_VEHICLES, MAX_POINTS = 200, 200
 
 
-def card(tone: str, verdict: str, rows: Iterable[tuple[str, str]], drawing: str = "") -> str:
-    """A verdict over a table of two columns, with a drawing beside them."""
+def make_card(tone: str, verdict: str, rows: Iterable[tuple[str, str]], drawing: str = "") -> str:
+    """Returns a verdict above a table of two columns, with a drawing beside the table."""
     cells = "".join(
-        f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>" for name, value in rows
+        f"<tr><th style='text-align:left'>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+        for name, value in rows
     )
     badge = f"<p><b style='color:{COLOURS[tone]}'>{html.escape(verdict)}</b></p>"
     return f"<div>{badge}<div style='display:flex;flex-wrap:wrap;gap:1em'><table>{cells}</table>{drawing}</div></div>"
 
 
-def paths(positions: NDArray[np.float64], label: str) -> str:
-    """Ways of vehicles (T, N, 3) seen from above, each in a colour, with a dot where it ends."""
+def draw_paths(positions: NDArray[np.float64], label: str) -> str:
+    """Draws the paths of positions (T, N, 3) from above, each with a colour and a dot at its end."""
     if positions.size == 0:
         return ""
-    plane = positions[:: max(1, len(positions) // MOST_POINTS), :MOST_VEHICLES, :2]
-    plane = np.concatenate([plane, positions[-1:, :MOST_VEHICLES, :2]])
+    plane = positions[:: max(1, len(positions) // MAX_POINTS), :MAX_VEHICLES, :2]
+    plane = np.concatenate([plane, positions[-1:, :MAX_VEHICLES, :2]])
     low, high = np.nanmin(plane, axis=(0, 1)), np.nanmax(plane, axis=(0, 1))
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         return ""
-    scale = min((WIDTH - 2 * EDGE) / max(high[0] - low[0], 1e-9), (HEIGHT - 2 * EDGE) / max(high[1] - low[1], 1e-9))
+    across, up = np.maximum(high - low, 1e-9)
+    scale = min((WIDTH - 2 * EDGE) / across, (HEIGHT - 2 * EDGE) / up)
     middle = (low + high) / 2
     x = WIDTH / 2 + scale * (plane[..., 0] - middle[0])
     y = HEIGHT / 2 - scale * (plane[..., 1] - middle[1])
@@ -47,11 +49,11 @@ def paths(positions: NDArray[np.float64], label: str) -> str:
         colour = PATHS[vehicle % len(PATHS)]
         parts.append(f"<polyline points='{line}' fill='none' stroke='{colour}' stroke-width='1'/>")
         parts.append(f"<circle cx='{points[-1][0]:.1f}' cy='{points[-1][1]:.1f}' r='3' fill='{colour}'/>")
-    return svg("".join(parts), label)
+    return make_svg("".join(parts), label)
 
 
-def bars(names: Sequence[str], values: Sequence[float], limits: Sequence[float], label: str) -> str:
-    """Distances as bars, red where below their limit, which is a line across each."""
+def draw_bars(names: Sequence[str], values: Sequence[float], limits: Sequence[float], label: str) -> str:
+    """Draws distances as bars, red below their limits. A line marks each limit."""
     if not names:
         return ""
     most = max([*values, *limits]) or 1.0
@@ -61,17 +63,18 @@ def bars(names: Sequence[str], values: Sequence[float], limits: Sequence[float],
     for k, (name, value, limit) in enumerate(zip(names, values, limits, strict=True)):
         top, thick = EDGE + k * step, 0.7 * step
         colour = COLOURS["bad"] if value < limit else PATHS[0]
-        parts.append(f"<rect x='{left}' y='{top:.1f}' width='{max(value, 0) * scale:.1f}' height='{thick:.1f}' fill='{colour}'/>")
+        width = max(value, 0) * scale
+        parts.append(f"<rect x='{left}' y='{top:.1f}' width='{width:.1f}' height='{thick:.1f}' fill='{colour}'/>")
         at = left + limit * scale
         parts.append(f"<line x1='{at:.1f}' x2='{at:.1f}' y1='{top:.1f}' y2='{top + thick:.1f}' stroke='currentColor'/>")
         parts.append(
             f"<text x='{left - 6}' y='{top + 0.75 * thick:.1f}' font-size='10' text-anchor='end' fill='currentColor'>"
             f"{html.escape(name[:18])}</text>"
         )
-    return svg("".join(parts), label)
+    return make_svg("".join(parts), label)
 
 
-def svg(inside: str, label: str) -> str:
-    """A drawing with what it is, for those who do not see it."""
+def make_svg(inside: str, label: str) -> str:
+    """Returns a drawing with a label for screen readers."""
     size = f"width='{WIDTH}' height='{HEIGHT}' viewBox='0 0 {WIDTH} {HEIGHT}'"
     return f"<svg xmlns='http://www.w3.org/2000/svg' {size} role='img' aria-label='{html.escape(label)}'>{inside}</svg>"

@@ -12,37 +12,40 @@ if TYPE_CHECKING:
 
 
 class Law:
-    """A control law: derive from it and write :meth:`control`.
+    """Base class of control laws: subclasses define :meth:`control`.
+
+    Example::
 
         class Springs(tl.Law):
             def control(self, obs, out):
-                out[:] = obs.slots_m - obs.positions - 2 * obs.velocities
+                out[:] = obs.slots_m - obs.positions - 2 * obs.velocities  # Damped springs.
 
-    Nothing is certified of it, and the judge judges it like any other. It is asked in the thread that flies. What it remembers
-    is its own: copies of a simulation ask the same object.
+    Such a law has no certificate; its flights are audited like all others. The thread of the flight calls it. Copies
+    of a simulation share the object, so its state is not copied.
     """
 
-    #: What it is called in reports; the name of the class unless given.
+    #: Name in reports; the name of the class unless given.
     name: str | None = None
-    #: How near of each other vehicles must be to be in ``obs.near`` [m]; None for a law that senses nobody.
+    #: Largest separation of the pairs in ``obs.near`` [m]; None for a law without sensing.
     sensing_range_m: float | None = None
-    #: What counts as a formation reached: ``"places"`` (slots where the reference has carried them), ``"displacements"`` (up to
-    #: translation) or ``"distances"`` (up to rotation, reflection and translation).
+    #: How a formation counts as reached. With ``"places"`` the vehicles are at the slots, moved with the reference.
+    #: ``"displacements"`` ignores a translation, ``"distances"`` also a rotation and a reflection.
     reaches: ClassVar[str] = "displacements"
 
     def control(self, obs: Observation, out: NDArray[np.float64]) -> None:
-        """Writes accelerations [m/s^2] into ``out``, an array (N, 3) that is NaN everywhere before: a vehicle without a command
-        ends the flight with an error.
+        """Writes the accelerations [m/s^2] of all vehicles into ``out``.
 
-        ``obs`` has ``t`` [s], ``positions`` and ``velocities`` (N, 3), ``slots_m`` (N, 3) where the vehicles shall be now, and
-        more (:class:`tautline.Observation`). What is raised here ends the flight and is raised by what flew it.
+        ``out`` is an array (N, 3) that is NaN at the start. A vehicle whose row is not finite ends the flight with an
+        error. ``obs`` is a :class:`tautline.Observation`. It has the time ``t`` [s], and as arrays (N, 3)
+        ``positions``, ``velocities`` and the slots of this time, ``slots_m``. An exception ends the flight, and the
+        call that flies raises it again.
         """
         raise NotImplementedError("write control(self, obs, out) of your law")
 
 
 def check_law(law: object) -> None:
-    """Refuses the class of a law in the place of a law, and names that are none."""
+    """Raises ``TypeError`` for a class in place of its instance, and for a name that is not a string."""
     if isinstance(law, type):
-        raise TypeError(f"law: a law is needed, not the class {law.__name__}: make one, {law.__name__}(...)")
+        raise TypeError(f"law: a law is needed, not the class {law.__name__}; give {law.__name__}(...)")
     if not isinstance(name := getattr(law, "name", None), (str, type(None))):
-        raise TypeError(f"name: the law's name is a string, not {type(name).__name__}")
+        raise TypeError(f"law.name: must be a string, not {type(name).__name__}")

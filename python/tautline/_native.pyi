@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 __all__ = [
     "Columns",
     "Error",
-    "Flown",
+    "FlightData",
     "Observation",
     "Question",
     "ReadOptions",
     "Scenario",
-    "Seen",
+    "FlightFindings",
     "Simulation",
     "attack",
     "audit_arrays",
@@ -31,30 +31,30 @@ __all__ = [
 ]
 
 class Error(ValueError):
-    """The input is wrong: the message names the place, the value and the remedy, as the command line does."""
+    """Wrong input. The message has the place, the problem, the value and the remedy."""
 
-    #: The stable name of the problem, such as ``audit/no-limit`` (docs/errors.md); None where an argument has the wrong form.
+    #: Stable code of the problem, such as ``audit/no-limit`` (docs/errors.md); None for an argument of a wrong form.
     code: str | None
 
 @final
 class Observation:
-    """What a law is told at one instant; the arrays are its own and may be kept."""
+    """Observation of a law at an instant. The arrays are copies, which the law may keep."""
 
     @property
     def t(self) -> float:
         """Time of the flight [s]."""
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(N, 3) positions [m]: row i is what vehicle i knows of itself."""
+        """(N, 3) positions [m]; row i is the own position that vehicle i measures."""
     @property
     def velocities(self) -> NDArray[np.float64]:
         """(N, 3) velocities [m/s]."""
     @property
     def slots_m(self) -> NDArray[np.float64]:
-        """(N, 3) where the vehicles shall be now [m]: the slots of the leg, carried along with the reference."""
+        """(N, 3) slots of the leg [m], moved with the reference."""
     @property
     def leg(self) -> int:
-        """The leg, from 0."""
+        """Number of the leg, from 0."""
     @property
     def reference_velocity_m_s(self) -> tuple[float, float, float]:
         """Velocity of the reference [m/s]."""
@@ -63,25 +63,25 @@ class Observation:
         """Acceleration of the reference [m/s^2]."""
     @property
     def near(self) -> NDArray[np.int64]:
-        """(K, 2) pairs i < j of vehicles, from 0, that are near each other; none unless the law has a sensing range."""
+        """(K, 2) pairs i < j, from 0, within the sensing range of the law; empty without a range."""
     @property
     def shared(self) -> bool:
-        """Whether all know of each other what each knows of itself, ``positions`` and ``velocities``; what follows is None then."""
+        """Whether every vehicle knows all ``positions`` and ``velocities``; the arrays below are then None."""
     @property
     def heard_positions(self) -> NDArray[np.float64] | None:
-        """(N, N, 3) positions [m]: ``[i, j]`` is what vehicle i last heard of vehicle j."""
+        """(N, N, 3) positions [m]; ``[i, j]`` is the last position of vehicle j that vehicle i received."""
     @property
     def heard_velocities(self) -> NDArray[np.float64] | None:
-        """(N, N, 3) velocities [m/s], in the same way."""
+        """(N, N, 3) velocities [m/s], with the same indices."""
     @property
     def heard_ages_s(self) -> NDArray[np.float64] | None:
-        """(N, N) how old that is [s]."""
+        """(N, N) ages of these positions and velocities [s]."""
     @property
     def seen_positions(self) -> NDArray[np.float64] | None:
-        """(N, N, 3) positions [m] of vehicle j that vehicle i sees with a sensor, where the law has a sensing range."""
+        """(N, N, 3) positions [m] of vehicle j from a sensor of vehicle i; None without a sensing range."""
     @property
     def seen_velocities(self) -> NDArray[np.float64] | None:
-        """(N, N, 3) velocities [m/s], in the same way."""
+        """(N, N, 3) velocities [m/s], with the same indices."""
 
 @final
 class Scenario:
@@ -140,7 +140,7 @@ class Simulation:
     def copy(self, noise_seed: int | None) -> Simulation: ...
 
 @final
-class Flown:
+class FlightData:
     @property
     def passed(self) -> bool: ...
     @property
@@ -160,11 +160,11 @@ class Flown:
     @property
     def separations_m(self) -> NDArray[np.float64]: ...
     @property
-    def seen(self) -> Seen: ...
+    def findings(self) -> FlightFindings: ...
 
 @final
-class Seen:
-    """What a flight said of itself beside its instants."""
+class FlightFindings:
+    """Limits, obstacles and audit of a flight."""
 
 @final
 class Columns:
@@ -195,9 +195,9 @@ class Columns:
     @property
     def piece_coefficients(self) -> NDArray[np.float64]: ...
 
-_Judged = tuple[str, str, str, str]
-_Answered = tuple[bool, str]
-_OfVehicles = tuple[float | None, Sequence[tuple[str, float]]]
+_AuditOutcome = tuple[str, str, str, str]
+_Answer = tuple[bool, str]
+_NumberOrByName = tuple[float | None, Sequence[tuple[str, float]]]
 
 @final
 class ReadOptions:
@@ -230,8 +230,8 @@ class Question:
         *,
         delta: float | None,
         motion: str | None,
-        max_accel: _OfVehicles,
-        radius: _OfVehicles,
+        max_accel: _NumberOrByName,
+        radius: _NumberOrByName,
         ellipsoid: Sequence[float] | None,
         obstacles: str | None,
         limit: Sequence[tuple[str, float]],
@@ -261,7 +261,7 @@ def attack(
     seed: int,
     out: str | None,
     outputs: dict[str, str | bool | int | None],
-) -> _Answered: ...
+) -> _Answer: ...
 def audit_arrays(
     question: Question,
     command: str,
@@ -269,13 +269,15 @@ def audit_arrays(
     positions: Any,
     velocities: Any | None,
     names: Sequence[str],
-    seen: Seen | None,
+    findings: FlightFindings | None,
     html: str | None,
-) -> _Judged: ...
+) -> _AuditOutcome: ...
 def audit_files(
     question: Question, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
-) -> _Judged: ...
-def audit_in_rust(times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float) -> tuple[float, float]: ...
+) -> _AuditOutcome: ...
+def audit_in_rust(
+    times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float
+) -> tuple[float, float]: ...
 def campaign(
     spec: str,
     out: str | None,
@@ -291,7 +293,7 @@ def compare(
     runs: int,
     seed: int,
     outputs: dict[str, str | bool | int | None],
-) -> _Answered: ...
+) -> _Answer: ...
 def export(
     paths: Sequence[str],
     options: ReadOptions,
@@ -302,7 +304,7 @@ def export(
 ) -> None: ...
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
-) -> Flown: ...
+) -> FlightData: ...
 def main(arguments: Sequence[str]) -> int: ...
 def margin(
     scenario: Scenario,
@@ -316,7 +318,7 @@ def margin(
     halvings: int,
     logarithmic: bool,
     outputs: dict[str, str | bool | int | None],
-) -> _Answered: ...
+) -> _Answer: ...
 def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
 def sweep(
@@ -326,5 +328,5 @@ def sweep(
     seed: int,
     verdict: str,
     outputs: dict[str, str | bool | int | None],
-) -> _Answered: ...
-def validate(out: str, force: bool, threads: int | None) -> _Answered: ...
+) -> _Answer: ...
+def validate(out: str, force: bool, threads: int | None) -> _Answer: ...

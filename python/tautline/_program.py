@@ -1,4 +1,4 @@
-"""Commands of the command line as functions: exports, laws side by side, margins, sweeps, attacks, the claims of the paper."""
+"""Commands of the command line as functions: exports, studies, and the validation of the paper's claims."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from pathlib import Path
 from typing import Any
 
 from . import _display, _native
-from ._scenario import Scenario, scenario_of
-from ._tables import Finding, Findings, cell
-from ._words import (
+from ._arguments import (
     PathLike,
-    by_name,
+    boolean,
     count,
-    flag,
-    listed,
-    maybe,
-    maybe_count,
-    maybe_path,
+    mapping,
+    name_list,
     number,
-    one_recording,
+    optional_count,
+    optional_number,
+    optional_path,
+    optional_text,
     path,
     paths,
-    reading,
-    text,
+    read_options,
+    single_recording,
     with_files,
 )
+from ._scenario import Scenario, to_scenario
+from ._tables import Finding, Findings, format_cell
 
 
 class Answer(Finding):
-    """What a command answers: a mapping with the keys of its JSON, which are attributes too; lists of rows become tables."""
+    """Result of a command: a mapping with the keys of its JSON, which are attributes as well. Lists of rows become
+    tables."""
 
     def __init__(self, is_good: bool, text: str) -> None:
         super().__init__(json.loads(text))
-        #: Whether the command line would end with 0.
         self._is_good = is_good
 
     @property
     def is_good(self) -> bool:
-        """Whether the command line would end with exit code 0: judged and good."""
+        """Whether the exit code of the command line would be 0."""
         return self._is_good
 
     def __bool__(self) -> bool:
-        raise TypeError("an answer is neither true nor false: ask is_good")
+        raise TypeError("an answer is neither true nor false; use is_good")
 
     def __getattr__(self, key: str) -> Any:
         value = super().__getattr__(key)
@@ -53,17 +53,17 @@ class Answer(Finding):
         return Findings(value) if is_rows else value
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that ``--json`` prints."""
+        """Returns the JSON that the command prints, as a dictionary."""
         return dict(self)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {'good' if self.is_good else 'bad'}: {', '.join(self)}>"
 
     def _repr_html_(self) -> str:
-        plain = [(key, cell(value)) for key, value in self.items() if not isinstance(value, (list, dict))]
+        plain = [(key, format_cell(value)) for key, value in self.items() if not isinstance(value, (list, dict))]
         tables = [(key, value) for key in self if isinstance(value := getattr(self, key), Findings)]
         shown = "".join(f"<h4>{escape(key)}</h4>{value._repr_html_()}" for key, value in tables)
-        return _display.card("good" if self.is_good else "bad", type(self).__name__, plain) + shown
+        return _display.make_card("good" if self.is_good else "bad", type(self).__name__, plain) + shown
 
 
 def export(
@@ -75,33 +75,36 @@ def export(
     force: bool = False,
     **read_as: Any,
 ) -> None:
-    """Writes a recording of any format as CSV, Parquet, NPZ or MCAP, the same to the last bit.
+    """Writes a recording of any format as CSV, Parquet, NPZ or MCAP, without rounding.
 
-    The format is that of the name of ``output``, or ``to``: ``csv``, ``parquet``, ``npz``, ``mcap``. Curves are sampled at ``sample_hz``. A file
-    that exists is overwritten with ``force``. ``read_as`` is as in :func:`tautline.audit`. Raises as :func:`tautline.read`, and ``OSError`` where the file
-    cannot be written.
+    The name of ``output`` gives the format, unless ``to`` is ``csv``, ``parquet``, ``npz`` or ``mcap``. Curves are
+    sampled at ``sample_hz``. ``force`` overwrites an existing file. The options of reading are those of
+    :func:`tautline.audit`. Raises the exceptions of :func:`tautline.read`, and ``OSError`` where the file cannot be
+    written.
     """
-    recordings = one_recording(paths(recording, "recording"), read_as)
-    options, target = reading(**read_as), path(output, "output")
-    how = text(to, "to"), maybe(sample_hz, "sample_hz"), flag(force, "force")
-    with_files(recordings, lambda: _native.export(recordings, options, target, *how))
+    recordings = single_recording(paths(recording, "recording"), read_as)
+    options, target = read_options(**read_as), path(output, "output")
+    more = optional_text(to, "to"), optional_number(sample_hz, "sample_hz"), boolean(force, "force")
+    with_files(recordings, lambda: _native.export(recordings, options, target, *more))
 
 
-def asked(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _native.Scenario:
-    """The scenario of a study, as its file says it now."""
-    found = scenario_of(scenario, set)
+def study_scenario(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _native.Scenario:
+    """Returns the scenario of a study. Raises :class:`Error` where its file has changed."""
+    found = to_scenario(scenario, set)
     found._check_unchanged()
     return found._native
 
 
-def outputs(csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None) -> dict[str, str | bool | int | None]:
-    """Files and threads of a study."""
+def outputs(
+    csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None
+) -> dict[str, str | bool | int | None]:
+    """Returns the files and threads of a study."""
     return {
-        "csv": maybe_path(csv, "csv"),
-        "latex": maybe_path(latex, "latex"),
-        "html": maybe_path(html, "html"),
-        "force": flag(force, "force"),
-        "threads": maybe_count(threads, "threads"),
+        "csv": optional_path(csv, "csv"),
+        "latex": optional_path(latex, "latex"),
+        "html": optional_path(html, "html"),
+        "force": boolean(force, "force"),
+        "threads": optional_count(threads, "threads"),
     }
 
 
@@ -118,15 +121,15 @@ def compare(
     force: bool = False,
     threads: int | None = None,
 ) -> Answer:
-    """Flies laws from the same starts, on all cores: ``answer.laws.to_pandas()`` is a row a law. docs/compare.md says what each number means.
+    """Flies laws from the same starts, on all cores. ``answer.laws.to_pandas()`` has a row for each law.
 
-    Laws are kinds or names of tables ``[laws.NAME]``; all that the scenario has unless given. Files that exist are overwritten
-    with ``force``.
+    ``laws`` are kinds or names of tables ``[laws.NAME]``, by default all that the scenario has. ``force`` overwrites
+    existing files. More in docs/compare.md.
     """
     return Answer(
         *_native.compare(
-            asked(scenario, set),
-            laws=None if laws is None else listed(laws, "laws"),
+            study_scenario(scenario, set),
+            laws=None if laws is None else name_list(laws, "laws"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
             outputs=outputs(csv, latex, html, force, threads),
@@ -153,11 +156,13 @@ def margin(
     force: bool = False,
     threads: int | None = None,
 ) -> Answer:
-    """How much of one key a verdict (``pass``, ``clear``, ``reached``) survives: the two values between ``start`` and ``stop`` between which it
-    turns. docs/margins.md says more."""
+    """Searches between ``start`` and ``stop`` for the two values of a key between which a verdict turns.
+
+    ``verdict`` is ``pass``, ``clear`` or ``reached``. More in docs/margins.md.
+    """
     return Answer(
         *_native.margin(
-            asked(scenario, set),
+            study_scenario(scenario, set),
             key=str(key),
             start=number(start, "start"),
             stop=number(stop, "stop"),
@@ -166,7 +171,7 @@ def margin(
             verdict=str(verdict),
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
-            logarithmic=flag(log, "log"),
+            logarithmic=boolean(log, "log"),
             outputs=outputs(csv, latex, html, force, threads),
         )
     )
@@ -186,16 +191,19 @@ def sweep(
     force: bool = False,
     threads: int | None = None,
 ) -> Answer:
-    """Flies the grid of one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``: ``answer.points.to_pandas()`` is a row a
-    point, with the share of runs that show a verdict (``pass``, ``clear``, ``reached``). docs/sweeps.md says more."""
+    """Flies a grid over one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``.
+
+    ``answer.points.to_pandas()`` has a row for each point, with the share of runs that have the ``verdict``.
+    ``verdict`` is ``pass``, ``clear`` or ``reached``. More in docs/sweeps.md.
+    """
     swept = []
-    for key, values in by_name(keys, "keys").items():
+    for key, values in mapping(keys, "keys").items():
         if isinstance(values, (str, bytes)) or not hasattr(values, "__iter__"):
             raise TypeError(f"keys: {key} needs a list of numbers, not {values!r}")
         swept.append((str(key), [number(value, key) for value in values]))
     return Answer(
         *_native.sweep(
-            asked(scenario, set),
+            study_scenario(scenario, set),
             keys=swept,
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
@@ -223,31 +231,38 @@ def attack(
     force: bool = False,
     threads: int | None = None,
 ) -> Answer:
-    """Searches for the worst start (up to ``start`` [m] from the scenario's), velocity (``velocity`` [m/s]) or keys (``vary``, with bounds). What
-    it does not find is no proof. docs/attack.md says more."""
+    """Searches for the flight with the smallest separation.
+
+    * ``start``: largest offset of each start position [m].
+    * ``velocity``: largest offset of each start velocity [m/s].
+    * ``vary``: keys, each with a lower and an upper bound.
+    * ``apart``: smallest separation of two start positions [m].
+
+    A search without a violation proves nothing. More in docs/attack.md.
+    """
     varied = []
-    for key, bounds in by_name(vary, "vary").items():
+    for key, bounds in mapping(vary, "vary").items():
         if not isinstance(bounds, (list, tuple)) or len(bounds) != 2:
             raise TypeError(f"vary: {key} needs a lower and an upper bound, not {bounds!r}")
         varied.append((str(key), number(bounds[0], key), number(bounds[1], key)))
     return Answer(
         *_native.attack(
-            asked(scenario, set),
-            start=maybe(start, "start"),
-            velocity=maybe(velocity, "velocity"),
-            apart=maybe(apart, "apart"),
+            study_scenario(scenario, set),
+            start=optional_number(start, "start"),
+            velocity=optional_number(velocity, "velocity"),
+            apart=optional_number(apart, "apart"),
             vary=varied,
             flights=count(flights, "flights"),
             seeds=count(seeds, "seeds"),
             seed=count(seed, "seed"),
-            out=maybe_path(out, "out"),
+            out=optional_path(out, "out"),
             outputs=outputs(csv, latex, html, force, threads),
         )
     )
 
 
 def validate(out: PathLike | None = None, *, force: bool = False, threads: int | None = None) -> Answer:
-    """Reproduces the paper and judges its claims and ours; figures and a page are left in the folder ``out`` where one is given."""
+    """Measures the claims of the paper and of tautline. Writes figures and a page into the folder ``out``, if given."""
     with tempfile.TemporaryDirectory() as folder:
         at = str(Path(folder) / "validate") if out is None else path(out, "out")
-        return Answer(*_native.validate(at, flag(force, "force"), maybe_count(threads, "threads")))
+        return Answer(*_native.validate(at, boolean(force, "force"), optional_count(threads, "threads")))

@@ -9,26 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _display, _native
+from ._arguments import PathLike, paths, read_options, single_recording, with_files
 from ._audit import Audit, audit
 from ._native import Error
-from ._tables import frame
-from ._words import PathLike, one_recording, paths, reading, with_files
+from ._tables import to_frame
 
 if TYPE_CHECKING:
     import pandas
 
-#: An interval longer than so many usual ones is a gap, as the judge has it.
-GAP_OVER_USUAL = 1.5
-#: Most numbers that are made of a recording: 2 GiB.
-MOST_NUMBERS = 2**28
+#: An interval longer than this many usual intervals is a gap, as in an audit.
+GAP_FACTOR = 1.5
+#: Largest array of positions: 2 GiB.
+MAX_NUMBERS = 2**28
 
 
 class Recording:
-    """A recording in memory: who was seen where and when."""
+    """A recording in memory: samples and curves of vehicles."""
 
     def __init__(self, files: list[str], read_as: dict[str, Any]) -> None:
-        self._files, self._read_as = one_recording(files, read_as), read_as
-        options = reading(**read_as)
+        self._files, self._read_as = single_recording(files, read_as), read_as
+        options = read_options(**read_as)
         self._columns = with_files(files, lambda: _native.read(files, options))
 
     @property
@@ -38,51 +38,52 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """What should be known of how it was read, a sentence each."""
+        """Notes on how the recording was read, a sentence each."""
         return self._columns.notes
 
     @property
     def is_planar(self) -> bool:
-        """Whether the height of some vehicle is not known: z is 0 everywhere then and has no meaning."""
+        """Whether the height of a vehicle is unknown; z is then 0 everywhere and has no meaning."""
         return self._columns.planar
 
     @property
     def epoch_ns(self) -> int:
-        """What was taken from every time, so that no digit of a clock in nanoseconds is lost [ns]."""
+        """Epoch that was subtracted from all times, so that clocks in nanoseconds keep their digits [ns]."""
         return self._columns.epoch_ns
 
     @property
     def has_curves(self) -> bool:
-        """Whether some of the motion is curves and not samples."""
+        """Whether the motion of a vehicle is given by curves."""
         return len(self._columns.piece_vehicle) > 0
 
     def to_numpy(
         self, hz: float | None = None, *, max_gap_s: float | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (T,) [s] and positions (T, N, 3) [m], in the order of ``vehicles``; NaN where a vehicle was not seen.
+        """Returns times (T,) [s] and positions (T, N, 3) [m] in the order of ``vehicles``. NaN means not seen.
 
-        Without ``hz`` the instants are those of the recording, bit for bit. With it they are regular, from the first instant on;
-        positions are on straight lines between samples and on the recording's curves, and NaN where two samples are
-        farther apart than ``max_gap_s`` (by default one and a half of the vehicle's usual interval).
+        Without ``hz`` the instants are those of the recording, without rounding. With ``hz`` they are regular from
+        the first instant on. Positions then lie on straight lines between samples, or on curves. They are NaN within
+        intervals longer than ``max_gap_s``, by default 1.5 times the vehicle's usual interval.
 
-        Raises :class:`Error` for curves without ``hz``, and for a rate that is not positive or gives too many numbers.
+        Raises :class:`Error` for curves without ``hz``, for a rate that is not positive, and for arrays that are too
+        large.
         """
         if max_gap_s is not None and not max_gap_s >= 0:
-            raise Error(f"max_gap_s is {max_gap_s}; give a time of 0 s or more")
+            raise Error(f"max_gap_s: must be 0 s or more, got {max_gap_s}")
         if hz is None:
             return self._as_recorded()
         if isinstance(hz, bool) or not isinstance(hz, (int, float, np.integer, np.floating)):
             raise TypeError(f"hz: a number is needed, not {type(hz).__name__}")
         if not (np.isfinite(hz) and hz > 0):
-            raise Error(f"hz is {hz}; give a positive number of instants a second")
+            raise Error(f"hz: must be positive and finite, got {hz}")
         columns = self._columns
         starts = [*columns.t[:1], *columns.piece_span[:, 0]]
         ends = [*columns.t[-1:], *columns.piece_span[:, 1]]
         if not starts:
             return np.empty(0), np.empty((0, len(self.vehicles), 3))
         span_s = max(ends) - min(starts)
-        if span_s * hz * max(1, 3 * len(self.vehicles)) > MOST_NUMBERS:
-            raise Error(f"hz is {hz}: that would be {span_s * hz:.3g} instants; give a lower rate")
+        if span_s * hz * max(1, 3 * len(self.vehicles)) > MAX_NUMBERS:
+            raise Error(f"hz: {hz} gives {span_s * hz:.3g} instants; give a lower rate")
         t = min(starts) + np.arange(int(np.floor(span_s * hz + 1e-9)) + 1) / hz
         positions = np.full((len(t), len(self.vehicles), 3), np.nan)
         for vehicle in range(len(self.vehicles)):
@@ -92,17 +93,19 @@ class Recording:
 
     def _as_recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if self.has_curves:
-            raise Error("the recording has curves: say how often they are sampled with hz=")
+            raise Error("the recording has curves; give a sampling rate, hz=")
         columns = self._columns
         t, instant = np.unique(columns.t, return_inverse=True)
-        if len(t) * 3 * len(self.vehicles) > MOST_NUMBERS:
-            count = f"{len(t)} instants of {len(self.vehicles)} vehicles, most of which were not seen then"
-            raise Error(f"vehicles have clocks of their own: that would be {count}; give hz=")
+        if len(t) * 3 * len(self.vehicles) > MAX_NUMBERS:
+            size = f"{len(t)} instants of {len(self.vehicles)} vehicles, mostly without a position"
+            raise Error(f"the samples of vehicles have different times: {size}; give hz=")
         positions = np.full((len(t), len(self.vehicles), 3), np.nan)
         positions[instant, columns.vehicle] = columns.position
         return t, positions
 
-    def _interpolate(self, vehicle: int, t: NDArray[np.float64], out: NDArray[np.float64], max_gap_s: float | None) -> None:
+    def _interpolate(
+        self, vehicle: int, t: NDArray[np.float64], out: NDArray[np.float64], max_gap_s: float | None
+    ) -> None:
         own = self._columns.vehicle == vehicle
         seen_s, position = self._columns.t[own], self._columns.position[own]
         if len(seen_s) == 0:
@@ -110,7 +113,7 @@ class Recording:
         interval_s = np.diff(seen_s)
         if max_gap_s is None:
             usual = np.sort(interval_s)[(len(interval_s) - 1) // 2] if len(interval_s) else 0.0
-            max_gap_s = GAP_OVER_USUAL * usual
+            max_gap_s = GAP_FACTOR * usual
         after = np.searchsorted(seen_s, t, side="left").clip(0, len(seen_s) - 1)
         is_seen = (t >= seen_s[0]) & (t <= seen_s[-1])
         exact = seen_s[after] == t
@@ -131,10 +134,13 @@ class Recording:
             out[within] = at
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row a sample in order of time: ``t``, ``id``, ``x``, ``y``, ``z`` (not in a plane), and ``vx``, ``vy``, ``vz``, ``radius`` where there are. Imports
-        pandas. Raises :class:`Error` where the recording has curves."""
+        """Returns a table with a row for each sample in order of time. Imports pandas.
+
+        Its columns are ``t``, ``id`` and the axes of positions: ``x``, ``y``, ``z`` (unless planar). Those of
+        velocities and ``radius`` follow where known. Raises :class:`Error` for curves.
+        """
         if self.has_curves:
-            raise Error("the recording has curves, which are no rows: take to_numpy(hz=...)")
+            raise Error("the recording has curves, which have no rows; use to_numpy(hz=...)")
         columns = self._columns
         rows: dict[str, Any] = {"t": columns.t, "id": np.array(self.vehicles, dtype=object)[columns.vehicle]}
         letters = "xy" if self.is_planar else "xyz"
@@ -144,11 +150,11 @@ class Recording:
             rows |= {f"v{letter}": columns.velocity[:, axis] for axis, letter in enumerate(letters)}
         if not np.isnan(columns.radius).all():
             rows["radius"] = columns.radius
-        return frame(rows)
+        return to_frame(rows)
 
-    def audit(self, **asked: Any) -> Audit:
-        """Judges the recording as :func:`tautline.audit` judges its file: between samples too, by its own curves and notes."""
-        return audit(self._files, **{**self._read_as, **asked})
+    def audit(self, **options: Any) -> Audit:
+        """Audits the recording's files with :func:`tautline.audit`, with the same options of reading."""
+        return audit(self._files, **{**self._read_as, **options})
 
     def __len__(self) -> int:
         return len(self.vehicles)
@@ -165,17 +171,19 @@ class Recording:
             ("time", f"{min(t):.6g} s to {max(t):.6g} s" if t else "-"),
             *(("note", note) for note in self.notes),
         ]
-        return _display.card("open", ", ".join(self._files), rows)
+        return _display.make_card("open", ", ".join(self._files), rows)
 
     def __repr__(self) -> str:
-        kind = f"{len(self._columns.piece_vehicle)} pieces of curves" if self.has_curves else f"{len(self._columns.t)} samples"
-        return f"<Recording {', '.join(self._files)}: {len(self)} vehicles, {kind}>"
+        columns = self._columns
+        size = f"{len(columns.piece_vehicle)} pieces of curves" if self.has_curves else f"{len(columns.t)} samples"
+        return f"<Recording {', '.join(self._files)}: {len(self)} vehicles, {size}>"
 
 
 def read(recording: PathLike | Sequence[PathLike], **read_as: Any) -> Recording:
-    """Reads a recording of any format into memory: a file or folder, or with ``join=True`` a list of files with a vehicle each.
+    """Reads a recording of any format into memory.
 
-    ``read_as`` is as in :func:`tautline.audit`. Raises ``FileNotFoundError`` for a missing file and :class:`Error`, with file, place, value and
-    remedy, for what cannot be read.
+    It is a file or folder, or with ``join=True`` a list of files with one vehicle each.
+    The options of reading are those of :func:`tautline.audit`. Raises ``FileNotFoundError`` for a missing file and
+    :class:`Error`, with file, place, value and remedy, for a file that cannot be read.
     """
     return Recording(paths(recording, "recording"), read_as)

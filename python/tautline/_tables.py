@@ -1,4 +1,4 @@
-"""What was found, as rows: lists of findings that become tables."""
+"""Findings, and their tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Finding(Mapping[str, Any]):
-    """One finding: its keys are those of the command line's JSON, and attributes too (``finding.min_m``)."""
+    """A finding. The keys of the command line's JSON are attributes as well (``finding.min_m``)."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values = dict(values)
@@ -32,7 +32,7 @@ class Finding(Mapping[str, Any]):
 
     @property
     def pair(self) -> tuple[str, str]:
-        """The names of the two that it is about; of an approach to an obstacle the vehicle and the obstacle."""
+        """Names of the two vehicles, or of the vehicle and the obstacle."""
         first, second = self._values["who"]
         return first, second
 
@@ -41,7 +41,7 @@ class Finding(Mapping[str, Any]):
 
 
 class Findings(Sequence[Finding]):
-    """Findings in their order."""
+    """A list of findings."""
 
     def __init__(self, rows: Sequence[Mapping[str, Any]]) -> None:
         self._rows = [Finding(row) for row in rows]
@@ -57,18 +57,18 @@ class Findings(Sequence[Finding]):
         return len(self._rows)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row a finding; the names of the two stand in ``first`` and ``second``. Imports pandas."""
-        return frame([flat(row) for row in self._rows])
+        """Returns a table with a row for each finding; ``first`` and ``second`` name the pair. Imports pandas."""
+        return to_frame([flatten(row) for row in self._rows])
 
     def __repr__(self) -> str:
         return f"Findings({self._rows!r})"
 
     def _repr_html_(self) -> str:
-        return table([flat(row) for row in self._rows])
+        return make_table([flatten(row) for row in self._rows])
 
 
-def flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A finding with its two names apart."""
+def flatten(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a finding with the names of its pair in two cells."""
     cells: dict[str, Any] = {}
     for key, value in row.items():
         if key == "who":
@@ -78,8 +78,8 @@ def flat(row: Mapping[str, Any]) -> dict[str, Any]:
     return cells
 
 
-def frame(rows: Any, **more: Any) -> pandas.DataFrame:
-    """A table of pandas, which is imported here."""
+def to_frame(rows: Any, **more: Any) -> pandas.DataFrame:
+    """Returns a table of pandas. Imports pandas."""
     try:
         import pandas
     except ImportError:
@@ -87,22 +87,22 @@ def frame(rows: Any, **more: Any) -> pandas.DataFrame:
     return pandas.DataFrame(rows, **more)
 
 
-def table(rows: Sequence[Mapping[str, Any]], most: int = 10) -> str:
-    """Rows as a table in HTML, the first of them where there are many."""
+def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:
+    """Returns the first rows as a table in HTML."""
     if not rows:
         return "<p>none</p>"
     columns = list(dict.fromkeys(key for row in rows for key in row))
     head = "".join(f"<th>{html.escape(str(column))}</th>" for column in columns)
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell(row.get(column)))}</td>" for column in columns) + "</tr>"
-        for row in rows[:most]
+        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(column)))}</td>" for column in columns) + "</tr>"
+        for row in rows[:max_rows]
     )
-    more = f"<p>and {len(rows) - most} more</p>" if len(rows) > most else ""
+    more = f"<p>and {len(rows) - max_rows} more</p>" if len(rows) > max_rows else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 
-def cell(value: object) -> str:
-    """A value as people read it."""
+def format_cell(value: object) -> str:
+    """Returns a value as text, rounded to six digits."""
     if value is None:
         return "-"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

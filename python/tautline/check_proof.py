@@ -1,6 +1,6 @@
 """Checks a proof of `tautline audit DATA --delta D --proof proof.json` by exact arithmetic.
 
-    python3 check_proof.py proof.json data.csv
+Usage: `python3 check_proof.py proof.json data.csv`.
 
 Exits with 0 if the claim is confirmed, 1 if it is denied, and 2 if a file cannot be read. The program shares no code
 with tautline and needs the standard library alone. Distances are compared as fractions of the doubles in the files.

@@ -1,4 +1,4 @@
-"""A cluster of Slurm with one node: this machine, with daemons, ports, keys and folders of its own."""
+"""A cluster of Slurm with this machine as its only node, and with its own daemons, ports, keys and folders."""
 
 from __future__ import annotations
 
@@ -12,39 +12,39 @@ from pathlib import Path
 from campaigns import children, end, ran, until
 from ray_node import free_port
 
-CONFIGURATION = """\
-ClusterName=tautline
-SlurmctldHost={host}(127.0.0.1)
-SlurmctldPort={controller}
-SlurmdPort={node}
-SlurmUser={user}
-SlurmdUser={user}
-AuthType=auth/munge
-AuthInfo=socket={folder}/munge/socket
-StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool
-SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd.pid
-ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SwitchType=switch/none
-MpiDefault=none
-ReturnToService=2
-SelectType=select/cons_tres
-SelectTypeParameters=CR_CPU
-SlurmdParameters=config_overrides
-SchedulerParameters=sched_interval=1,sched_min_interval=0
-MaxArraySize={most}
-NodeName={host} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN
-PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
-"""
+CONFIGURATION = [
+    "ClusterName=tautline",
+    "SlurmctldHost={host}(127.0.0.1)",
+    "SlurmctldPort={controller}",
+    "SlurmdPort={node}",
+    "SlurmUser={user}",
+    "SlurmdUser={user}",
+    "AuthType=auth/munge",
+    "AuthInfo=socket={folder}/munge/socket",
+    "StateSaveLocation={folder}/state",
+    "SlurmdSpoolDir={folder}/spool",
+    "SlurmctldPidFile={folder}/slurmctld.pid",
+    "SlurmdPidFile={folder}/slurmd.pid",
+    "ProctrackType=proctrack/linuxproc",
+    "TaskPlugin=task/none",
+    "SwitchType=switch/none",
+    "MpiDefault=none",
+    "ReturnToService=2",
+    "SelectType=select/cons_tres",
+    "SelectTypeParameters=CR_CPU",
+    "SlurmdParameters=config_overrides",
+    "SchedulerParameters=sched_interval=1,sched_min_interval=0",
+    "MaxArraySize={most}",
+    "NodeName={host} NodeAddr=127.0.0.1 CPUs=2 State=UNKNOWN",
+    "PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP",
+]
 
 
 class Slurm:
     """A cluster whose arrays have at most ``most`` tasks."""
 
     def __init__(self, folder: Path, most: int) -> None:
-        """Starts it and waits until the node is idle; ``end`` ends it, whatever came of this."""
+        """Writes keys and configuration. ``start`` starts the daemons, ``end`` ends them."""
         self.daemons: list[subprocess.Popen[bytes]] = []
         self.folder = folder
         for name, mode in [("munge", 0o711), ("state", 0o700), ("spool", 0o755)]:
@@ -56,9 +56,9 @@ class Slurm:
         key.chmod(0o400)
         configuration = folder / "slurm.conf"
         host, user = socket.gethostname().partition(".")[0], pwd.getpwuid(os.getuid()).pw_name
-        configuration.write_text(CONFIGURATION.format(
-            host=host, user=user, folder=folder, most=most, controller=free_port(), node=free_port()
-        ))
+        text = "".join(f"{line}\n" for line in CONFIGURATION)
+        ports = {"controller": free_port(), "node": free_port()}
+        configuration.write_text(text.format(host=host, user=user, folder=folder, most=most, **ports))
         self.environment = {**os.environ, "SLURM_CONF": str(configuration)}
         self.environment["PATH"] += ":/usr/sbin"
 
@@ -66,12 +66,12 @@ class Slurm:
         """Starts the daemons and waits until the node takes jobs."""
         munge = self.folder / "munge"
         files = {"socket": "socket", "key-file": "key", "pid-file": "pid", "log-file": "log", "seed-file": "seed"}
-        # Forced to take folders that others than root can write above: they are in /tmp.
+        # Munge refuses sockets below folders such as /tmp, which others can write, unless forced.
         self.daemon("munged", "--foreground", "--force", *(f"--{name}={munge / file}" for name, file in files.items()))
         until((munge / "socket").exists, 20, "munged does not start")
         self.daemon("slurmctld", "-D")
         self.daemon("slurmd", "-D")
-        until(lambda: self.asked("sinfo", "--noheader", "--format=%t") == "idle", 60, "no node of Slurm")
+        until(lambda: self.output_of("sinfo", "--noheader", "--format=%t") == "idle", 60, "no node of Slurm")
 
     def daemon(self, *command: str) -> None:
         """Starts a daemon in the foreground."""
@@ -79,17 +79,17 @@ class Slurm:
             daemon = subprocess.Popen(command, stdout=log, stderr=log, env=self.environment, start_new_session=True)
         self.daemons.append(daemon)
 
-    def asked(self, *command: str | Path) -> str:
-        """What one of Slurm's commands prints; empty where it fails."""
+    def output_of(self, *command: str | Path) -> str:
+        """Returns the output of a command of Slurm; empty if it fails."""
         return ran(*command, env=self.environment).stdout.strip()
 
     def is_empty(self) -> bool:
-        """Whether no job is waiting or running."""
+        """Whether no job waits or runs."""
         answer = ran("squeue", "--noheader", env=self.environment)
         return answer.returncode == 0 and not answer.stdout.strip()
 
     def end(self) -> None:
-        """Ends its daemons, and nothing else."""
+        """Ends the daemons."""
         for daemon in reversed(self.daemons):
             started = children(daemon.pid)
             daemon.terminate()

@@ -1,4 +1,4 @@
-"""Runs the commands of a page, or says what is wrong with those that it does not run."""
+"""Runs the commands of a page, and checks the arguments of those that it does not run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pages import ROOT, Block, Page
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 TAUTLINE = Path(os.environ.get("TAUTLINE", TARGET / "debug" / "tautline")).resolve()
 
-# Rust programs that cargo starts by name, and where each kind of them lies.
+# Options of cargo for programs by name, and the folders of these programs.
 CARGO_TARGETS = {"--example": "examples", "--bench": "benches", "--test": "tests"}
 
 MOST_S = 3600 if os.environ.get("TAUTLINE_LONG") else 170
@@ -39,15 +39,15 @@ class Command:
 
 @dataclass(frozen=True)
 class Ran:
-    """What came of a command."""
+    """Result of a command."""
 
     exit_code: int
     output: str
-    """Standard output and behind it standard error."""
+    """Standard output followed by standard error."""
 
 
 def commands(block: Block) -> list[Command]:
-    """The commands of a block, with the exit code that a comment on their line says, or 0."""
+    """Returns the commands of a block, with the exit code in a comment on their line, or 0."""
     made: list[Command] = []
     text, said, begin = "", 0, 0
     for number, line in enumerate(block.text.splitlines(), block.line + 1):
@@ -66,7 +66,7 @@ def commands(block: Block) -> list[Command]:
 
 
 def as_run(command: Command) -> str | None:
-    """The command as the tests run it, or `None` where they do not."""
+    """Returns the command that the tests run, or `None` for a command that they do not run."""
     text = command.text
     if listed(NOT_RUN_HERE, command) or (listed(LONG, command) and not os.environ.get("TAUTLINE_LONG")):
         return None
@@ -88,7 +88,13 @@ def run(text: str, folder: Path, programs: Path) -> Ran:
     environment = {"PATH": path, "HOME": str(folder), "NO_COLOR": "1", "COLUMNS": "200"}
     try:
         done = subprocess.run(
-            ["sh", "-c", text], cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=MOST_S, check=False
+            ["sh", "-c", text],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=MOST_S,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         return Ran(-1, f"not done after {MOST_S} s: the table LONG of tests/docs/exceptions.py is for such commands")
@@ -97,26 +103,27 @@ def run(text: str, folder: Path, programs: Path) -> Ran:
 
 
 def wrong(command: Command, ran: Ran) -> str | None:
-    """What is wrong with what came of it."""
+    """Returns an error unless the exit code is that of the page."""
     if ran.exit_code == command.exit_code:
         return None
-    said = f"the page says exit code {command.exit_code}, it was {ran.exit_code}"
-    return f"{command.place}: {command.text}\n{said}:\n{ran.output.strip()}"
+    problem = f"the page says exit code {command.exit_code}, it was {ran.exit_code}"
+    return f"{command.place}: {command.text}\n{problem}:\n{ran.output.strip()}"
 
 
 def unread(command: Command) -> list[str]:
-    """What is wrong with a command that is not run: a program that nobody lists, a target that is not there, an unknown option."""
+    """Returns the errors of a command that is not run: an unlisted program, a missing target, an unknown option."""
     found = []
     known = command.program in RUN | NOT_RUN.keys() or Path(command.program).name == "tautline"
     if not known:
         found.append(f"{command.place}: `{command.program}` is neither run nor excepted in tests/docs/exceptions.py")
     if command.program == "cargo":
         found += missing_targets(command)
-    return found + [f"{command.place}: {one}" for arguments in spoken(command.text) for one in unknown_arguments(arguments)]
+    unknown = [error for arguments in spoken(command.text) for error in unknown_arguments(arguments)]
+    return found + [f"{command.place}: {error}" for error in unknown]
 
 
 def unread_within(page: Page) -> list[str]:
-    """What is wrong with the commands that a page names within its lines."""
+    """Returns the errors of commands within the lines of a page."""
     named = [one for one in page.spoken if re.match(r"(tautline|cargo) [a-z]", one.target)]
     return [wrong for one in named for wrong in unread(Command(one.target, one.place, page.name, 0))]
 
@@ -131,7 +138,7 @@ def missing_targets(command: Command) -> list[str]:
 
 
 def spoken(text: str) -> list[list[str]]:
-    """The arguments of every call of tautline in some text: a command, or a file that holds commands."""
+    """Returns the arguments of every call of tautline in a text."""
     if text.startswith("tautline "):
         return [shlex.split(text)[1:]]
     calls = re.findall(r"(?:^|[\s(\"'])(?:/[\w/.-]*/)?tautline((?: +[^\s|;&)\"'<>#`]+)+)", text)
@@ -139,7 +146,7 @@ def spoken(text: str) -> list[list[str]]:
 
 
 def unknown_arguments(arguments: list[str]) -> list[str]:
-    """Commands and options that the program's help does not have."""
+    """Returns errors for commands and options that the help of the program does not have."""
     words = [word for word in arguments[:2] if re.fullmatch(r"[a-z]+", word)]
     if not words or words[0] not in subcommands(()):
         return [f"tautline has no command `{arguments[0]}`"]
@@ -163,11 +170,12 @@ def subcommands(path: tuple[str, ...]) -> list[str]:
 
 
 def known_options(path: tuple[str, ...]) -> set[str]:
-    return set(re.findall(r"^ +(-\w)\b", help_of(path), re.MULTILINE)) | set(re.findall(r"--[a-z][\w-]*", help_of(path)))
+    text = help_of(path)
+    return set(re.findall(r"^ +(-\w)\b", text, re.MULTILINE)) | set(re.findall(r"--[a-z][\w-]*", text))
 
 
 def missing_lines(shown: str, printed: str) -> str | None:
-    """The first line that a page shows and the command did not print: its lines stand one below the other, but for `...`."""
+    """Returns the first line of a page that the output does not have. `...` stands for omitted lines."""
     have = [line.rstrip() for line in printed.splitlines()]
     position = 0
     for part in re.split(r"^\.\.\.$", shown, flags=re.MULTILINE):

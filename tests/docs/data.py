@@ -1,4 +1,4 @@
-"""Blocks of a page that are files: scenarios, campaigns and obstacles are given to the program, the rest is parsed."""
+"""Checks blocks that are files: the program reads scenarios, campaigns and obstacles, others are parsed."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from commands import help_of, run, spoken, unknown_arguments
+from commands import run, spoken, unknown_arguments
 from exceptions import AROUND
 from pages import ROOT, Block
 
 WRONG_INPUT = 2
 
-# Files that an audit is given, by their first key, and the option that takes them.
-ASKED_OF_AUDIT = {"obstacle": "--obstacles", "fence": "--fence", "audit": "--config"}
+# First key of a file for `tautline audit`, and its option.
+AUDIT_FILES = {"obstacle": "--obstacles", "fence": "--fence", "audit": "--config"}
 
 TWO = "t_s,id,x,y,z\n0,a,100,100,100\n0,b,110,100,100\n1,a,100,100,100\n1,b,110,100,100\n"
 
 
 def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:
-    """What is wrong with a block that is no command."""
+    """Returns the errors of a block that is not a command."""
     try:
         if block.language == "toml":
             return wrong_toml(block, folder, programs)
@@ -36,7 +36,7 @@ def wrong_data(block: Block, folder: Path, programs: Path) -> list[str]:
     except (ValueError, SyntaxError) as error:
         return [f"{block.place}: {error}"]
     known = ("toml", "json", "yaml", "python", "rust", "csv", "")
-    return [] if block.language in known else [f"{block.place}: nobody tests blocks of `{block.language}`"]
+    return [] if block.language in known else [f"{block.place}: no test for blocks of `{block.language}`"]
 
 
 def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
@@ -50,9 +50,9 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
         command = f"tautline check {file}"
     elif "scenario" in keys:
         command = f"tautline campaign plan {file} --out plan-{block.line}"
-    elif len(keys) == 1 and keys.keys() <= ASKED_OF_AUDIT.keys():
+    elif len(keys) == 1 and keys.keys() <= AUDIT_FILES.keys():
         (folder / "two.csv").write_text(TWO, encoding="utf-8")
-        command = f"tautline audit two.csv --delta 0.5 {' '.join(ASKED_OF_AUDIT[key] for key in keys)} {file}"
+        command = f"tautline audit two.csv --delta 0.5 {' '.join(AUDIT_FILES[key] for key in keys)} {file}"
     else:
         sets = [*AROUND.get(block.page, []), *settings(keys)]
         command = f"tautline check pentagon {' '.join(f'--set {shlex.quote(one)}' for one in sets)}"
@@ -62,7 +62,7 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
 
 
 def wrong_features(block: Block, keys: dict[str, Any]) -> list[str]:
-    """What is wrong with how a crate of the reader's asks for those of this workspace, which it finds at `../tautline`."""
+    """Returns the errors of a Cargo.toml that depends on crates of this workspace at `../tautline`."""
     wrong = []
     for name, asked in keys["dependencies"].items():
         manifest = ROOT / Path(asked["path"]).relative_to("../tautline") / "Cargo.toml"
@@ -70,12 +70,13 @@ def wrong_features(block: Block, keys: dict[str, Any]) -> list[str]:
         if ours.get("package", {}).get("name") != name:
             wrong.append(f"{block.place}: there is no crate {name} at {asked['path']}")
         known = ours.get("features", {})
-        wrong += [f"{block.place}: {name} has no feature {one}" for one in asked.get("features", []) if one not in known]
+        missing = [feature for feature in asked.get("features", []) if feature not in known]
+        wrong += [f"{block.place}: {name} has no feature {feature}" for feature in missing]
     return wrong
 
 
 def settings(table: dict[str, Any], path: str = "") -> list[str]:
-    """What `--set` takes to set every key of a table by itself."""
+    """Returns a value of `--set` for each key of a table."""
     made = []
     for key, value in table.items():
         place = f"{path}.{key}" if path else key
@@ -87,7 +88,7 @@ def settings(table: dict[str, Any], path: str = "") -> list[str]:
 
 
 def inline(value: Any) -> str:
-    """A value as TOML has it within a line."""
+    """Returns a value as TOML in one line."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{json.dumps(key)} = {inline(one)}" for key, one in value.items()) + "}"
     if isinstance(value, list):
@@ -96,7 +97,7 @@ def inline(value: Any) -> str:
 
 
 def wrong_yaml(block: Block) -> list[str]:
-    import yaml  # comes with Ray, beside which tests/run.sh runs this
+    import yaml  # installed for the tests of clusters
 
     try:
         yaml.safe_load(block.text)
@@ -106,9 +107,9 @@ def wrong_yaml(block: Block) -> list[str]:
 
 
 def wrong_excerpt(block: Block) -> list[str]:
-    """Rust on a page is compiled where it comes from: the file in its first line has it word for word, but for `// ...`."""
+    """Returns an error for each part of a Rust block that its file does not have. `// ...` stands for omitted code."""
     if not block.name:
-        return [f"{block.place}: the first line of Rust names the file that it stands in: // examples/own_law.rs"]
+        return [f"{block.place}: the first line must name the source of the code: // examples/own_law.rs"]
     source = (ROOT / block.name).read_text(encoding="utf-8")
     parts = block.text.split("\n", 1)[1].split("// ...\n")
     return [f"{block.place}: {block.name} does not have\n{part}" for part in parts if part.strip("\n") not in source]

@@ -1,4 +1,4 @@
-"""The files that pages speak of and do not make, made by the program."""
+"""Files that pages use but do not create."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pages import ROOT
 PENTAGON = "tautline run pentagon --out out/pentagon --quiet"
 FLIGHT = "tautline run pentagon --set time.duration_s=10 --out out/short --quiet --no-figures --no-snapshots"
 
-# Page: what its reader has.
+# Page: files that it needs.
 NEEDED_BY = {
     "README.md": ["flight.csv"],
     "docs/audit.md": ["flight.csv"],
@@ -21,7 +21,7 @@ NEEDED_BY = {
     "docs/viewer.md": ["out/pentagon", "flight.csv"],
 }
 
-# File or folder: the commands that make it. Exit code 1 is as good as 0: a flight of 10 s does not reach its formation.
+# File or folder: commands that create it. Exit code 1 is allowed: a flight of 10 s does not reach its formation.
 MADE_BY = {
     "out/pentagon": [PENTAGON],
     "flight.csv": [FLIGHT, "tautline export out/short -o flight.csv"],
@@ -36,7 +36,7 @@ MADE_BY = {
 
 
 class Fixtures:
-    """Files that are made once, when the first page asks for them."""
+    """Files that are created once, for the first page that needs them."""
 
     def __init__(self) -> None:
         self._place = tempfile.TemporaryDirectory(prefix="tautline-docs-")
@@ -47,7 +47,7 @@ class Fixtures:
         (self.programs / "tautline").symlink_to(TAUTLINE)
 
     def folder(self, page: str) -> Path:
-        """A folder of its own for a page, with what it needs, and the examples."""
+        """Returns a new folder for a page, with its files and the examples."""
         folder = Path(tempfile.mkdtemp(dir=self.root))
         shutil.copytree(ROOT / "examples", folder / "examples")
         for name in NEEDED_BY.get(page, []):

@@ -1,4 +1,4 @@
-"""A page of Markdown as its readers and its tests see it: blocks of code, headings that can be linked to, links."""
+"""A page of Markdown: blocks of code, headings, links."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 FENCE = re.compile(r"^( *)```(\w*) *$")
 HEADING = re.compile(r"^#{1,6} +(.*?) *$")
-# What stands below the header of a table.
+# Line below the header of a table.
 RULE = re.compile(r"\|[-:| ]*-[-:| ]*\|$")
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"(`+)(?:.*?)\1")
@@ -19,7 +19,7 @@ NAMED = re.compile(r"^(?:#|//|<!--) (\S+\.\w+)(?: -->)?$")
 
 @dataclass(frozen=True)
 class Block:
-    """A block of code, and where it begins."""
+    """A block of code and its place."""
 
     language: str
     text: str
@@ -34,7 +34,7 @@ class Block:
 
     @property
     def name(self) -> str | None:
-        """The file that its first line says it is."""
+        """Name of the file in the first line."""
         first = self.text.split("\n", 1)[0]
         found = NAMED.match(first)
         return found[1] if found else None
@@ -42,7 +42,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Said:
-    """Where a link leads, as it is written, or a word of code within a line."""
+    """Target of a link, or code within a line, with its place."""
 
     target: str
     place: str
@@ -57,10 +57,10 @@ class Page:
         self.blocks: list[Block] = []
         self.links: list[Said] = []
         self.spoken: list[Said] = []
-        """Code within a line, and where."""
+        """Code within lines."""
         self.headings: list[str] = []
         self.headless: list[str] = []
-        """Where a row of a table stands that has no header above it, and so is shown as text."""
+        """Places of rows of tables without a header, which Markdown shows as text."""
         self._read(path.read_text(encoding="utf-8").splitlines())
 
     def _read(self, lines: list[str]) -> None:
@@ -81,7 +81,8 @@ class Page:
                 if heading := HEADING.match(line):
                     section = heading[1]
                     self.headings.append(section)
-                if line.startswith("|") and not above.startswith("|") and not RULE.match("".join(lines[number : number + 1])):
+                below = "".join(lines[number : number + 1])
+                if line.startswith("|") and not above.startswith("|") and not RULE.match(below):
                     self.headless.append(f"{self.name}:{number}")
                 self.spoken += [Said(found[0].strip("`"), f"{self.name}:{number}") for found in CODE.finditer(line)]
                 bare = CODE.sub("", re.sub(r"\[`[^`]*`\]", "[code]", line))
@@ -92,7 +93,7 @@ class Page:
 
     @property
     def anchors(self) -> set[str]:
-        """What may stand behind a # in a link to this page, as Git hosts and mdBook make it of headings."""
+        """Anchors of the headings, as Git hosts and mdBook generate them."""
         made: list[str] = []
         for heading in self.headings:
             words = re.sub(r"\]\([^)]*\)", "", heading).lower()
@@ -105,13 +106,13 @@ class Page:
 
 
 def pages() -> list[Page]:
-    """Every page that is tested, in the order of the book."""
+    """Returns all pages that are tested."""
     docs = sorted((ROOT / "docs").glob("*.md"))
     return [Page(path) for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "ARCHITECTURE.md", *docs)]
 
 
 def dead_links(page: Page, root: Path = ROOT) -> list[str]:
-    """What is wrong with each link of a page that does not lead to a file, or a heading, that is there."""
+    """Returns an error for each link to a missing file or heading."""
     wrong = []
     for link in page.links:
         if re.match(r"[a-z]+:", link.target):

@@ -1,4 +1,4 @@
-"""The book: its contents name every page once, its index says what each answers, and scenario.md is what the schema says."""
+"""Tests of the book: its contents and index list every page, and scenario.md follows from the schema."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from pages import ROOT, Page
 
 DOCS = ROOT / "docs"
 MDBOOK = ROOT / "target/mdbook/bin/mdbook"
-# Keys whose description speaks of another number's unit.
+# Keys whose description names the unit of another number.
 OF_ANOTHER = ("thrust_n_per_rpm2",)
 
 ITEM = re.compile(r"^- \[([^\]]+)\]\(([\w-]+\.md)\)(: .+)?$", re.MULTILINE)
 
-AREAS = "scenario recording audit export request compare margin sweep attack campaign render pictures files usage machine law simulation"
+AREAS = """scenario recording audit export request compare margin sweep attack campaign render pictures files usage
+machine law simulation"""
 CODE = re.compile(rf'"((?:{"|".join(AREAS.split())})/[a-z0-9-]+)"')
 
 sys.path.insert(0, str(DOCS))
@@ -27,12 +28,12 @@ import scenario_reference  # noqa: E402
 
 
 def items(docs: Path, page: str) -> list[tuple[str, ...]]:
-    """Title, file and what stands behind them, of each page that a page lists."""
+    """Returns title, file and description of each page in a list of pages."""
     return ITEM.findall((docs / page).read_text(encoding="utf-8"))
 
 
 def faults(docs: Path) -> list[str]:
-    """What is wrong with the order of the pages, with their tables and with where they link to."""
+    """Returns the errors in the order of the pages, in their tables and in their links."""
     contents, index = items(docs, "SUMMARY.md"), items(docs, "README.md")
     there = {path.name for path in docs.glob("*.md")} - {"SUMMARY.md", "README.md"}
     named = [file for _, file, _ in contents]
@@ -56,19 +57,20 @@ def build(docs: Path, out: Path) -> str:
 
 
 class Book(unittest.TestCase):
-    """The order of the pages."""
+    """Tests of the order of the pages and of the codes of errors."""
 
     def test_contents_and_index_name_every_page_and_links_stay_in_the_book(self) -> None:
         self.assertEqual(faults(DOCS), [])
 
     def test_every_code_of_an_error_is_explained_and_no_other(self) -> None:
         sources = [path for folder in ("src", "crates", "python/src") for path in (ROOT / folder).rglob("*.rs")]
-        written = {code for path in sources if "tests" not in path.parts for code in CODE.findall(path.read_text(encoding="utf-8"))}
+        texts = [path.read_text(encoding="utf-8") for path in sources if "tests" not in path.parts]
+        written = {code for text in texts for code in CODE.findall(text)}
         explained = set(re.findall(r"`([a-z]+/[a-z0-9-]+)`", (DOCS / "errors.md").read_text(encoding="utf-8")))
         self.assertGreater(len(written), 50)
         self.assertEqual(written, explained)
 
-    def test_what_is_wrong_with_a_book_is_found(self) -> None:
+    def test_errors_of_a_book_are_found(self) -> None:
         right = {
             "SUMMARY.md": "- [A](a.md)\n- [B](b.md)\n",
             "README.md": "- [A](a.md): what is that?\n- [B](b.md): and what is this?\n",
@@ -121,19 +123,22 @@ class ScenarioReference(unittest.TestCase):
 
     def test_the_page_is_what_the_schema_says(self) -> None:
         page = (DOCS / "scenario.md").read_text(encoding="utf-8")
-        self.assertEqual(page, self.made, "make it anew: tautline schema | python3 docs/scenario_reference.py > docs/scenario.md")
+        remedy = "run tautline schema | python3 docs/scenario_reference.py > docs/scenario.md"
+        self.assertEqual(page, self.made, remedy)
 
     def test_every_key_of_the_schema_is_on_the_page(self) -> None:
         for key in sorted(keys_of(self.schema)):
             self.assertTrue(f"`{key}`" in self.made or f"[{key}" in self.made, key)
 
-    def test_a_unit_is_the_one_that_the_description_says(self) -> None:
-        """What a description says of its unit, "... in m/s", ends the name of the key too."""
-        units = sorted({*scenario_reference.UNITS.values(), *scenario_reference.UNNAMED.values()}, key=len, reverse=True)
+    def test_keys_and_descriptions_have_the_same_unit(self) -> None:
+        """The unit of a description, "... in m/s", is the unit of the key."""
+        units = {*scenario_reference.UNITS.values(), *scenario_reference.UNNAMED.values()}
+        units = sorted(units, key=len, reverse=True)
         said = re.compile(rf" in ({'|'.join(map(re.escape, units))})(?= |[,.:;]|$)")
         checked = 0
         for line in self.made.splitlines():
-            if not line.startswith("| `") or line.startswith(tuple(f"| `{key}`" for key in OF_ANOTHER)):
+            others = tuple(f"| `{key}`" for key in OF_ANOTHER)
+            if not line.startswith("| `") or line.startswith(others):
                 continue
             cells = [cell.strip() for cell in line.split(" | ")]
             if cells[1] != "text" and (found := said.search(cells[-1])):

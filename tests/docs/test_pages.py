@@ -1,4 +1,4 @@
-"""Every page of the docs: its commands run and print what it shows, its files are taken by the program, its links lead somewhere."""
+"""Tests of every page of the docs: commands run and print the shown output, files are valid, links have targets."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pages import Block, Page, dead_links, pages
 
 
 class Walk:
-    """What a reader does who carries a page out from top to bottom."""
+    """A run of a page from top to bottom."""
 
     def __init__(self, page: Page, folder: Path, programs: Path) -> None:
         self.page, self.folder, self.programs = page, folder, programs
         self.wrong: list[str] = []
 
     def walk(self) -> list[str]:
-        """Everything that is wrong with the page, in its order."""
+        """Returns all errors of the page, in its order."""
         last: tuple[str, Ran | None] = "", None
         for block in self.page.blocks:
             if block.name and block.language != "rust":
@@ -37,7 +37,7 @@ class Walk:
         return self.wrong + unread_within(self.page)
 
     def carry_out(self, block: Block) -> Ran | None:
-        """What came of the last command of a block, where it was run."""
+        """Runs the commands of a block. Returns the result of the last one, if it was run."""
         ran: Ran | None = None
         for command in commands(block):
             self.wrong += unread(command)
@@ -69,7 +69,7 @@ def setUpModule() -> None:
 
 
 class Pages(unittest.TestCase):
-    """A test for each page, made below."""
+    """Tests of each page, which are added below."""
 
     def carried_out(self, page: Page) -> None:
         folder = fixtures.folder(page.name)
@@ -82,7 +82,7 @@ class Pages(unittest.TestCase):
 
 
 class Exceptions(unittest.TestCase):
-    """No exception outlives what it was made for."""
+    """Tests that every exception is in use."""
 
     def test_each_is_of_a_page_as_it_is(self) -> None:
         blocks = [block for page in pages() for block in page.blocks]

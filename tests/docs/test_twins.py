@@ -1,4 +1,4 @@
-"""The tests of pages notice what is wrong: each page here has one fault, and is refused for it."""
+"""Tests of the tests of pages: a page with a fault has an error."""
 
 from __future__ import annotations
 
@@ -46,28 +46,30 @@ cargo test --test docs_of_tautline
 ```
 """
 
-# What is changed in the page above, and a word of what is said of it.
+# Fault: text of the page above, its replacement, and a part of the error.
 FAULTS = {
-    "an option that is not there": ("--set law.alpha=2", "--sett law.alpha=2", "unexpected argument"),
-    "a command that is not there": ("tautline list", "tautline lists", "unrecognized subcommand"),
-    "a key that is not there": ("law.alpha=2", "law.alhpa=2", "unknown"),
-    "an option that is not there, within a line": ("audit --delta", "audit --dleta", "has no option --dleta"),
-    "an exit code that is not said": ("# exit code 1: a", "# a", "the page says exit code 0, it was 1"),
-    "an exit code that is not so": ("tautline list\n", "tautline list  # exit code 1\n", "the page says exit code 1, it was 0"),
-    "output of other days": ("six vehicles from a line", "seven vehicles from a line", "seven vehicles from a line"),
+    "an unknown option": ("--set law.alpha=2", "--sett law.alpha=2", "unexpected argument"),
+    "an unknown command": ("tautline list", "tautline lists", "unrecognized subcommand"),
+    "an unknown key": ("law.alpha=2", "law.alhpa=2", "unknown"),
+    "an unknown option within a line": ("audit --delta", "audit --dleta", "has no option --dleta"),
+    "a missing exit code": ("# exit code 1: a", "# a", "the page says exit code 0, it was 1"),
+    "a wrong exit code": ("tautline list\n", "tautline list  # exit code 1\n", "the page says exit code 1, it was 0"),
+    "old output": ("six vehicles from a line", "seven vehicles from a line", "seven vehicles from a line"),
     "lines in the wrong order": ("circle  ", "thousand  ", "thousand  "),
-    "a gap that is not shown": ("...\n", "", "does not print"),
+    "omitted lines without `...`": ("...\n", "", "does not print"),
     "a file with a wrong key": ("runs = 3", "rums = 3", "rums"),
-    "a file that cannot be read": ("runs = 3", "runs 3", "runs"),
-    "a program that nobody lists": ("tautline list", "tautlime list", "`tautlime` is neither run nor excepted"),
-    "a wrong option of what is not run": (
-        "cargo test --test docs_of_tautline", "ssh node7 /shared/tautline campaign shard camp --shards 1", "has no option --shards"
-    ),  # fmt: skip
+    "a malformed file": ("runs = 3", "runs 3", "runs"),
+    "an unlisted program": ("tautline list", "tautlime list", "`tautlime` is neither run nor excepted"),
+    "an unknown option of a command that is not run": (
+        "cargo test --test docs_of_tautline",
+        "ssh node7 /shared/tautline campaign shard camp --shards 1",
+        "has no option --shards",
+    ),
 }
 
 
 class Twins(unittest.TestCase):
-    """Pages with a fault."""
+    """Tests of pages with a fault."""
 
     fixtures: Fixtures
 
@@ -88,7 +90,7 @@ class Twins(unittest.TestCase):
         page = self.page(text)
         return Walk(page, self.fixtures.folder(page.name), self.fixtures.programs).walk()
 
-    def test_only_the_target_that_is_not_there_is_wrong_with_the_page(self) -> None:
+    def test_the_missing_target_is_the_only_error_of_the_page(self) -> None:
         found = self.faults_of(RIGHT)
         self.assertEqual(len(found), 1, found)
         self.assertIn("there is no tests/docs_of_tautline.rs", found[0])
@@ -100,9 +102,9 @@ class Twins(unittest.TestCase):
                 found = self.faults_of(RIGHT.replace(right, wrong, 1))
                 self.assertTrue(any(said in one for one in found), found)
 
-    def test_an_excerpt_that_is_not_in_its_file_is_found(self) -> None:
-        text = "# A page\n\n```rust\n// examples/own_law.rs\nimpl Law for SpringsAndRepulsion {\n// ...\nfn main() {}\n```\n"
-        found = self.faults_of(text)
+    def test_an_excerpt_that_its_file_does_not_have_is_found(self) -> None:
+        code = "// examples/own_law.rs\nimpl Law for SpringsAndRepulsion {\n// ...\nfn main() {}\n"
+        found = self.faults_of(f"# A page\n\n```rust\n{code}```\n")
         self.assertEqual(len(found), 1, found)
         self.assertIn("fn main() {}", found[0])
 
@@ -112,7 +114,8 @@ class Twins(unittest.TestCase):
                 self.assertTrue(self.faults_of(f"# A page\n\n```{language}\n{text}\n```\n"))
 
     def test_dead_links_are_found(self) -> None:
-        page = self.page("# A page\n\n[a](nowhere.md) [b](#no-heading) [c](README.md#no-heading) [d](README.md#read-me) `[e](no.md)`\n")
+        dead = "[a](nowhere.md) [b](#no-heading) [c](README.md#no-heading)"
+        page = self.page(f"# A page\n\n{dead} [d](README.md#read-me) `[e](no.md)`\n")
         self.assertEqual(len(dead_links(page, self.root)), 3)
 
     def test_a_block_without_an_end_is_found(self) -> None:

@@ -1,7 +1,7 @@
 """Tests of the checker of proofs.
 
-python3 proofs.py check_proof.py FOLDER, where FOLDER holds NAME.csv and NAME.json. Each proof of the folder is confirmed,
-and denied after each alteration. The tests of `Checker` write proofs of their own.
+Usage: `python3 proofs.py check_proof.py FOLDER`, where FOLDER holds NAME.csv and NAME.json. Each proof of the folder is
+confirmed, and denied after each alteration. The tests of `Checker` write proofs of their own.
 """
 
 import contextlib
@@ -38,7 +38,7 @@ def is_denied(proof, data):
 
 
 def alterations(proof, dice):
-    """The proof with one thing altered each: what, and the proof."""
+    """Yields a description of an alteration, and the altered proof."""
 
     def altered(what, change):
         other = copy.deepcopy(proof)
@@ -91,7 +91,9 @@ def proof_of(text, ids=("a", "b"), boxes=(), clock=None, **claim):
         "version": 1,
         "data": {"recording": "data.csv", "sha256": hashlib.sha256(text.encode()).hexdigest()},
         "claim": usual | claim,
-        "windows": [{"from_s": begin, "to_s": end, "boxes": copy.deepcopy(boxes)} for begin, end in zip(edges, edges[1:])],
+        "windows": [
+            {"from_s": begin, "to_s": end, "boxes": copy.deepcopy(boxes)} for begin, end in zip(edges, edges[1:])
+        ],
     }
 
 
@@ -102,7 +104,7 @@ def run(proof, data):
         "data.csv": data if type(data) is bytes else data.encode(),
     }
     check_proof.open = lambda path, mode: io.BytesIO(files[path])
-    # The encoding is that of a terminal without Unicode.
+    # The output has the encoding of a terminal without Unicode.
     out, error = io.TextIOWrapper(io.BytesIO(), encoding="ascii"), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
         code = check_proof.main([*files])
@@ -135,14 +137,14 @@ def is_true(proof):
 
 
 class Checker(unittest.TestCase):
-    def expect(self, code, text, proof, said=""):
+    def expect(self, code, text, proof, message=""):
         found, out = run(proof, text)
         self.assertEqual(found, code, out)
-        self.assertIn(said, out)
+        self.assertIn(message, out)
         self.assertEqual(out.count("\n"), 1, out)
         return out
 
-    def test_a_number_sign_begins_a_comment_above_the_header_alone(self):
+    def test_a_number_sign_begins_a_comment_only_above_the_header(self):
         comment = "# t,id,x,y,z\n#\n"
         self.expect(CONFIRMED, comment + table(), proof_of(comment + table()))
         ids = ("a", "b", "#c")
@@ -151,14 +153,15 @@ class Checker(unittest.TestCase):
             self.expect(DENIED, text, proof_of(text), "#c is missing")
             self.expect(code, text, proof_of(text, ids, [[2, 0.0, y, 0.0, 9.0, y, 0.0]]))
 
-    def test_the_line_states_what_the_claim_assumes(self):
+    def test_the_output_states_the_assumptions_of_the_claim(self):
         out = self.expect(CONFIRMED, table(), proof_of(table(), offsets_s={"b": 0.0}))
-        said = "clear, never closer than 3.0 m, a and b (limit 1.0 m); straight between samples up to 1 s apart; times in s"
-        self.assertEqual(out, f"CONFIRMED: {said}\n")
+        claim = "clear, never closer than 3.0 m, a and b (limit 1.0 m)"
+        self.assertEqual(out, f"CONFIRMED: {claim}; straight between samples up to 1 s apart; times in s\n")
         moved = proof_of(table(), offsets_s={"a": 100.0, "b": 100.0}, time_s=104.5)
         self.expect(CONFIRMED, table(), moved, ", with clocks moved: a by 100.0 s, b by 100.0 s;")
         text = table(times=range(0, 10_000, 1000))
-        self.expect(CONFIRMED, text, proof_of(text, clock={"unit": "ms", "inferred": True}), "; times in ms (inferred)\n")
+        inferred = proof_of(text, clock={"unit": "ms", "inferred": True})
+        self.expect(CONFIRMED, text, inferred, "; times in ms (inferred)\n")
         far = proof_of(table(times=range(0, 100, 10)), time_s=45.0, max_gaps_s=[None, 10.0])
         self.expect(CONFIRMED, table(times=range(0, 100, 10)), far, "straight between samples up to 10 s apart;")
         # No other vehicle is seen in the gap of c.
@@ -177,12 +180,13 @@ class Checker(unittest.TestCase):
         for row in ("9,b,0,3,0.1\n", "8,b,1,3,0\n"):
             self.expect(UNREADABLE, table() + row, proof_of(table() + row), "at two places at")
 
-    def test_a_row_without_a_position_is_of_a_vehicle_that_is_not_seen(self):
+    def test_a_row_without_a_position_means_not_seen(self):
         self.expect(CONFIRMED, table() + "10,a,, ,\n", proof_of(table() + "10,a,, ,\n"))
         self.expect(CONFIRMED, table() + "10,c,,,\n", proof_of(table() + "10,c,,,\n", ("a", "b", "c")))
         self.expect(DENIED, table() + "10,c,,,\n", proof_of(table() + "10,c,,,\n"), "c is missing")
         self.expect(DENIED, table(), proof_of(table(), ("a", "b", "c")), "c is missing")
-        for row in ("10,a,,0,\n", ",a,,,\n", "10,,9,0,0\n", "10,a,,\n", "10,a,nan,0,0\n", "10,a,1_0,0,0\n", "1e999,a,9,0,0\n"):
+        rows = ["10,a,,0,\n", ",a,,,\n", "10,,9,0,0\n", "10,a,,\n"]
+        for row in (*rows, "10,a,nan,0,0\n", "10,a,1_0,0,0\n", "1e999,a,9,0,0\n"):
             self.expect(UNREADABLE, table() + row, proof_of(table() + row), "data, line 22: must")
 
     def test_dates_are_read_to_the_nanosecond(self):
@@ -195,13 +199,14 @@ class Checker(unittest.TestCase):
             self.expect(UNREADABLE, text, proof_of(text, clock={"epoch_ns": epoch_ns}), "the unit of dates is ns")
             late = proof_of(text, clock={"unit": "ns", "epoch_ns": epoch_ns + 1})
             self.expect(DENIED, text, late, "not as close as")
-        for wrong in ("2023-01-01T00:00:09", "2023-01-01T00:00:60Z", "2023-02-30T00:00:09Z", "2023-01-01T00:00:09+99:00"):
+        wrong_dates = ["2023-01-01T00:00:09", "2023-01-01T00:00:60Z", "2023-02-30T00:00:09Z"]
+        for wrong in (*wrong_dates, "2023-01-01T00:00:09+99:00"):
             text = table(times=[*dates[:9], wrong])
             self.expect(UNREADABLE, text, proof_of(text, clock={"unit": "ns", "epoch_ns": epoch_ns}), "data, line 11: ")
 
     def test_times_are_rounded_as_tautline_rounds_them(self):
         epoch_ns = 1_700_000_000_000_000_000
-        # Digits count where they are plain. A number with an exponent is the nearest double first, to 2.4e-7 s here.
+        # Plain digits are exact. A number with an exponent is rounded to a double first, here to 2.4e-7 s.
         for unit, text, time_s in (
             ("s", "1700000004", 4.0),
             ("s", "1700000004.3", 4.3),
@@ -237,7 +242,8 @@ class Checker(unittest.TestCase):
             text = table(ids=("a", '"' + name.replace('"', '""') + '"' if name[1] in '",' else name))
             self.expect(CONFIRMED, text, proof_of(text, ("a", name)), f"a and {ascii(name)} (limit")
             self.expect(DENIED, text, proof_of(text, ("a", "b")), "is missing")
-        for text in (table().replace("\n", "\r\n").replace("5,a", "\n \t\r\n5,a"), "\ufeff" + table(), table("t,id,x,y,z,")):
+        windows_text = table().replace("\n", "\r\n").replace("5,a", "\n \t\r\n5,a")
+        for text in (windows_text, "\ufeff" + table(), table("t,id,x,y,z,")):
             self.expect(CONFIRMED, text, proof_of(text))
         text = table() + '9,"a\n",9,0,0\n'
         self.expect(UNREADABLE, text, proof_of(text), "data, line 22: unexpected end of data")
@@ -246,15 +252,17 @@ class Checker(unittest.TestCase):
         self.expect(UNREADABLE, data, proof, "UnicodeDecodeError")
 
     def test_limits_are_positive_and_finite(self):
-        for limit_m, separation_m in ((-5.0, -4.0), (0.0, 3.0), (math.nan, 3.0), (math.inf, 3.0), (1.0, -4.0), (1.0, math.nan)):
+        wrong_limits = [(-5.0, -4.0), (0.0, 3.0), (math.nan, 3.0), (math.inf, 3.0)]
+        for limit_m, separation_m in (*wrong_limits, (1.0, -4.0), (1.0, math.nan)):
             proof = proof_of(table(), limit_m=limit_m, separation_m=separation_m)
             self.expect(UNREADABLE, table(), proof, "must be a finite number of ")
         self.expect(CONFIRMED, table(), proof_of(table(), limit_m=5e-324))
         self.expect(CONFIRMED, table(), proof_of(table(), limit_m=3.5, status="violation"))
 
-    def test_boxes_are_of_vehicles_of_the_claim(self):
+    def test_boxes_belong_to_vehicles_of_the_claim(self):
         for box in ([7, *[0.0] * 6], [-1, *[0.0] * 6], [True, *[0.0] * 6], [0.0] * 7, [0, 0.0]):
-            self.expect(UNREADABLE, table(), proof_of(table(), boxes=[box]), "a box must have a vehicle below 2 and 6 numbers")
+            message = "a box must have a vehicle below 2 and 6 numbers"
+            self.expect(UNREADABLE, table(), proof_of(table(), boxes=[box]), message)
         for box in ([], [1, *[math.nan] * 6], 0, "box"):
             self.expect(UNREADABLE, table(), proof_of(table(), boxes=[box]))
         self.expect(CONFIRMED, table(), proof_of(table(), boxes=[[1, 0.0, 3.0, -1.0, 9.0, 3.0, 1.0]]))
@@ -280,7 +288,7 @@ class Checker(unittest.TestCase):
             proof["windows"].insert(1, {"from_s": 0, "to_s": 5, "boxes": boxes})
             self.expect(DENIED, table(), proof, "the windows do not cover the recording")
 
-    def test_the_vehicles_are_lists_of_names_that_differ(self):
+    def test_vehicles_and_pair_are_lists_of_different_names(self):
         for wrong in (
             {"vehicles": "ab"},
             {"vehicles": ["a", "b", "b"], "max_gaps_s": [1.5] * 3},
@@ -310,7 +318,9 @@ class Checker(unittest.TestCase):
                 code, out = run(proof, table())
                 self.assertNotIn("Traceback", out)
                 self.assertTrue(code != CONFIRMED or is_true(proof), f"{path} {value!r}: {out}")
-                is_typed = type(path[-1]) is int if value is MISSING else type(value) in (int, float, type(at(valid, path)))
+                is_typed = type(value) in (int, float, type(at(valid, path)))
+                if value is MISSING:
+                    is_typed = type(path[-1]) is int
                 self.assertTrue(code != DENIED or is_typed or path[-1] == "sha256", f"{path} {value!r}: {out}")
 
     def test_damaged_files_exit_with_a_message(self):
@@ -325,7 +335,8 @@ class Checker(unittest.TestCase):
                 proof = json.dumps(valid | {"data": {"sha256": hashlib.sha256(data).hexdigest()}}).encode()
             code, out = run(bytes(proof), bytes(data))
             self.assertRegex(out, "^(CONFIRMED|DENIED|UNREADABLE): ")
-            self.assertTrue(code != CONFIRMED or changed is data or is_true(json.loads(bytes(proof))), f"{proof!r}: {out}")
+            is_right = code != CONFIRMED or changed is data or is_true(json.loads(bytes(proof)))
+            self.assertTrue(is_right, f"{proof!r}: {out}")
         for proof in (b"", b"[" * 100_000, b"null", b"[]", b'{"claim": []}', b"9" * 5000, b'"\\ud800"', b"\xff"):
             self.assertEqual(run(proof, table())[0], UNREADABLE)
 

@@ -1,4 +1,4 @@
-"""What the tests of the Python package share."""
+"""Helpers of the tests of the Python package."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def passing(instants: int = 100) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Four vehicles 3 m apart on a line, of which the first comes within half a metre of the second: t (T,), p (T, 4, 3)."""
+    """Returns times (T,) and positions (T, 4, 3) of vehicles 3 m apart; vehicle 1 comes within 0.5 m of vehicle 2."""
     t = np.arange(instants) * 0.1
     p = np.zeros((instants, 4, 3))
     p[:, :, 0] = 3.0 * np.arange(4)
@@ -28,7 +28,7 @@ def passing(instants: int = 100) -> tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def short(name: str = "pentagon", **sets: object) -> tl.Scenario:
-    """A built-in scenario of two seconds."""
+    """Returns a built-in scenario with a duration of two seconds."""
     return tl.Scenario(name, set={"time.duration_s": 2.0, **sets})
 
 
@@ -39,19 +39,19 @@ def printed_json(words: list[str]) -> dict:
 
 
 class Case(unittest.TestCase):
-    """A test with a folder of its own."""
+    """A test with a temporary folder."""
 
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
 
-    def refuses(self, kind: type[BaseException], says: str, do: Callable[[], object]) -> None:
-        """Asserts that an error of exactly this class is raised whose message says something."""
+    def refuses(self, kind: type[BaseException], message: str, do: Callable[[], object]) -> None:
+        """Asserts that an error of exactly this class is raised whose message contains a text."""
         with self.assertRaises(kind) as caught:
             do()
         self.assertIs(type(caught.exception), kind)
-        self.assertIn(says, str(caught.exception))
+        self.assertIn(message, str(caught.exception))
 
 
 class Springs(tl.Law):

@@ -1,4 +1,4 @@
-"""Audits of arrays and of files: the same verdicts as the command line's, whatever the order in memory."""
+"""Tests of audits of arrays and files: they have the verdicts of the command line, for any memory order."""
 
 
 import numpy as np
@@ -15,11 +15,11 @@ class Arrays(Case):
         self.assertEqual(a.closest[0].time_s, 0.5)
         self.assertEqual(tl.audit(t, p, delta=0.5).verdict, "CLEAR if straight between samples")
 
-    def test_the_four_verdicts_are_the_command_lines(self) -> None:
+    def test_verdicts_equal_those_of_the_command_line(self) -> None:
         t, p = passing()
         tl_path = self.folder / "p.npz"
         np.savez(tl_path, t=t, positions=p, names=np.array(["1", "2", "3", "4"]))
-        asked = {
+        questions = {
             "CLEAR if straight between samples": ({"delta": 0.4}, ["--delta=0.4"]),
             "VIOLATION": ({"delta": 1.5}, ["--delta=1.5"]),
             "UNDECIDED": ({"delta": 0.4, "max_gap": 0.01}, ["--delta=0.4", "--max-gap=0.01"]),
@@ -28,17 +28,18 @@ class Arrays(Case):
                 ["--delta=0.4", "--motion=bounded", "--max-accel=1"],
             ),
         }
-        for verdict, (options, words) in asked.items():
+        for verdict, (options, words) in questions.items():
             with self.subTest(verdict=verdict):
                 a = tl.audit(t, p, **options)
                 self.assertEqual(a.verdict, verdict)
                 self.assertEqual(tl.audit(tl_path, **options).verdict, verdict)
                 printed = printed_json(["audit", "--json", *words, str(tl_path)])
                 ours = a.to_dict()
-                for key in ("status", "separation", "audit", "closest", "violations", "undecided", "gaps", "vehicles", "span_s"):
+                keys = ["status", "separation", "audit", "closest", "violations", "undecided", "gaps", "span_s"]
+                for key in [*keys, "vehicles"]:
                     self.assertEqual(ours[key], printed[key], key)
 
-    def test_who_is_not_seen_throughout_is_named_and_presence_can_be_required(self) -> None:
+    def test_absent_vehicles_are_named_and_presence_can_be_required(self) -> None:
         t, p = passing()
         p = p.copy()
         p[len(t) // 2 :, 3] = np.nan
@@ -49,7 +50,7 @@ class Arrays(Case):
         self.assertEqual((strict.status, strict.to_dict()["presence"]["partly"]), ("undecided", 1))
         self.assertTrue(tl.audit(t, p, delta=0.1, require_presence=True, ids=["1", "2", "3"]).is_clear)
 
-    def test_accelerations_are_means_over_a_window_where_one_is_given(self) -> None:
+    def test_accel_window_limits_mean_accelerations(self) -> None:
         t = np.arange(41) * 0.05
         p = np.zeros((41, 1, 3))
         p[:, 0, 0] = 3.0 * np.minimum(t, 1.0)
@@ -58,7 +59,7 @@ class Arrays(Case):
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.4).status, "clear")
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.2).status, "violation")
 
-    def test_a_flight_has_the_verdict_of_its_run_and_by_its_samples_alone_another(self) -> None:
+    def test_a_flight_has_the_verdict_of_its_run_unless_independent(self) -> None:
         f = tl.fly("pentagon", set={"time.duration_s": 3})
         self.assertEqual(f.audit().verdict, "PROVED CLEAR by the run's audit of every step")
         self.assertEqual(f.audit().separation_m, f.separation_m)
@@ -66,7 +67,7 @@ class Arrays(Case):
         with self.assertRaises(ValueError):
             f.positions[0, 0, 0] = 0.0
 
-    def test_the_order_in_memory_changes_nothing(self) -> None:
+    def test_the_memory_order_does_not_matter(self) -> None:
         rng = np.random.default_rng(1)
         t, p = np.arange(40) * 0.1, rng.normal(scale=5.0, size=(40, 5, 3))
         expected = tl.audit(t, p, delta=0.5).to_dict()
@@ -82,7 +83,7 @@ class Arrays(Case):
         other[7, 2, 1] += 3.0
         self.assertNotEqual(tl.audit(t, other, delta=0.5).to_dict(), expected)
 
-    def test_a_plane_has_no_heights_and_is_said(self) -> None:
+    def test_positions_in_a_plane_have_no_heights(self) -> None:
         t, p = passing()
         flat, space = tl.audit(t, p[:, :, :2], delta=1.5), tl.audit(t, p, delta=1.5)
         self.assertEqual((flat.verdict, flat.separation_m), (space.verdict, space.separation_m))
@@ -92,7 +93,7 @@ class Arrays(Case):
         with self.assertRaisesRegex(tl.Error, "heights of its vehicles are not known"):
             tl.audit(t, p[:, :, :2], limit={"height": 120})
 
-    def test_a_layout_says_what_the_axes_of_arrays_count(self) -> None:
+    def test_layout_gives_the_order_of_axes(self) -> None:
         t, p = passing()
         expected = tl.audit(t, p, delta=0.5).to_dict()
         for layout, order in (("time,axis,vehicle", (0, 2, 1)), ("axis,vehicle,time", (2, 1, 0))):
@@ -100,7 +101,7 @@ class Arrays(Case):
         with self.assertRaisesRegex(tl.Error, "time, vehicle and axis"):
             tl.audit(t, p, delta=0.5, layout="t,v,x")
 
-    def test_who_was_not_seen_is_a_gap_and_never_clear(self) -> None:
+    def test_a_gap_is_never_clear(self) -> None:
         t, p = passing()
         p[40:60, 2] = np.nan
         a = tl.audit(t, p, delta=0.1)
@@ -110,7 +111,7 @@ class Arrays(Case):
             a.raise_for_violation()
         a.raise_for_violation(allow_undecided=True)
 
-    def test_velocities_sharpen_what_is_bounded(self) -> None:
+    def test_velocities_tighten_bounded_motion(self) -> None:
         t = np.arange(30) * 0.5
         angle = 0.3 * t
         circle = np.stack([np.cos(angle), np.sin(angle), 0 * t], axis=1)
@@ -122,42 +123,44 @@ class Arrays(Case):
         self.assertGreater(sharp.separation_m, without.separation_m)
         self.assertLessEqual(sharp.separation_m, 10.0)
 
-    def test_radii_obstacles_windows_limits_and_names_are_asked_as_on_the_command_line(self) -> None:
+    def test_radii_obstacles_windows_limits_and_names(self) -> None:
         t, p = passing()
         self.assertEqual(tl.audit(t, p, radius={"1": 0.5, "2": 0.6, "3": 0.1, "4": 0.1}).violations[0].limit_m, 1.1)
         self.assertTrue(tl.audit(t, p, delta=1.5, to_s=1.0).is_clear)
         self.assertTrue(tl.audit(t, p, delta=1.5, ids=["3", "4"]).is_clear)
-        self.assertEqual(tl.audit(t, p, delta=1.5, names=["a", "b,c", "d", "e"], ids=["b,c", "d"]).to_dict()["judged"], 2)
-        fence = self.folder / "solid.toml"
-        fence.write_text('[[obstacle]]\nname = "pole"\nball = { radius_m = 0.5 }\nat_m = [9.0, 1.0, 0.0]\nclearance_m = 0.6\n')
-        self.assertEqual(tl.audit(t, p, delta=0.1, obstacles=fence).violations[0].pair, ("4", "pole"))
+        named = tl.audit(t, p, delta=1.5, names=["a", "b,c", "d", "e"], ids=["b,c", "d"])
+        self.assertEqual(named.to_dict()["judged"], 2)
+        solid = self.folder / "solid.toml"
+        place = "at_m = [9.0, 1.0, 0.0]\nclearance_m = 0.6\n"
+        solid.write_text(f'[[obstacle]]\nname = "pole"\nball = {{ radius_m = 0.5 }}\n{place}')
+        self.assertEqual(tl.audit(t, p, delta=0.1, obstacles=solid).violations[0].pair, ("4", "pole"))
         self.assertEqual(tl.audit(t, p, delta=0.1, limit={"speed": 0.1}).verdict, "VIOLATION")
         self.assertTrue(tl.audit(t, p, delta=0.1, limit={"speed": 5.0}).is_clear)
 
-    def test_the_page_is_that_of_the_judgement_or_of_none(self) -> None:
+    def test_a_page_needs_an_unchanged_recording(self) -> None:
         t, p = passing()
         a = tl.audit(t, p, delta=1.5)
         page = self.folder / "a.html"
         a.to_html(page)
         self.assertIn("VIOLATION", page.read_text())
         p[0, 3] = 50.0
-        self.refuses(tl.Error, "not what it was", lambda: a.to_html(page))
+        self.refuses(tl.Error, "has changed", lambda: a.to_html(page))
 
 
 class Files(Case):
-    def test_the_folder_of_a_run_is_its_recording(self) -> None:
+    def test_the_folder_of_a_run_is_a_recording(self) -> None:
         tl.fly(short(), record=self.folder / "run.mcap")
         self.assertEqual(tl.audit(self.folder).to_dict(), tl.audit(self.folder / "run.mcap").to_dict())
         self.assertEqual(len(tl.read(self.folder).vehicles), 5)
         tl.export(self.folder, self.folder / "out.csv")
         self.assertTrue((self.folder / "out.csv").exists())
 
-    def test_names_of_an_iterator_are_all_judged(self) -> None:
+    def test_ids_may_be_an_iterator(self) -> None:
         t, p = passing()
-        judged = tl.audit(t, p, delta=5.0, limit={"speed": 0.1}, ids=iter(["1", "2"]))
-        self.assertEqual(judged.status, "violation")
+        audit = tl.audit(t, p, delta=5.0, limit={"speed": 0.1}, ids=iter(["1", "2"]))
+        self.assertEqual(audit.status, "violation")
 
-    def test_a_file_is_judged_as_on_the_command_line(self) -> None:
+    def test_an_audit_of_a_file_equals_that_of_the_command_line(self) -> None:
         file = self.folder / "run.mcap"
         tl.fly("pentagon-laplacian", record=file)
         a = tl.audit(file)
@@ -166,7 +169,7 @@ class Files(Case):
         a.to_html(self.folder / "a.html")
         self.assertTrue((self.folder / "a.html").exists())
 
-    def test_a_tautline_toml_beside_the_recording_is_heeded(self) -> None:
+    def test_a_tautline_toml_beside_the_recording_is_used(self) -> None:
         t, p = passing()
         np.savez(self.folder / "p.npz", t=t, positions=p)
         (self.folder / "tautline.toml").write_text("[audit]\ndelta_m = 1.5\n")
@@ -174,7 +177,7 @@ class Files(Case):
         self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
         self.refuses(tl.Error, "there is no delta", lambda: tl.audit(self.folder / "p.npz", config=False))
 
-    def test_files_of_a_vehicle_each_are_joined(self) -> None:
+    def test_join_reads_files_with_one_vehicle_each(self) -> None:
         for name, x in (("a", 0.0), ("b", 1.0)):
             (self.folder / f"{name}.csv").write_text(f"t,x,y,z\n0,{x},0,0\n1,{x},0,0\n")
         files = [self.folder / "a.csv", self.folder / "b.csv"]
@@ -183,7 +186,7 @@ class Files(Case):
 
 
 class Shown(Case):
-    def test_what_a_notebook_shows_has_no_script_and_names_are_escaped(self) -> None:
+    def test_html_for_notebooks_has_no_script_and_escapes_names(self) -> None:
         t, p = passing()
         shown = tl.audit(t, p, delta=1.5, names=["<b>", "&", "c", "d"])._repr_html_()
         self.assertIn("VIOLATION", shown)

@@ -1,4 +1,4 @@
-"""Notebooks and recipes run."""
+"""Tests of notebooks and recipes."""
 
 import os
 import sys
@@ -20,7 +20,7 @@ import pettingzoo_formation  # noqa: E402
 
 @unittest.skipUnless(os.environ.get("TAUTLINE_NOTEBOOKS"), "a minute: sh tests/run.sh --long runs them")
 class Notebooks(Case):
-    def test_every_notebook_runs_and_is_kept_without_what_it_printed(self) -> None:
+    def test_every_notebook_runs_and_has_no_stored_output(self) -> None:
         books = sorted((ROOT / "python" / "notebooks").glob("*.ipynb"))
         self.assertEqual(len(books), 3)
         for file in books:
@@ -33,10 +33,10 @@ class Notebooks(Case):
 
 
 class PettingZoo(unittest.TestCase):
-    def test_the_environment_passes_the_packages_own_test(self) -> None:
+    def test_the_environment_passes_the_test_of_pettingzoo(self) -> None:
         parallel_api_test(pettingzoo_formation.FormationEnv(duration_s=5.0), num_cycles=300)
 
-    def test_the_same_seed_and_actions_are_the_same_episode(self) -> None:
+    def test_seed_and_actions_determine_the_episode(self) -> None:
         def episode(seed: int) -> np.ndarray:
             env = pettingzoo_formation.FormationEnv(duration_s=5.0)
             env.reset(seed=seed)
@@ -46,7 +46,7 @@ class PettingZoo(unittest.TestCase):
         np.testing.assert_array_equal(episode(3), episode(3))
         self.assertTrue((episode(3) != episode(4)).any())
 
-    def test_a_violation_ends_the_episode_for_all(self) -> None:
+    def test_a_violation_terminates_all_agents(self) -> None:
         env = pettingzoo_formation.FormationEnv()
         env.reset(seed=0)
         for _ in range(100):
@@ -62,7 +62,7 @@ class PettingZoo(unittest.TestCase):
 
 
 class GymPybulletDrones(Case):
-    """The log is one of our own, in the format that the package documents; the package itself is on no registry."""
+    """Tests with a log in the format of the package's documentation, because no registry has the package."""
 
     def log(self, late: float = 0.0) -> str:
         t = np.arange(50) / 48
@@ -77,14 +77,14 @@ class GymPybulletDrones(Case):
             np.savez(out, timestamps=times, states=states, controls=np.zeros((2, 12, 96)))
         return str(file)
 
-    def test_a_log_is_judged_without_what_was_never_written(self) -> None:
+    def test_columns_that_were_never_written_are_ignored(self) -> None:
         t, positions, velocities = gym_pybullet_drones.load(self.log())
         self.assertEqual((t.shape, positions.shape), ((50,), (50, 2, 3)))
-        judged = tl.audit(t, positions, velocities=velocities, delta=0.12)
-        self.assertEqual(judged.verdict, "VIOLATION")
-        self.assertAlmostEqual(judged.separation_m, 0.1, places=6)
+        audit = tl.audit(t, positions, velocities=velocities, delta=0.12)
+        self.assertEqual(audit.verdict, "VIOLATION")
+        self.assertAlmostEqual(audit.separation_m, 0.1, places=6)
 
-    def test_drones_of_different_times_are_refused(self) -> None:
+    def test_drones_with_different_times_are_refused(self) -> None:
         self.refuses(tl.Error, "different times", lambda: gym_pybullet_drones.load(self.log(late=0.001)))
 
 

@@ -1,4 +1,4 @@
-"""Flights and laws in Python: the same bits as the program flies, exceptions whole, the interpreter free."""
+"""Tests of flights and laws: the same bits as the program, exceptions of laws, threads."""
 
 import os
 import signal
@@ -14,10 +14,10 @@ from shared import Case, Springs, printed_json, short
 
 
 class Flights(Case):
-    def test_a_flight_is_the_programs_to_the_bit(self) -> None:
+    def test_a_flight_has_the_bits_of_the_program(self) -> None:
         ours = tl.fly(short(), record=self.folder / "ours.mcap").to_dict()
-        words = ["run", "pentagon", "--set=time.duration_s=2.0", "--json", "--no-figures", f"--out={self.folder / 'theirs'}"]
-        theirs = printed_json(words)
+        out = f"--out={self.folder / 'theirs'}"
+        theirs = printed_json(["run", "pentagon", "--set=time.duration_s=2.0", "--json", "--no-figures", out])
         for report in (ours, theirs):
             del report["performance"]
         self.assertEqual(ours, theirs)
@@ -25,12 +25,12 @@ class Flights(Case):
         again = tl.read(self.folder / "theirs" / "run.mcap").to_numpy()
         np.testing.assert_array_equal(read[1], again[1])
 
-    def test_arrays_are_what_is_recorded(self) -> None:
+    def test_arrays_equal_the_recording(self) -> None:
         f = tl.fly(short(), record=self.folder / "run.mcap")
         t, p = tl.read(self.folder / "run.mcap").to_numpy()
         np.testing.assert_array_equal(f.t, t)
         np.testing.assert_array_equal(f.positions, p)
-        # The engine counts positions from the middle of the start.
+        # The engine computes positions relative to the centre of the start.
         np.testing.assert_allclose(f.positions[0], f.scenario.positions_m, atol=1e-12)
         self.assertEqual(f.velocities.shape, f.positions.shape)
         self.assertEqual(f.separations_m.min(), f.separation_m)
@@ -49,23 +49,24 @@ class Flights(Case):
 
 
 class Laws(Case):
-    def test_a_law_flies_and_says_that_it_is_another(self) -> None:
+    def test_a_flight_under_another_law_is_noted(self) -> None:
         f = tl.fly("pentagon", law=Springs(), record=self.folder / "run.mcap")
         self.assertEqual(f.report["separation"]["certified_m"], None)
-        np.testing.assert_allclose(f.positions[-1] - f.positions[-1].mean(0), f.scenario.slots_m - f.scenario.slots_m.mean(0), atol=1e-3)
+        last, slots = f.positions[-1], f.scenario.slots_m
+        np.testing.assert_allclose(last - last.mean(0), slots - slots.mean(0), atol=1e-3)
         self.assertTrue(any("Springs" in note for note in tl.audit(self.folder / "run.mcap").notes))
 
-    def test_a_law_is_told_what_is_true(self) -> None:
+    def test_an_observation_is_exact_without_a_network(self) -> None:
         seen = []
 
-        class Looks(tl.Law):
+        class Observes(tl.Law):
             sensing_range_m = 4.0
 
             def control(self, obs, out):
                 seen.append(obs)
                 out[:] = 0
 
-        f = tl.fly(short(), law=Looks())
+        f = tl.fly(short(), law=Observes())
         first, last = seen[0], seen[-1]
         np.testing.assert_array_equal(first.positions, f.positions[0])
         np.testing.assert_array_equal(first.slots_m, f.scenario.slots_m)
@@ -75,15 +76,15 @@ class Laws(Case):
         self.assertLessEqual({(i, j) for i in range(5) for j in range(i + 1, 5) if apart[i, j] <= 4.0}, near)
         self.assertEqual(len(seen), 2 * 240 + 1)
 
-    def test_over_a_network_a_law_is_told_what_was_heard(self) -> None:
+    def test_an_observation_over_a_network_has_the_received_states(self) -> None:
         seen = []
 
-        class Looks(tl.Law):
+        class Observes(tl.Law):
             def control(self, obs, out):
                 seen.append(obs)
                 out[:] = 1.0
 
-        tl.fly(short(**{"network.latency_s": 0.1, "network.rate_hz": 20}), law=Looks())
+        tl.fly(short(**{"network.latency_s": 0.1, "network.rate_hz": 20}), law=Observes())
         obs = seen[-1]
         self.assertFalse(obs.shared)
         self.assertEqual((obs.heard_positions.shape, obs.heard_ages_s.shape), ((5, 5, 3), (5, 5)))
@@ -92,7 +93,7 @@ class Laws(Case):
         self.assertTrue((obs.heard_positions[0, 1] != obs.positions[1]).any())
         self.assertIsNone(obs.seen_positions)
 
-    def test_what_a_law_raises_is_raised_whole(self) -> None:
+    def test_an_exception_of_a_law_keeps_its_traceback(self) -> None:
         class Fails(tl.Law):
             def control(self, obs, out):
                 out[:] = 0
@@ -115,7 +116,7 @@ class Laws(Case):
             sim.step(steps=480)
         self.assertEqual(sim.ending, "the law is undefined: it failed")
 
-    def test_exceptions_that_are_no_errors_pass_too(self) -> None:
+    def test_system_exit_of_a_law_is_raised(self) -> None:
         class Leaves(tl.Law):
             def control(self, obs, out):
                 raise SystemExit(3)
@@ -124,7 +125,7 @@ class Laws(Case):
             tl.fly(short(), law=Leaves())
         self.assertEqual(caught.exception.code, 3)
 
-    def test_a_law_that_writes_no_number_is_named_with_vehicle_and_step(self) -> None:
+    def test_a_command_that_is_not_finite_is_an_error(self) -> None:
         class Forgets(tl.Law):
             def __init__(self, value):
                 self.value = value
@@ -136,11 +137,13 @@ class Laws(Case):
                 elif self.value is not None:
                     out[4, 1] = self.value
 
+        message = "step 240: the law's command for vehicle 5 is not a finite number"
         for value in (None, np.nan, np.inf):
-            self.refuses(tl.Error, "step 240: the law's command for vehicle 5 is not a finite number", lambda value=value: tl.fly(short(), law=Forgets(value)))
-        self.refuses(tl.Error, "step 240: the law's command for vehicle 5", lambda: tl.Simulation(short(), law=Forgets(None)).step(steps=480))
+            self.refuses(tl.Error, message, lambda value=value: tl.fly(short(), law=Forgets(value)))
+        sim = tl.Simulation(short(), law=Forgets(None))
+        self.refuses(tl.Error, message, lambda: sim.step(steps=480))
 
-    def test_a_law_that_returns_or_reshapes_is_told_what_to_do(self) -> None:
+    def test_a_law_that_returns_or_reshapes_is_refused(self) -> None:
         class Returns(tl.Law):
             def control(self, obs, out):
                 return obs.positions
@@ -151,10 +154,10 @@ class Laws(Case):
                 out.shape = (3, 5)
 
         self.refuses(TypeError, "writes into `out`", lambda: tl.fly(short(), law=Returns()))
-        self.refuses(tl.Error, "made an array of shape (3, 5)", lambda: tl.fly(short(), law=Reshapes()))
+        self.refuses(tl.Error, "must keep its shape (5, 3), got (3, 5)", lambda: tl.fly(short(), law=Reshapes()))
         self.refuses(NotImplementedError, "write control", lambda: tl.fly(short(), law=tl.Law()))
 
-    def test_a_large_swarms_law_stays_in_the_thread_that_flies(self) -> None:
+    def test_a_law_of_a_large_swarm_runs_in_the_calling_thread(self) -> None:
         threads = set()
 
         class Where(Springs):
@@ -169,7 +172,7 @@ class Laws(Case):
 
 
 class Huge(tl.Law):
-    """Commands what no state can bear, from a time on."""
+    """Commands an acceleration from ``from_s`` on after which states are not finite."""
 
     def __init__(self, from_s: float = 0.0, value: float = 1e300) -> None:
         self.from_s, self.value = from_s, value
@@ -181,7 +184,7 @@ class Huge(tl.Law):
 
 
 class Pulls(tl.Law):
-    """Pulls all vehicles to one point, and then commands what no state can bear."""
+    """Pulls all vehicles to one point, and commands 1e300 m/s^2 from 10 s on."""
 
     def control(self, obs, out):
         out[:] = obs.positions.mean(0) - obs.positions if obs.t < 10.0 else 1e300
@@ -209,7 +212,7 @@ class EarlyEnds(Case):
             np.testing.assert_array_equal(p, f.positions)
         self.assertEqual(f.audit(to_s=0.5).status, "clear")
 
-    def test_a_flight_to_its_end_has_none(self) -> None:
+    def test_a_complete_flight_has_no_early_end(self) -> None:
         f = tl.fly(short())
         self.assertEqual((f.ended_early, f.status, f.audit().ended_early), (None, "clear", None))
         sim = tl.Simulation(short())
@@ -217,7 +220,7 @@ class EarlyEnds(Case):
         sim.step(steps=480)
         self.assertEqual((sim.status, sim.ending, sim.ended_early), ("clear", "completed", None))
 
-    def test_a_violation_before_an_early_end_stays_one(self) -> None:
+    def test_a_violation_before_an_early_end_counts(self) -> None:
         f = tl.fly("pentagon-laplacian", law=Pulls(), set={"time.duration_s": 30})
         self.assertIsNotNone(f.ended_early)
         self.assertEqual((f.status, f.audit().status), ("violation", "violation"))
@@ -243,7 +246,7 @@ class EarlyEnds(Case):
 
 
 class Threads(Case):
-    def test_python_runs_while_a_flight_is_flown_and_a_recording_judged(self) -> None:
+    def test_other_threads_run_during_flights_and_audits(self) -> None:
         count, is_over = 0, threading.Event()
 
         def counts() -> None:
@@ -255,7 +258,8 @@ class Threads(Case):
         counter.start()
         try:
             scenario = tl.Scenario("pentagon", set={"time.duration_s": 60})
-            t, p = np.arange(3000) * 0.1, np.random.default_rng(0).normal(scale=20, size=(3000, 20, 3))
+            t = np.arange(3000) * 0.1
+            p = np.random.default_rng(0).normal(scale=20, size=(3000, 20, 3))
             for work in (lambda: tl.fly(scenario), lambda: tl.audit(t, p, delta=0.1)):
                 before = count
                 work()
@@ -264,7 +268,7 @@ class Threads(Case):
             is_over.set()
             counter.join()
 
-    def test_ctrl_c_ends_a_flight_and_leaves_its_recording(self) -> None:
+    def test_ctrl_c_ends_a_flight_and_keeps_its_recording(self) -> None:
         def presses_once(path) -> None:
             while not path.exists() or path.stat().st_size == 0:
                 pass
@@ -280,9 +284,9 @@ class Threads(Case):
             t, _ = tl.read(file).to_numpy()
             self.assertLess(t[-1], 5000)
 
-    def test_copies_that_fail_at_once_in_two_threads_each_raise_their_own(self) -> None:
-        # One law, asked by two copies. Both are in `control` at once: the first raises, and while it waits for the interpreter's lock to
-        # raise that in Python the second raises something else.
+    def test_copies_in_two_threads_raise_their_own_exceptions(self) -> None:
+        # Two copies share a law and are in `control` at once. While the first waits for the interpreter's lock to raise
+        # its exception in Python, the second raises another one.
         second_is_in, first_is_in = threading.Event(), threading.Event()
         names, raised = threading.local(), {}
 
@@ -325,9 +329,10 @@ class Threads(Case):
                 thread.join()
         finally:
             sys.setswitchinterval(interval)
-        self.assertEqual({name: type(error) for name, error in raised.items()}, {"first": KeyError, "second": IndexError})
+        kinds = {name: type(error) for name, error in raised.items()}
+        self.assertEqual(kinds, {"first": KeyError, "second": IndexError})
 
-    def test_an_exception_in_one_copy_does_not_end_another(self) -> None:
+    def test_an_exception_in_a_copy_does_not_end_another(self) -> None:
         class Fails(tl.Law):
             failing = None
 
@@ -386,7 +391,7 @@ class Threads(Case):
         with self.assertRaises(IndexError):
             sim.step()
 
-    def test_a_simulation_is_stepped_by_one_at_a_time(self) -> None:
+    def test_a_simulation_cannot_be_stepped_twice_at_once(self) -> None:
         class Steps(tl.Law):
             sim = None
 
@@ -401,7 +406,7 @@ class Threads(Case):
 
 
 class Simulations(Case):
-    def test_stepped_by_its_law_a_simulation_is_the_flight(self) -> None:
+    def test_a_simulation_equals_the_flight(self) -> None:
         f, sim = tl.fly(short()), tl.Simulation(short())
         while not sim.is_over:
             sim.step(steps=7)
@@ -420,7 +425,7 @@ class Simulations(Case):
         np.testing.assert_array_equal(sim.commands, u)
         self.assertEqual(sim.t, 1.0)
 
-    def test_the_judge_follows_and_nothing_passes_between_steps(self) -> None:
+    def test_the_audit_covers_the_time_between_steps(self) -> None:
         sim = tl.Simulation(short(**{"time.dt_s": 0.5, "time.max_halvings": 0}))
         u = np.zeros((5, 3))
         where = sim.positions
@@ -432,7 +437,7 @@ class Simulations(Case):
         self.assertEqual(sim.status, "violation")
         self.assertEqual(set(sim.violations[0].pair), {str(first + 1), str(second + 1)})
 
-    def test_a_copy_goes_on_by_itself_with_the_same_bits(self) -> None:
+    def test_a_copy_continues_with_the_same_bits(self) -> None:
         sim = tl.Simulation(short())
         sim.step(steps=100)
         copy = sim.copy()
@@ -443,8 +448,8 @@ class Simulations(Case):
         noisy = tl.Simulation(short(**{"sensing.position_noise_m": 0.05, "sensing.rate_hz": 100}))
         noisy.step(steps=10)
         same, other = noisy.copy(), noisy.copy(noise_seed=9)
-        for one in (noisy, same, other):
-            one.step(steps=200)
+        for simulation in (noisy, same, other):
+            simulation.step(steps=200)
         np.testing.assert_array_equal(same.positions, noisy.positions)
         self.assertTrue((other.positions != noisy.positions).any())
 

@@ -1,4 +1,4 @@
-"""The command line inside the package, and its commands as functions."""
+"""Tests of the command line in the package, and of its commands as functions."""
 
 import inspect
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import tautline as tl
 from shared import Case, passing, short
-from tautline import _words
+from tautline import _arguments
 
 SPEC = """\
 scenario = "pentagon"
@@ -45,7 +45,7 @@ class Command(Case):
         ):
             self.assertEqual(tautline(*words).returncode, code, words)
 
-    def test_it_is_a_module_too_and_pages_repeat_the_command(self) -> None:
+    def test_the_command_runs_as_a_module_and_pages_show_it(self) -> None:
         t, p = passing()
         np.savez(self.folder / "p.npz", t=t, positions=p)
         words = [sys.executable, "-m", "tautline", "audit", "p.npz", "--delta", "0.4", "--html", "a.html"]
@@ -54,26 +54,29 @@ class Command(Case):
         self.assertIn("CLEAR if straight between samples", ran.stdout)
         self.assertIn("tautline audit p.npz --delta 0.4", (self.folder / "a.html").read_text())
 
-    def test_every_question_of_the_command_line_can_be_asked_in_python(self) -> None:
-        asked = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
-        self.assertIn("max-gap", asked)
-        answers = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "proof", "allow-undecided", "no-config", "help"}
-        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_words.reading).parameters}
+    def test_python_has_every_option_of_the_command_line(self) -> None:
+        options = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
+        self.assertIn("max-gap", options)
+        outputs = {"json", "quiet", "junit", "events", "html", "summary", "annotations", "proof"}
+        outputs |= {"allow-undecided", "no-config", "help"}
+        taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_arguments.read_options).parameters}
         taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
-        self.assertEqual({name for name in asked - answers if name.replace("-", "_") not in taken}, set())
+        self.assertEqual({name for name in options - outputs if name.replace("-", "_") not in taken}, set())
 
-    def test_nothing_is_printed_by_functions(self) -> None:
-        text = "import tautline as tl\ntl.compare('pentagon', ['laplacian'], runs=1, set={'time.duration_s': 2})\ntl.fly('pentagon', set={'time.duration_s': 2})"
+    def test_functions_print_nothing(self) -> None:
+        text = "import tautline as tl\n"
+        text += "tl.compare('pentagon', ['laplacian'], runs=1, set={'time.duration_s': 2})\n"
+        text += "tl.fly('pentagon', set={'time.duration_s': 2})"
         ran = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True, timeout=300)
         self.assertEqual((ran.stdout, ran.stderr), ("", ""))
 
-    def test_pandas_and_matplotlib_are_imported_when_they_are_asked_for(self) -> None:
+    def test_pandas_and_matplotlib_are_imported_on_use(self) -> None:
         text = "import sys, tautline\nassert not {'pandas', 'matplotlib'} & set(sys.modules)"
         subprocess.run([sys.executable, "-c", text], check=True, timeout=60)
 
 
 class Functions(Case):
-    def test_a_campaign_answers_goes_on_and_is_a_table(self) -> None:
+    def test_a_campaign_has_an_answer_and_a_table_and_is_repeatable(self) -> None:
         spec, out = self.folder / "spec.toml", self.folder / "out"
         spec.write_text(SPEC.format(runs=6))
         answer = tl.campaign(spec, out, worst=0)
@@ -84,7 +87,7 @@ class Functions(Case):
         self.assertEqual(tl.campaign(spec, out, worst=0).to_dict(), answer.to_dict())
         self.assertEqual((out / "results.parquet").read_bytes(), before)
 
-    def test_a_campaign_knows_what_flew_it(self) -> None:
+    def test_a_campaign_records_the_hash_of_its_program(self) -> None:
         spec, out = self.folder / "spec.toml", self.folder / "out"
         spec.write_text(SPEC.format(runs=2))
         tl.campaign(spec, out, worst=0)
@@ -92,34 +95,35 @@ class Functions(Case):
 
         from tautline import _native
 
-        holder = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
-        self.assertEqual(json.loads((out / "manifest.json").read_text())["tool"]["sha256"], holder)
+        expected = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
+        self.assertEqual(json.loads((out / "manifest.json").read_text())["tool"]["sha256"], expected)
 
-    def test_laws_are_compared(self) -> None:
+    def test_compare(self) -> None:
         answer = tl.compare(short(), ["edge-tension", "laplacian"], runs=3, html=self.folder / "c.html")
         self.assertEqual(answer.laws.to_pandas()["name"].tolist(), ["edge-tension", "laplacian"])
         self.assertEqual((answer.runs, answer["runs"]), (3, 3))
         self.assertTrue((self.folder / "c.html").exists())
-        self.refuses(tl.Error, "exists", lambda: tl.compare(short(), ["laplacian"], runs=1, html=self.folder / "c.html"))
+        page = self.folder / "c.html"
+        self.refuses(tl.Error, "exists", lambda: tl.compare(short(), ["laplacian"], runs=1, html=page))
         of_text = tl.compare(tl.Scenario.from_toml(short().to_toml()), ["laplacian"], runs=1)
         self.assertEqual(of_text.laws[0].name, "laplacian")
 
-    def test_a_margin_is_found(self) -> None:
+    def test_margin(self) -> None:
         found = tl.margin("pentagon", "time.duration_s", 2, 60, scan=2, halvings=1)
         self.assertEqual(found.key, "time.duration_s")
         self.assertFalse(found.probes[0].get("holds", False))
 
-    def test_a_grid_is_swept(self) -> None:
+    def test_sweep(self) -> None:
         found = tl.sweep(short(), {"law.alpha": np.array([0.5, 1.0]), "law.delta_m": [1, 9]}, verdict="clear")
         self.assertEqual(found["grid"][1], {"key": "law.delta_m", "values": [1.0, 9.0]})
         self.assertEqual([point.refused for point in found.points], [0, 1, 0, 1])
         self.assertTrue(found.is_good)
 
-    def test_an_attack_is_searched(self) -> None:
+    def test_attack(self) -> None:
         found = tl.attack(short(), start=0.1, flights=6, vary={"sensing.latency_s": (0.0, 0.1)})
         self.assertEqual(found["scenario"], json.loads(json.dumps(found.to_dict()))["scenario"])
 
-    def test_what_is_known_before_the_first_step(self) -> None:
+    def test_check(self) -> None:
         found = tl.check("pentagon")
         self.assertAlmostEqual(found.certified_m, 2.055307, places=6)
         self.assertTrue(found.is_good)
@@ -128,9 +132,10 @@ class Functions(Case):
         self.assertIn("start-on-line", [warning.code for warning in refused.warnings])
         self.assertEqual(found.to_dict()["vehicles"], found.vehicles)
 
-    def test_scenarios_are_listed_and_built(self) -> None:
+    def test_scenarios(self) -> None:
         self.assertIn("pentagon", tl.scenarios())
-        s = tl.Scenario("pentagon", set={"start.positions_m.2.x": 9.2, "law.kind": "displacement", "graph": {"kind": "star"}})
+        changes = {"start.positions_m.2.x": 9.2, "law.kind": "displacement", "graph": {"kind": "star"}}
+        s = tl.Scenario("pentagon", set=changes)
         self.assertEqual((s.law, len(s), s.links.shape), ("displacement", 5, (4, 2)))
         self.assertEqual(tl.Scenario.from_toml(s.to_toml()).sha256, s.sha256)
         file = self.folder / "s.toml"
@@ -139,12 +144,12 @@ class Functions(Case):
         self.assertEqual(tl.fly(s, set={"time.duration_s": 2.0}).scenario.duration_s, 2.0)
 
     @unittest.skipUnless(os.environ.get("TAUTLINE_LONG"), "minutes: set TAUTLINE_LONG")
-    def test_the_papers_claims_are_judged(self) -> None:
+    def test_validate(self) -> None:
         self.assertTrue(tl.validate(self.folder / "validate").is_good)
 
 
 class Recordings(Case):
-    def test_exports_read_back_to_the_last_bit(self) -> None:
+    def test_exports_have_the_same_bits(self) -> None:
         f = tl.fly(short(), record=self.folder / "run.mcap")
         for format in ("csv", "parquet", "npz", "mcap"):
             file = self.folder / f"copy.{format}"
@@ -154,9 +159,10 @@ class Recordings(Case):
             np.testing.assert_array_equal(t, f.t, format)
         self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
         tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
-        self.refuses(tl.Error, "does not tell a format", lambda: tl.export(self.folder / "run.mcap", self.folder / "a.xyz"))
+        unknown = self.folder / "a.xyz"
+        self.refuses(tl.Error, "does not tell a format", lambda: tl.export(self.folder / "run.mcap", unknown))
 
-    def test_a_rate_interpolates_and_never_across_a_gap(self) -> None:
+    def test_a_rate_interpolates_except_across_gaps(self) -> None:
         file = self.folder / "a.csv"
         rows = [f"{0.1 * k:.1f},a,{k},0,0" for k in range(21) if not 8 < k < 13]
         file.write_text("t,id,x,y,z\n" + "\n".join(rows) + "\n")
@@ -182,8 +188,8 @@ class Recordings(Case):
         self.refuses(tl.Error, "hz=", lambda: recording.to_numpy())
         self.refuses(tl.Error, "no rows", lambda: recording.to_pandas())
         self.assertEqual(recording.audit(delta=1.0).verdict, "PROVED CLEAR")
-        for hz, says in ((-1, "positive"), (float("nan"), "positive"), (1e12, "lower rate")):
-            self.refuses(tl.Error, says, lambda hz=hz: recording.to_numpy(hz=hz))
+        for hz, message in ((-1, "positive"), (float("nan"), "positive"), (1e12, "lower rate")):
+            self.refuses(tl.Error, message, lambda hz=hz: recording.to_numpy(hz=hz))
 
 
 if __name__ == "__main__":

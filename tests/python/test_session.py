@@ -1,4 +1,4 @@
-"""The session that says what the package is: every statement of it runs as printed in docs/python.md."""
+"""Tests that the code of docs/python.md runs."""
 
 import os
 import re
@@ -9,7 +9,7 @@ PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
 
 
 class Session(Case):
-    def test_every_block_of_python_on_the_page_runs_as_printed(self) -> None:
+    def test_every_block_of_python_on_the_page_runs(self) -> None:
         blocks = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
         self.assertGreater(len(blocks), 8)
         t, p = passing()
@@ -20,17 +20,21 @@ class Session(Case):
             with self.subTest(block=number):
                 exec(compile(block, f"docs/python.md, block {number}", "exec"), names)
 
-    def test_the_adoption_session(self) -> None:
+    def test_a_session_with_the_whole_interface(self) -> None:
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(self.folder)
-        (self.folder / "spec.toml").write_text('scenario = "pentagon"\nruns = 4\n[set]\ntime.duration_s = 2.0\n[vary]\n"start.jitter_m" = { uniform = [0.0, 0.2] }\n')
+        spec = 'scenario = "pentagon"\nruns = 4\n[set]\ntime.duration_s = 2.0\n'
+        spec += '[vary]\n"start.jitter_m" = { uniform = [0.0, 0.2] }\n'
+        (self.folder / "spec.toml").write_text(spec)
         import numpy as np, tautline as tl  # noqa: E401
         t, p = passing()
         a = tl.audit(t, p, delta=1.5)
         a.verdict, a.separation_m, a.closest[0].pair, a.violations.to_pandas(), a.to_dict(), a.to_html("a.html")
         with self.assertRaises(tl.ViolationError):
             a.raise_for_violation()
-        s = tl.Scenario("pentagon", set={"time.duration_s": 60}); f = tl.fly(s, record="run.mcap"); f.t, f.positions, f.velocities, f.report  # noqa: E702
+        s = tl.Scenario("pentagon", set={"time.duration_s": 60})
+        f = tl.fly(s, record="run.mcap")
+        f.t, f.positions, f.velocities, f.report
         class Springs(tl.Law):
             def __init__(self, slots): self.slots = slots  # noqa: E704
             def control(self, obs, out): out[:] = self.slots - obs.positions - 2 * obs.velocities  # noqa: E704

@@ -1,4 +1,4 @@
-"""Easy slips never become a clear verdict, and nothing that was written is lost by them."""
+"""Tests of mistakes: none gives a clear verdict, and none loses a written file."""
 
 import copy
 import multiprocessing
@@ -22,7 +22,7 @@ class Ahead(tl.Law):
 
 
 class Together(tl.Law):
-    """Pulls everybody to one place."""
+    """Pulls all vehicles to the origin."""
 
     def control(self, obs, out):
         out[:] = -obs.positions - 2 * obs.velocities
@@ -30,19 +30,19 @@ class Together(tl.Law):
 
 class OwnFlights(Case):
     def agrees(self, flight: tl.Flight, file: object) -> None:
-        """Asserts that the arrays of a flight are judged as its recording is."""
+        """Asserts that audits of a flight and of its recording are equal."""
         ours, recorded = flight.audit().to_dict(), tl.audit(file).to_dict()
         for key in ("status", "separation", "audit", "closest", "violations", "undecided", "obstacles"):
             self.assertEqual(ours[key], recorded[key], key)
 
-    def test_obstacles_are_judged(self) -> None:
+    def test_obstacles_are_audited(self) -> None:
         file = self.folder / "o.mcap"
         flight = tl.fly("obstacles", law=Ahead(), record=file, set={"time.duration_s": 12.0})
         self.assertEqual(flight.status, "violation")
         self.assertEqual(flight.audit().verdict, "VIOLATION")
         self.agrees(flight, file)
 
-    def test_ellipsoids_are_judged(self) -> None:
+    def test_ellipsoids_are_audited(self) -> None:
         file = self.folder / "e.mcap"
         ellipsoid = {"shape": "ellipsoid", "half_axes_m": [1.0, 1.0, 1.5]}
         sets = {"law.kind": "displacement", "law.delta_m": 2.0, "safety": ellipsoid, "time.duration_s": 5.0}
@@ -51,14 +51,14 @@ class OwnFlights(Case):
         self.assertEqual(flight.audit().verdict, "VIOLATION")
         self.agrees(flight, file)
 
-    def test_what_the_flight_saw_between_instants_counts(self) -> None:
+    def test_an_approach_between_instants_counts(self) -> None:
         file = self.folder / "r.mcap"
         coarse = {"time.record_hz": 1, "law.f1_per_s2": 30, "law.f2_per_s": 1}
         flight = tl.fly("pentagon-laplacian", record=file, set=coarse)
         self.assertEqual(flight.status, "violation")
         self.assertEqual(flight.audit().verdict, "VIOLATION")
         self.agrees(flight, file)
-        # The arrays alone do not know.
+        # The arrays alone do not contain it.
         self.assertGreater(tl.audit(flight.t, flight.positions, delta=2.0).separation_m, flight.separation_m)
 
     def test_a_clear_flight_stays_clear(self) -> None:
@@ -67,10 +67,10 @@ class OwnFlights(Case):
         self.assertEqual(flight.audit(delta=3.0).verdict, "VIOLATION")
 
 
-class Words(Case):
-    def test_a_name_is_no_list_of_names(self) -> None:
+class Arguments(Case):
+    def test_arguments_of_wrong_types_are_refused(self) -> None:
         t, p = passing()
-        for says, asked in (
+        for message, options in (
             ("ids: a list of names is needed, not str", {"ids": "12"}),
             ("names: a list of names is needed, not str", {"names": "abcd"}),
             ("limit: a dictionary is needed, not int", {"limit": 5}),
@@ -79,7 +79,7 @@ class Words(Case):
             ("motion: a string is needed, not bool", {"motion": False}),
             ("unexpected keyword argument 'detla'", {"detla": 1.0}),
         ):
-            self.refuses(TypeError, says, lambda asked=asked: tl.audit(t, p, **{"delta": 0.1, **asked}))
+            self.refuses(TypeError, message, lambda options=options: tl.audit(t, p, **{"delta": 0.1, **options}))
         self.refuses(tl.Error, "no vehicle is named", lambda: tl.audit(t, p, delta=0.1, ids=iter([])))
         self.refuses(tl.Error, "too large", lambda: tl.audit(t, p, delta=10**400))
         self.assertEqual(tl.audit(t, p, delta=0.1, expect_vehicles=np.int64(4)).vehicles, ["1", "2", "3", "4"])
@@ -92,42 +92,43 @@ class Words(Case):
         self.refuses(tl.Error, "is not finite", lambda: tl.sweep("pentagon", {"law.alpha": [1.0, float("nan")]}))
         self.refuses(TypeError, "not the class Springs", lambda: tl.fly("pentagon", law=Springs))
 
-    def test_tables_of_pandas_are_named_for_what_they_are(self) -> None:
+    def test_series_of_pandas_are_refused(self) -> None:
         import pandas
 
         t, p = passing()
         self.refuses(TypeError, "not Series", lambda: tl.audit(pandas.Series(t), p, delta=1.0))
 
-    def test_settings_beside_arrays_are_heeded_or_refused(self) -> None:
+    def test_config_applies_to_arrays(self) -> None:
         t, p = passing()
         config = self.folder / "c.toml"
         config.write_text("[audit]\ndelta_m = 1.5\n")
         self.assertEqual(tl.audit(t, p, config=config).verdict, "VIOLATION")
         config.write_text("[audit.limits]\nspeed_m_s = 0.1\n")
         self.assertEqual(tl.audit(t, p, delta=0.1, config=config).verdict, "VIOLATION")
-        self.refuses(FileNotFoundError, "none.toml", lambda: tl.audit(t, p, delta=0.1, config=self.folder / "none.toml"))
+        missing = self.folder / "none.toml"
+        self.refuses(FileNotFoundError, "none.toml", lambda: tl.audit(t, p, delta=0.1, config=missing))
 
-    def test_who_is_not_there_is_named(self) -> None:
+    def test_absent_vehicles_are_named(self) -> None:
         t, p = passing()
         p[:, 3], p[1:, 2] = np.nan, np.nan
         notes = " ".join(tl.audit(t, p, delta=0.1).notes)
-        self.assertIn("`4` are NaN at every instant: nothing is said of them", notes)
+        self.assertIn("`4` are NaN at every instant and are not audited", notes)
         self.assertIn("`3` are not seen from the first instant to the last", notes)
         self.assertEqual(tl.audit(*passing(), delta=0.1).notes, [])
 
-    def test_what_is_found_is_neither_true_nor_false(self) -> None:
+    def test_results_have_no_truth_value(self) -> None:
         for found in (tl.audit(*passing(), delta=1.5), tl.fly(short()), tl.check("pentagon")):
             self.refuses(TypeError, "neither true nor false", lambda found=found: bool(found))
 
 
 class Kept(Case):
-    def test_a_page_of_another_verdict_does_not_take_its_place(self) -> None:
+    def test_a_page_of_another_verdict_does_not_replace_a_page(self) -> None:
         t, p = passing()
         a, page = tl.audit(t, p, delta=1.5), self.folder / "a.html"
         a.to_html(page)
         before = page.read_bytes()
         p[:, 0] = [0.0, 9.0, 0.0]
-        self.refuses(tl.Error, "not what it was", lambda: a.to_html(page))
+        self.refuses(tl.Error, "has changed", lambda: a.to_html(page))
         self.assertEqual(page.read_bytes(), before)
 
     def test_a_flight_overwrites_neither_its_scenario_nor_itself(self) -> None:
@@ -141,7 +142,7 @@ class Kept(Case):
         nowhere = self.folder / "none" / "x.html"
         self.refuses(OSError, "there is no folder", lambda: tl.fly(short(), html=nowhere))
 
-    def test_threads_write_the_same_page_whole(self) -> None:
+    def test_threads_may_write_the_same_page(self) -> None:
         page, failed = self.folder / "same.html", []
         t, p = passing(10)
 
@@ -159,29 +160,30 @@ class Kept(Case):
         self.assertTrue(page.read_text().rstrip().endswith("</html>"))
         self.assertEqual(os.listdir(self.folder), ["same.html"])
 
-    def test_a_scenario_that_changed_is_not_asked_about_behind_ones_back(self) -> None:
+    def test_a_changed_scenario_is_refused(self) -> None:
         file = self.folder / "s.toml"
         file.write_text(short().to_toml())
         s = tl.Scenario(file)
         file.write_text(short(**{"law.alpha": 2.0}).to_toml())
         self.refuses(tl.Error, "has changed", lambda: tl.compare(s, runs=1))
         self.refuses(tl.Error, "has changed", lambda: tl.fly(s, set={"time.duration_s": 1.0}))
-        self.refuses(tl.Error, "not what it was", lambda: pickle.loads(pickle.dumps(s)))
+        self.refuses(tl.Error, "has changed", lambda: pickle.loads(pickle.dumps(s)))
         file.unlink()
         self.refuses(FileNotFoundError, "s.toml", lambda: tl.compare(s, runs=1))
 
-    def test_paths_in_a_text_count_from_where_python_runs(self) -> None:
+    def test_paths_in_a_text_are_relative_to_the_working_folder(self) -> None:
         before = os.getcwd()
         self.addCleanup(os.chdir, before)
         os.chdir(self.folder)
         (self.folder / "slots.csv").write_text("x,y\n0,0\n3,0\n6,0\n")
-        text = '[swarm]\ncount = 3\n[start]\nshape = "line"\nspacing_m = 4.0\n[formation]\nshape = "file"\nfile = "slots.csv"\n[law]\ndelta_m = 1.0\n[time]\nduration_s = 1.0\n'
+        text = '[swarm]\ncount = 3\n[start]\nshape = "line"\nspacing_m = 4.0\n'
+        text += '[formation]\nshape = "file"\nfile = "slots.csv"\n[law]\ndelta_m = 1.0\n[time]\nduration_s = 1.0\n'
         s = tl.Scenario.from_toml(text)
         self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
         self.assertEqual(os.listdir(self.folder), ["slots.csv"])
 
-    @unittest.skipUnless(sys.platform == "linux", "nobody can write into /proc there")
-    def test_a_text_needs_no_folder_that_can_be_written(self) -> None:
+    @unittest.skipUnless(sys.platform == "linux", "/proc is read-only there")
+    def test_a_text_needs_no_writable_folder(self) -> None:
         before = os.getcwd()
         self.addCleanup(os.chdir, before)
         os.chdir("/proc")
@@ -189,7 +191,7 @@ class Kept(Case):
         self.assertTrue(tl.check(s).is_good)
         self.assertEqual(tl.compare(s, ["edge-tension"], runs=1).runs, 1)
 
-    def test_findings_travel_between_processes(self) -> None:
+    def test_results_can_be_pickled(self) -> None:
         a = tl.audit(*passing(), delta=1.5)
         sent = pickle.loads(pickle.dumps(a))
         self.assertEqual((sent.headline, sent.to_dict()), (a.headline, a.to_dict()))
@@ -211,7 +213,7 @@ class Kept(Case):
             self.assertEqual(pool.apply_async(instants, (large,)).get(timeout=120), steps)
 
     @unittest.skipUnless(sys.platform == "linux", "processes are forked there")
-    def test_a_forked_process_asks_about_a_large_swarm_and_in_several_threads(self) -> None:
+    def test_a_forked_process_compares_a_large_swarm_in_several_threads(self) -> None:
         shared = {"law.kind": "edge-tension", "graph.kind": "complete", "formation.assignment": "given"}
         large = tl.Scenario("thousand", set={"time.duration_s": 0.02, "arrival.hold_s": 0.0, **shared})
         tl.check(large)

@@ -1,4 +1,4 @@
-"""Types: the package passes mypy, its stub is what the native module is, and everything public says what it is."""
+"""Tests of types and docstrings: mypy passes, the stub equals the native module, public items have docstrings."""
 
 import inspect
 import subprocess
@@ -14,7 +14,7 @@ SETTINGS = str(ROOT / "python" / "pyproject.toml")
 
 class Types(unittest.TestCase):
     def mypy(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """Runs mypy where the package is found as a user's code finds it: installed."""
+        """Runs mypy in a folder from which the installed package is imported."""
         line = [sys.executable, "-m", *words]
         return subprocess.run(line, cwd=ROOT / "tests", capture_output=True, text=True, check=False, timeout=600)
 
@@ -22,18 +22,18 @@ class Types(unittest.TestCase):
         ran = self.mypy("mypy", "--config-file", SETTINGS, str(ROOT / "python" / "tautline"))
         self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
 
-    def test_the_stub_is_what_the_native_module_is(self) -> None:
+    def test_the_stub_equals_the_native_module(self) -> None:
         ran = self.mypy("mypy.stubtest", "tautline._native", "--mypy-config-file", SETTINGS, "--ignore-disjoint-bases")
         self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
 
-    def test_a_users_code_is_checked(self) -> None:
+    def test_mypy_checks_code_that_uses_the_package(self) -> None:
         wrong = "import tautline as tl\ntl.audit('a.csv', delta='1.5')\n"
         right = "import tautline as tl\nx: float | None = tl.audit('a.csv', delta=1.5).separation_m\n"
         for code, text in ((1, wrong), (0, right)):
             ran = self.mypy("mypy", "--strict", "-c", text)
             self.assertEqual(ran.returncode, code, ran.stdout + ran.stderr)
 
-    def test_everything_public_says_what_it_is(self) -> None:
+    def test_public_items_have_docstrings(self) -> None:
         for name in tl.__all__:
             thing = getattr(tl, name)
             self.assertTrue(inspect.getdoc(thing), name)

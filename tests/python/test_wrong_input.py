@@ -1,4 +1,4 @@
-"""Wrong input from Python: the right class of exception with the message of the command line, and never an abort."""
+"""Tests of wrong input: it raises the right class of exception with the message of the command line."""
 
 import unittest
 
@@ -8,10 +8,10 @@ from shared import Case, Springs, passing, short
 
 
 class Arrays(Case):
-    def test_what_is_no_array_of_doubles_is_a_type_error(self) -> None:
+    def test_anything_but_an_array_of_doubles_is_a_type_error(self) -> None:
         t, p = passing()
         record = np.zeros(p.size, dtype=[("a", "u1"), ("b", "f8")])["b"].reshape(p.shape)
-        for says, times, positions in (
+        for message, times, positions in (
             ("not of float32", t, p.astype(np.float32)),
             ("not of int64", t, p.astype(np.int64)),
             ("not of int64", np.arange(len(t)), p),
@@ -25,11 +25,11 @@ class Arrays(Case):
             ("needed beside the times", t, None),
             ("not int", 3, None),
         ):
-            self.refuses(TypeError, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+            self.refuses(TypeError, message, lambda t=times, p=positions: tl.audit(t, p, delta=1.0))
 
-    def test_wrong_shapes_say_what_is_needed(self) -> None:
+    def test_wrong_shapes_are_refused(self) -> None:
         t, p = passing()
-        for says, times, positions in (
+        for message, times, positions in (
             ("(T, N, 3) or (T, N, 2) is needed, not of shape (1200,)", t, p.ravel()),
             ("the last axis is x, y and z", t, p[:, :, :1]),
             ("the last axis is x, y and z", t, np.zeros((len(t), 4, 4))),
@@ -40,12 +40,12 @@ class Arrays(Case):
             ("holds nothing to judge", t, p[:, :0]),
             ("1 vehicle to judge, and nothing to keep apart", t, p[:, :1]),
         ):
-            self.refuses(tl.Error, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+            self.refuses(tl.Error, message, lambda t=times, p=positions: tl.audit(t, p, delta=1.0))
         self.refuses(tl.Error, "velocities: they are of shape", lambda: tl.audit(t, p, delta=1.0, velocities=p[1:]))
         self.refuses(tl.Error, "names: 2 for 4 vehicles", lambda: tl.audit(t, p, delta=1.0, names=["a", "b"]))
         self.refuses(tl.Error, "the same name", lambda: tl.audit(t, p, delta=1.0, names=["a", "b", "a", "c"]))
 
-    def test_numbers_in_odd_places_are_named_by_their_place(self) -> None:
+    def test_numbers_that_are_not_finite_are_named_by_their_place(self) -> None:
         t, p = passing()
 
         def changed(array: np.ndarray, place: object, value: float) -> np.ndarray:
@@ -53,7 +53,7 @@ class Arrays(Case):
             copy[place] = value
             return copy
 
-        for says, times, positions in (
+        for message, times, positions in (
             ("positions[10, 1]: it holds NaN", t, changed(p, (10, 1, 0), np.nan)),
             ("positions[10, 1]: it holds inf", t, changed(p, (10, 1, 2), np.inf)),
             ("t[7]: it is NaN", changed(t, 7, np.nan), p),
@@ -62,13 +62,14 @@ class Arrays(Case):
             ("t[1]: time runs backwards", t[::-1], p),
             ("not a finite number below 1e70", t, 1e300 * p),
         ):
-            self.refuses(tl.Error, says, lambda times=times, positions=positions: tl.audit(times, positions, delta=1.0))
+            self.refuses(tl.Error, message, lambda t=times, p=positions: tl.audit(t, p, delta=1.0))
         velocities = changed(np.zeros_like(p), (3, 0, 1), np.nan)
-        self.refuses(tl.Error, "velocities[3, 0]: it holds NaN", lambda: tl.audit(t, p, delta=1.0, velocities=velocities))
+        message = "velocities[3, 0]: it holds NaN"
+        self.refuses(tl.Error, message, lambda: tl.audit(t, p, delta=1.0, velocities=velocities))
 
-    def test_wrong_questions_get_the_command_lines_answer(self) -> None:
+    def test_wrong_options_have_the_message_of_the_command_line(self) -> None:
         t, p = passing()
-        for says, asked in (
+        for message, options in (
             ("there is no delta", {}),
             ("delta must be above 0", {"delta": -1}),
             ("delta must be above 0", {"delta": float("nan")}),
@@ -79,13 +80,13 @@ class Arrays(Case):
             ("no vehicle zz", {"delta": 1, "ids": ["zz"]}),
             ("4 vehicles to judge, not 5", {"delta": 1, "expect_vehicles": 5}),
         ):
-            self.refuses(tl.Error, says, lambda asked=asked: tl.audit(t, p, **asked))
+            self.refuses(tl.Error, message, lambda options=options: tl.audit(t, p, **options))
         self.refuses(TypeError, "delta: a number is needed, not str", lambda: tl.audit(t, p, delta="1"))
         self.refuses(TypeError, "a number is needed, not bool", lambda: tl.audit(t, p, delta=True))
-        self.refuses(TypeError, "says how a file is read", lambda: tl.audit(t, p, delta=1, fps=30))
+        self.refuses(TypeError, "fps: only for files", lambda: tl.audit(t, p, delta=1, fps=30))
         self.refuses(TypeError, "unexpected keyword", lambda: tl.audit("a.csv", delta=1, bogus=1))
 
-    def test_an_error_has_the_code_of_its_problem(self) -> None:
+    def test_errors_have_codes(self) -> None:
         t, p = passing()
         for code, do in (
             ("audit/no-limit", lambda: tl.audit(t, p)),
@@ -99,7 +100,7 @@ class Arrays(Case):
                 do()
             self.assertEqual(caught.exception.code, code)
 
-    def test_many_vehicles_are_judged_and_not_refused(self) -> None:
+    def test_many_vehicles_are_audited(self) -> None:
         side = 300
         p = np.zeros((2, side * side, 2))
         p[:, :, 0], p[:, :, 1] = 3.0 * (np.arange(side * side) % side), 3.0 * (np.arange(side * side) // side)
@@ -107,7 +108,7 @@ class Arrays(Case):
 
 
 class Files(Case):
-    def test_missing_files_are_file_not_found(self) -> None:
+    def test_missing_files_are_not_found(self) -> None:
         t, p = passing()
         for do in (
             lambda: tl.audit("none.csv", delta=1),
@@ -120,7 +121,7 @@ class Files(Case):
         ):
             self.refuses(FileNotFoundError, "No such file", do)
 
-    def test_what_is_wrong_in_a_file_is_said_with_its_place(self) -> None:
+    def test_errors_in_a_file_have_a_place(self) -> None:
         file = self.folder / "a.csv"
         file.write_text("t,id,x,y,z\n0,a,0,0,0\n0,b,1,0,x\n")
         self.refuses(tl.Error, "line 3", lambda: tl.audit(file, delta=0.5))
@@ -131,15 +132,16 @@ class Files(Case):
         self.refuses(TypeError, "a path is needed, not bytes", lambda: tl.read(b"a.csv"))
         self.refuses(tl.Error, "none is given", lambda: tl.read([]))
 
-    def test_what_cannot_be_written_is_an_os_error(self) -> None:
-        self.refuses(OSError, "cannot write", lambda: tl.fly(short(), record=self.folder / "none" / "run.mcap"))
+    def test_a_file_that_cannot_be_written_is_an_os_error(self) -> None:
+        missing = self.folder / "none"
+        self.refuses(OSError, "cannot write", lambda: tl.fly(short(), record=missing / "run.mcap"))
         t, p = passing()
-        self.refuses(OSError, "cannot write", lambda: tl.audit(t, p, delta=1).to_html(self.folder / "none" / "a.html"))
+        self.refuses(OSError, "cannot write", lambda: tl.audit(t, p, delta=1).to_html(missing / "a.html"))
 
 
 class Scenarios(Case):
-    def test_a_wrong_scenario_says_place_value_and_remedy(self) -> None:
-        for says, do in (
+    def test_errors_of_a_scenario_have_place_value_and_remedy(self) -> None:
+        for message, do in (
             ("did you mean `pentagon`?", lambda: tl.Scenario("pentagn")),
             ("--set:1:11: `dt_s` must be a number, got the text", lambda: tl.Scenario(set={"time.dt_s": "x"})),
             ("is not a key of an override", lambda: tl.Scenario(set={"a b": 1})),
@@ -150,13 +152,14 @@ class Scenarios(Case):
             ("there is no law named `nope`", lambda: tl.compare("pentagon", ["nope"])),
             ("--from and --to", lambda: tl.margin("pentagon", "time.control_hz", 5, 5)),
         ):
-            self.refuses(tl.Error, says, do)
+            self.refuses(tl.Error, message, do)
         self.refuses(TypeError, "a name or a path is needed, not int", lambda: tl.Scenario(3))
         self.refuses(TypeError, "a value of TOML is needed, not set", lambda: tl.Scenario(set={"name": {1}}))
 
-    def test_a_million_vehicles_too_many_are_an_error(self) -> None:
+    def test_too_many_vehicles_are_an_error(self) -> None:
         text = 'name = "many"\n[swarm]\ncount = 1000000000000\n[start]\nshape = "line"\nspacing_m = 3.0\n'
-        text += '[formation]\nshape = "circle"\nradius_m = 5.0\n[law]\nkind = "displacement"\ndelta_m = 1.0\n[time]\nduration_s = 1.0\n'
+        text += '[formation]\nshape = "circle"\nradius_m = 5.0\n[law]\nkind = "displacement"\ndelta_m = 1.0\n'
+        text += "[time]\nduration_s = 1.0\n"
         with self.assertRaises(tl.Error):
             tl.Scenario.from_toml(text)
 
@@ -165,28 +168,29 @@ class Simulations(Case):
     def test_wrong_steps_fly_nothing(self) -> None:
         sim = tl.Simulation(short())
         u = np.zeros((5, 3))
-        for kind, says, do in (
+        wrong = np.where(np.arange(5)[:, None] == 2, np.nan, u)
+        for kind, message, do in (
             (TypeError, "not list", lambda: sim.step(u.tolist())),
             (TypeError, "not of float32", lambda: sim.step(u.astype(np.float32))),
             (tl.Error, "of shape (5, 3) are needed, not (4, 3)", lambda: sim.step(u[:4])),
             (tl.Error, "not (5, 1)", lambda: sim.step(u[:, :1])),
             (tl.Error, "not of shape (15,)", lambda: sim.step(u.ravel())),
-            (tl.Error, "step 1: the command for vehicle 3 is not a finite number", lambda: sim.step(np.where(np.arange(5)[:, None] == 2, np.nan, u))),
-            (tl.Error, "steps: 0 were asked for", lambda: sim.step(steps=0)),
+            (tl.Error, "step 1: the command for vehicle 3 is not a finite number", lambda: sim.step(wrong)),
+            (tl.Error, "steps: must be at least 1, got 0", lambda: sim.step(steps=0)),
             (TypeError, "a whole number is needed, not float", lambda: sim.step(steps=1.5)),
         ):
-            self.refuses(kind, says, do)
+            self.refuses(kind, message, do)
         self.assertEqual(sim.steps, 0)
         sim.step(u[:, :2])
         self.assertEqual(sim.steps, 1)
 
-    def test_a_flight_that_has_ended_is_not_stepped(self) -> None:
+    def test_a_flight_that_has_ended_cannot_be_stepped(self) -> None:
         sim = tl.Simulation(short())
         sim.step(steps=10_000)
         self.assertEqual((sim.ending, sim.t), ("completed", 2.0))
         self.refuses(tl.Error, "the flight has ended (completed)", sim.step)
 
-    def test_what_is_no_law_is_a_type_error(self) -> None:
+    def test_anything_but_a_law_is_a_type_error(self) -> None:
         self.refuses(TypeError, "int has no method control", lambda: tl.fly(short(), law=3))
         self.refuses(TypeError, "str has no method control", lambda: tl.Simulation(short(), law="orca"))
 

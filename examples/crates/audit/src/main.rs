@@ -1,4 +1,4 @@
-//! Judges positions of your own, step by step.
+//! Audits positions of your own, step by step.
 
 use std::error::Error;
 
@@ -6,7 +6,7 @@ use tautline_audit::Auditor;
 use tautline_audit::swarm::Rows;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Two vehicles head-on past each other in one second: 10 m apart at both ends, 1 m apart in between.
+    // Two vehicles pass each other within one step: about 10 m apart at both ends, 1 m apart in between.
     let mut auditor = Auditor::new(2, 2.0)?;
     auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, 1.0, 0.0]))?;
     auditor.step(1.0, &Rows::from_row_slice(&[5.0, 0.0, 0.0, -5.0, 1.0, 0.0]))?;

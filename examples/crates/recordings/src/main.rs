@@ -1,4 +1,4 @@
-//! Reads a recording of any origin and judges it: `cargo run -p example-recordings -- RECORDING DELTA_M`.
+//! Reads and audits a recording of any format: `cargo run -p example-recordings -- RECORDING DELTA_M`.
 
 use std::error::Error;
 use std::path::Path;
