@@ -1,5 +1,4 @@
-//! docs/report.md names every key that the program prints, with its unit, and no other; docs/compare.md those of `compare`,
-//! docs/attack.md those of `attack`, docs/campaigns.md those of `campaign`.
+//! docs/report.md lists exactly the keys of the JSON of `run` and `check`, with units; docs/study-json.md those of studies.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,9 +8,7 @@ use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/report.md");
 const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
-const COMPARE_PAGE: &str = include_str!("../../docs/compare.md");
-const ATTACK_PAGE: &str = include_str!("../../docs/attack.md");
-const CAMPAIGN_PAGE: &str = include_str!("../../docs/campaigns.md");
+const STUDIES: &str = include_str!("../../docs/study-json.md");
 /// Tables that stand in many places of `campaign.json`, by their keys.
 const KINDS: [&[&str]; 3] = [
     &["count", "of", "share", "low", "high", "confidence"],
@@ -130,14 +127,14 @@ fn every_key_of_the_check_is_on_its_page() {
 #[test]
 fn every_key_of_a_comparison_is_on_its_page() {
     let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
-    assert_eq!(plain(&documented(COMPARE_PAGE, "compare --json")), printed(&[&quick]));
+    assert_eq!(plain(&documented(STUDIES, "compare --json")), printed(&[&quick]));
 }
 
 #[test]
 fn every_key_of_an_attack_is_on_its_page() {
     let quick =
         ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "-", "--set", "time.duration_s=1.5"];
-    assert_eq!(plain(&documented(ATTACK_PAGE, "attack --json")), printed(&[&quick]));
+    assert_eq!(plain(&documented(STUDIES, "attack --json")), printed(&[&quick]));
 }
 
 /// The same value with a word for each table that stands in many places.
@@ -178,7 +175,7 @@ fn every_key_of_a_campaign_is_on_its_page() {
         !named.iter().any(|other| other.starts_with(&format!("{key}.")) || other.starts_with(&format!("{key}[]")))
     };
     let whole: BTreeSet<_> = named.iter().filter(|key| is_whole(key)).cloned().collect();
-    assert_eq!(plain(&documented(CAMPAIGN_PAGE, "campaign.json")), whole);
+    assert_eq!(plain(&documented(STUDIES, "campaign.json")), whole);
 }
 
 #[test]
