@@ -1,26 +1,28 @@
-//! A spanning tree of a graph as a system of equations, solved from the leaves to the root and back.
+//! Spanning tree of a graph as a preconditioner: a linear system that is solved from the leaves to the root and back.
 
 use super::{Graph, Pinning};
 
-/// M of a spanning tree with the graph's pins, factored: its solutions take O(N), and lie near those of the graph's own M where that
-/// has few edges more.
+/// Factored M of a spanning tree with the graph's pins. A solution takes O(N), and is close to that of the graph's own M if
+/// the graph has few additional edges.
 pub(super) struct SpanningTree {
-    /// Vehicles, each after the one that it hangs from: the root first.
+    /// Vehicles in breadth-first order; the root is first, and each vehicle comes after its parent.
     order: Vec<usize>,
-    /// Whom each hangs from; the root from itself.
+    /// Parent of each vehicle; the root is its own parent.
     parent: Vec<usize>,
-    /// What is left of a vehicle's diagonal once all that hangs from it has been eliminated; infinite for a root that stays at 0,
-    /// as a leader does, or somebody where nobody is pinned.
+    /// Diagonal of each vehicle after the elimination of its subtree. Infinite for a root whose value stays 0: a leader, or an
+    /// arbitrary vehicle without pinning.
     pivot: Vec<f64>,
 }
 
-/// Conjugate gradients that a tree leads need about as many iterations, each of some three times the work, as the cube root of the
-/// lengths along the tree of all edges that it lacks, which are at most twice the reach; those that the diagonal leads, about
-/// the reach. The cube of 3, times 2.
+/// Factor of the choice of preconditioner: the tree is used if `54 lacks <= reach^2`.
+///
+/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work, where
+/// `2 lacks reach` bounds the sum of tree distances across the edges that the tree lacks. With the diagonal they need about
+/// `reach` iterations. Hence 3 (2 lacks reach)^(1/3) <= reach.
 const PAYS: usize = 54;
 
 impl SpanningTree {
-    /// Where it leads conjugate gradients faster than the diagonal does: on long thin graphs and those that lack few edges to be trees.
+    /// Returns the tree if it is the faster preconditioner: on long thin graphs and on graphs with few edges beyond a tree.
     pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
         let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
         let neighbours = Neighbours::of(graph);
@@ -28,13 +30,13 @@ impl SpanningTree {
         (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
     }
 
-    /// Of a connected graph of at least one vehicle, breadth first from a leader or from the first.
+    /// Builds the tree of a connected graph with at least one vehicle, breadth first from a leader or from vehicle 0.
     fn new(neighbours: &Neighbours, pinning: &Pinning) -> Self {
         let root = pinning.leader().unwrap_or(0);
         let (order, parent) = neighbours.breadth_first(vec![root]);
         let count = parent.len();
-        // Pins below a vehicle, as if they were its own: an edge of stiffness 1 in series with s is one of s/(1 + s). No
-        // difference is taken, and so no digit lost.
+        // Stiffness of the pins below a vehicle, seen from it: an edge of stiffness 1 in series with s has s/(1 + s). No
+        // differences are taken, so no digits are lost.
         let mut pins: Vec<f64> = (0..count).map(|i| if pinning.pins(i) { 1.0 } else { 0.0 }).collect();
         for &i in order.iter().skip(1).rev() {
             let pin = pins[i];
@@ -47,7 +49,7 @@ impl SpanningTree {
         Self { order, parent, pivot: pins }
     }
 
-    /// Puts the solution in the place of the right side.
+    /// Replaces the right-hand side by the solution.
     pub(super) fn solve(&self, x: &mut [f64]) {
         let Some((&root, others)) = self.order.split_first() else { return };
         for &i in others.iter().rev() {
@@ -90,9 +92,9 @@ impl Neighbours {
         &self.all[self.offsets[i]..self.offsets[i + 1]]
     }
 
-    /// Vehicles in the order in which they are reached from some of them, and whom each is reached from: these from themselves. Of
-    /// those that are as far, who has most to reach goes first, which keeps short what the edges left out span: a comb on a
-    /// ladder, and not its two rails.
+    /// Returns the vehicles in breadth-first order from `from`, and the parent of each; the vehicles of `from` are their own
+    /// parents. Within a layer the vehicle with the most unreached neighbours goes first. This keeps the tree distances across
+    /// the other edges short: a ladder gives a comb instead of its two rails.
     fn breadth_first(&self, from: Vec<usize>) -> (Vec<usize>, Vec<usize>) {
         let mut parent = vec![usize::MAX; self.offsets.len() - 1];
         for &i in &from {
@@ -117,7 +119,7 @@ impl Neighbours {
         (order, parent)
     }
 
-    /// Edges between the vehicle that is farthest from those that are pinned, or from the leader or the first, and them.
+    /// Returns the largest number of edges between a vehicle and the nearest pinned one, or the leader, or vehicle 0.
     fn reach(&self, pinning: &Pinning) -> usize {
         let mut from: Vec<usize> = (0..self.offsets.len() - 1).filter(|&i| pinning.pins(i)).collect();
         if from.is_empty() {
@@ -134,7 +136,7 @@ mod tests {
     use super::super::inverse_iteration::Operator;
     use super::*;
 
-    /// Two rails and the rungs between them.
+    /// Returns a ladder: two rails with rungs between them.
     fn ladder(rungs: usize) -> Graph {
         let rails = (2..2 * rungs).map(|i| (i - 2, i));
         let edges: Vec<_> = rails.chain((0..rungs).map(|k| (2 * k, 2 * k + 1))).collect();
@@ -179,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_ladder_of_thousands_is_solved() {
-        // The slowest motion of a ladder is that of a rail.
+        // The slowest mode of a ladder is that of one rail.
         let rungs = 3000;
         let graph = ladder(rungs);
         let found = Operator::new(&graph, &Pinning::Nobody, &graph.degrees()).inverse_iteration().expect("solved");
