@@ -1,8 +1,9 @@
 //! Input of a control law at one instant.
 //!
-//! Vehicle i knows its own state and the target. Of each other vehicle j it has the state that it *heard* (received over
-//! a link of the graph, with the age of the message) and the state that it *sees* (measured by its own sensor). Where
-//! every vehicle knows the true present state of every other, all of these states are one shared table without copies.
+//! Vehicle i knows its own state and the target. Of each other vehicle j it has two states. The state that it *heard*
+//! was received over a link of the graph, with the age of the message. The state that it *sees* is measured by its own
+//! sensor. If every vehicle knows the true present state of every other, all of these are one shared table without
+//! copies.
 
 use std::fmt;
 
@@ -27,8 +28,8 @@ pub struct Observation<'a> {
     pub target: Target<'a>,
     /// Communication links.
     pub links: &'a Graph,
-    /// Pairs i < j within the law's sensing range ([`crate::law::Capabilities::sensing_range_m`]), in index order. May contain
-    /// pairs that are slightly farther apart. Empty for a law without a sensing range.
+    /// Pairs i < j within the law's sensing range ([`crate::law::Capabilities::sensing_range_m`]), in index order. May
+    /// contain pairs that are slightly farther apart. Empty for a law without a sensing range.
     pub near: &'a [(usize, usize)],
     /// Obstacles in the world.
     pub obstacles: &'a [Obstacle],
@@ -59,8 +60,8 @@ pub trait Picture: fmt::Debug + Sync {
         None
     }
 
-    /// Positions for the search of near pairs, and the distance \[m\] by which the search radius must exceed the sensing
-    /// range so that it finds every pair whose sensed states are in range. `None`: own positions, no margin.
+    /// Positions for the search of near pairs, with the distance \[m\] to add to the sensing range. With this addition
+    /// the search finds every pair whose sensed separation is in range. `None`: own positions and no addition.
     fn near_from(&self) -> Option<(&Rows, f64)> {
         None
     }
@@ -119,8 +120,8 @@ impl Neighbour {
 }
 
 impl<'a> Observation<'a> {
-    /// Observation where every vehicle knows the true present states and the target is a formation at rest. The caller adds
-    /// near pairs and obstacles.
+    /// Observation where every vehicle knows the true present states and the target is a formation at rest. The caller
+    /// adds near pairs and obstacles.
     #[must_use]
     pub fn exact(swarm: &'a Swarm, links: &'a Graph, formation: &'a Formation) -> Self {
         Self {

@@ -1,7 +1,7 @@
 //! Least eigenvalue of a Laplacian, pinned or not, without forming a matrix: block inverse iteration.
 //!
-//! Each iteration also searches along the previous change, as conjugate gradients do (LOBPCG). The linear systems are solved
-//! by conjugate gradients, preconditioned with a spanning tree of the graph or with its diagonal.
+//! Each iteration also searches along the previous change, as conjugate gradients do (LOBPCG). The linear systems are
+//! solved by conjugate gradients, preconditioned with a spanning tree of the graph or with its diagonal.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -17,8 +17,8 @@ const SEARCHED: usize = 3 * BLOCK;
 const SETTLED: f64 = 1e-12;
 /// Residual of a linear system, relative to its right-hand side.
 const SOLVED: f64 = 1e-6;
-/// Largest number of visits of edges and vehicles: some fifteen seconds, and more if neighbours are far apart in memory.
-/// Wide graphs of tens of thousands of vehicles may exceed it.
+/// Largest number of visits of edges and vehicles: some fifteen seconds, and more if neighbours are far apart in
+/// memory. Wide graphs of tens of thousands of vehicles may exceed it.
 const MOST_VISITS: u64 = 4_000_000_000;
 
 /// M as a linear operator on its invariant subspace: vectors of mean 0 without pinning, and zero at a leader.
@@ -105,7 +105,8 @@ impl<'a> Operator<'a> {
         forms
     }
 
-    /// Returns an orthonormal basis of the span of these vectors, completed within the invariant subspace if they are dependent.
+    /// Returns an orthonormal basis of the span of these vectors, completed within the invariant subspace if they are
+    /// dependent.
     fn orthonormal(&self, block: DMatrix<f64>) -> DMatrix<f64> {
         let kept_out = match *self.pinning {
             Pinning::Nobody => Some(vec![1.0; block.nrows()]),
@@ -158,7 +159,8 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// Replaces x by the solution y of M y = x with preconditioned conjugate gradients, starting at x over its Rayleigh quotient.
+    /// Replaces x by the solution y of M y = x with preconditioned conjugate gradients, starting at x over its Rayleigh
+    /// quotient.
     fn solve(&mut self, quotient: f64, x: &mut [f64]) -> Option<()> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut y: Vec<f64> = x.iter().map(|x| x / quotient).collect();
@@ -254,7 +256,8 @@ mod tests {
         let found = Operator::new(&path, &pinned, &degrees).inverse_iteration().expect("solved");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / (2.0 * count as f64 - 1.0));
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
-        // The even modes of a ring with one pinned vehicle are those of a path pinned at its end with half the stiffness.
+        // The even modes of a ring with one pinned vehicle are those of a path pinned at its end with half the
+        // stiffness.
         let ring = Graph::ring(count);
         let pinned = Pinning::Listed(vec![17]);
         let found = Operator::new(&ring, &pinned, &degrees).inverse_iteration().expect("solved");
@@ -264,8 +267,9 @@ mod tests {
 
     /// Exact least eigenvalue of a ring of N vehicles with vehicle 0 pinned.
     ///
-    /// `x_k = cos(q (N/2 - k))` has the eigenvalue 2 - 2 cos q at every other vehicle. At vehicle 0 this requires
-    /// `2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2)`, solved for the smallest q by bisection.
+    /// `x_k = cos(q (N/2 - k))` has the eigenvalue 2 - 2 cos q at every other vehicle. At vehicle 0 this requires `2
+    /// (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2)`, solved for the smallest q by
+    /// bisection.
     fn ring_pinned_at_one(count: usize) -> f64 {
         let half = 0.5 * count as f64;
         let off = |q: f64| {

@@ -1,7 +1,7 @@
 //! Communication graphs: undirected simple graphs over the vehicles of a swarm, and the spectra of their Laplacians.
 //!
-//! The laws sum over the neighbours j in `N_i` of vehicle i. Their guarantees depend on the graph's Laplacian `L_G` and on
-//! its algebraic connectivity, the second smallest eigenvalue of `L_G`.
+//! The laws sum over the neighbours j in `N_i` of vehicle i. Their guarantees depend on the graph's Laplacian `L_G` and
+//! on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
 mod inverse_iteration;
 mod pinning;
@@ -286,8 +286,8 @@ impl Graph {
         self.weighted_laplacian(|_, _| 1.0)
     }
 
-    /// Returns the weighted Laplacian `L_w`, N x N. `weight(i, j)` is called once for each edge i < j, in row order; weights may
-    /// be negative. Takes 8 N^2 bytes.
+    /// Returns the weighted Laplacian `L_w`, N x N. `weight(i, j)` is called once for each edge i < j, in row order;
+    /// weights may be negative. Takes 8 N^2 bytes.
     #[must_use]
     pub fn weighted_laplacian(&self, mut weight: impl FnMut(usize, usize) -> f64) -> DMatrix<f64> {
         let mut laplacian = DMatrix::zeros(self.count, self.count);

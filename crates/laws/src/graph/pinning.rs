@@ -1,6 +1,7 @@
 //! Pinning: which vehicles know the reference.
 
-/// Vehicles that know the reference, as in pinning control. With the Laplacian L of the links, the pinned Laplacian M is
+/// Vehicles that know the reference, as in pinning control. With the Laplacian L of the links, the pinned Laplacian M
+/// is
 ///
 /// - M = L without a reference; the relevant eigenvalue is the second smallest, lambda2;
 /// - M = L + B if all or some vehicles know it, where B is diagonal with a 1 for each of these vehicles;

@@ -3,10 +3,11 @@
 use super::{Graph, pair_count};
 
 impl Graph {
-    /// Returns a random connected graph with `edge_count` edges, clamped to N - 1 and the number of pairs. The edges are a tree
-    /// that joins each vehicle to a random earlier one, and uniformly drawn pairs.
+    /// Returns a random connected graph with `edge_count` edges, clamped to N - 1 and the number of pairs. The edges
+    /// are a tree that joins each vehicle to a random earlier one, and uniformly drawn pairs.
     ///
-    /// `below(n)` draws an integer below n. If more than half of the pairs are edges, the missing pairs are drawn instead.
+    /// `below(n)` draws an integer below n. If more than half of the pairs are edges, the missing pairs are drawn
+    /// instead.
     #[must_use]
     pub fn random(count: usize, edge_count: usize, mut below: impl FnMut(usize) -> usize) -> Self {
         let pairs = pair_count(count);
@@ -90,14 +91,15 @@ mod tests {
 
     #[test]
     fn extra_edges_join_any_two_alike() {
-        // Count how often each pair of 6 vehicles is joined in 2,000 graphs. With 8 edges the edges are drawn, with 12 the
-        // missing pairs.
+        // Count how often each pair of 6 vehicles is joined in 2,000 graphs. With 8 edges the edges are drawn, with 12
+        // the missing pairs.
         for edges in [8, 12] {
             let (mut below, mut joined) = (numbers(3), [0; 36]);
             for _ in 0..2000 {
                 Graph::random(6, edges, &mut below).edges().for_each(|(i, j)| joined[6 * i + j] += 1);
             }
-            // 0-1 is always in the tree. Any other pair is in the tree with probability 1/later, and otherwise drawn uniformly.
+            // 0-1 is always in the tree. Any other pair is in the tree with probability 1/later, and otherwise drawn
+            // uniformly.
             assert_eq!(joined[1], 2000);
             for later in 2..6 {
                 let of_later = (0..later).map(|i| joined[6 * i + later]);

@@ -14,12 +14,12 @@ const DENSE_UP_TO: usize = 400;
 const SAME: f64 = 1e-9;
 
 impl Graph {
-    /// Returns the algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`. It is positive exactly if the graph
-    /// is connected, and 0 for fewer than two vehicles. The value is cached.
+    /// Returns the algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`. It is positive exactly if
+    /// the graph is connected, and 0 for fewer than two vehicles. The value is cached.
     ///
     /// Closed forms exist for complete graphs, stars, rings and paths: N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N). A
-    /// disconnected graph has exactly 0. Otherwise a dense solver computes all eigenvalues for up to 400 vehicles. Beyond, block
-    /// inverse iteration converges to at most a few parts in 1e9 above lambda2.
+    /// disconnected graph has exactly 0. Otherwise a dense solver computes all eigenvalues for up to 400 vehicles.
+    /// Beyond, block inverse iteration converges to at most a few parts in 1e9 above lambda2.
     ///
     /// If that takes more than some fifteen seconds (a minute for hundreds of thousands of vehicles), the lower bound
     /// `4/(N (N - 1))` replaces lambda2, and [`Graph::connectivity_is_bound`] returns true.
@@ -29,11 +29,11 @@ impl Graph {
     }
 
     /// Returns the least eigenvalue of the pinned Laplacian M (see [`Pinning`]). It is positive exactly if the graph is
-    /// connected and some vehicle is pinned. Without pinning it is the algebraic connectivity. The value of the first pinning
-    /// queried is cached.
+    /// connected and some vehicle is pinned. Without pinning it is the algebraic connectivity. The value of the first
+    /// pinning queried is cached.
     ///
-    /// Closed forms: 1 if all vehicles are pinned, 1 for a star led from its hub, and any pinning of the complete graph.
-    /// Otherwise as [`Graph::algebraic_connectivity`], with the lower bound `1/N^2`.
+    /// Closed forms: 1 if all vehicles are pinned, 1 for a star led from its hub, and any pinning of the complete
+    /// graph. Otherwise as [`Graph::algebraic_connectivity`], with the lower bound `1/N^2`.
     #[must_use]
     pub fn pinned_connectivity(&self, pinning: &Pinning) -> f64 {
         if *pinning == Pinning::Nobody {
@@ -118,9 +118,9 @@ impl Graph {
         matrix
     }
 
-    /// Returns the distinct relevant eigenvalues of M in ascending order; without pinning the 0 of common motion is left out.
-    /// For more than 400 vehicles on an incomplete graph, returns the least one and an upper bound on the largest. Empty for a
-    /// disconnected graph.
+    /// Returns the distinct relevant eigenvalues of M in ascending order; without pinning the 0 of common motion is
+    /// left out. For more than 400 vehicles on an incomplete graph, returns the least one and an upper bound on the
+    /// largest. Empty for a disconnected graph.
     #[must_use]
     pub fn pinned_spectrum(&self, pinning: &Pinning) -> Vec<f64> {
         let least = self.pinned_connectivity(pinning);
@@ -157,10 +157,10 @@ impl Graph {
         degrees.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)).map(of).collect()
     }
 
-    /// Returns an upper bound on the largest eigenvalue of M. Without pinning it is N for the complete graph. Otherwise it is
-    /// the largest sum of the degrees of two joined vehicles (Anderson and Morley 1985), exact for stars and for rings of even
-    /// N. Pinned vehicles add one. With a leader, the bound of the graph without it plus one is used if it is smaller: 1 for a
-    /// star led from its hub.
+    /// Returns an upper bound on the largest eigenvalue of M. Without pinning it is N for the complete graph. Otherwise
+    /// it is the largest sum of the degrees of two joined vehicles (Anderson and Morley 1985), exact for stars and for
+    /// rings of even N. Pinned vehicles add one. With a leader, the bound of the graph without it plus one is used if
+    /// it is smaller: 1 for a star led from its hub.
     #[must_use]
     pub fn largest_eigenvalue_bound(&self, pinning: &Pinning) -> f64 {
         let pinned = if matches!(pinning, Pinning::All | Pinning::Listed(_)) { 1.0 } else { 0.0 };

@@ -2,27 +2,28 @@
 
 use super::{Graph, Pinning};
 
-/// Factored M of a spanning tree with the graph's pins. A solution takes O(N), and is close to that of the graph's own M if
-/// the graph has few additional edges.
+/// Factored M of a spanning tree with the graph's pins. A solution takes O(N), and is close to that of the graph's own
+/// M if the graph has few additional edges.
 pub(super) struct SpanningTree {
     /// Vehicles in breadth-first order; the root is first, and each vehicle comes after its parent.
     order: Vec<usize>,
     /// Parent of each vehicle; the root is its own parent.
     parent: Vec<usize>,
-    /// Diagonal of each vehicle after the elimination of its subtree. Infinite for a root whose value stays 0: a leader, or an
-    /// arbitrary vehicle without pinning.
+    /// Diagonal of each vehicle after the elimination of its subtree. Infinite for a root whose value stays 0: a
+    /// leader, or an arbitrary vehicle without pinning.
     pivot: Vec<f64>,
 }
 
 /// Factor of the choice of preconditioner: the tree is used if `54 lacks <= reach^2`.
 ///
-/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work, where
-/// `2 lacks reach` bounds the sum of tree distances across the edges that the tree lacks. With the diagonal they need about
-/// `reach` iterations. Hence 3 (2 lacks reach)^(1/3) <= reach.
+/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work, where `2
+/// lacks reach` bounds the sum of tree distances across the edges that the tree lacks. With the diagonal they need
+/// about `reach` iterations. Hence 3 (2 lacks reach)^(1/3) <= reach.
 const PAYS: usize = 54;
 
 impl SpanningTree {
-    /// Returns the tree if it is the faster preconditioner: on long thin graphs and on graphs with few edges beyond a tree.
+    /// Returns the tree if it is the faster preconditioner: on long thin graphs and on graphs with few edges beyond a
+    /// tree.
     pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
         let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
         let neighbours = Neighbours::of(graph);
@@ -35,8 +36,8 @@ impl SpanningTree {
         let root = pinning.leader().unwrap_or(0);
         let (order, parent) = neighbours.breadth_first(vec![root]);
         let count = parent.len();
-        // Stiffness of the pins below a vehicle, seen from it: an edge of stiffness 1 in series with s has s/(1 + s). No
-        // differences are taken, so no digits are lost.
+        // Stiffness of the pins below a vehicle, seen from it: an edge of stiffness 1 in series with s has s/(1 + s).
+        // No differences are taken, so no digits are lost.
         let mut pins: Vec<f64> = (0..count).map(|i| if pinning.pins(i) { 1.0 } else { 0.0 }).collect();
         for &i in order.iter().skip(1).rev() {
             let pin = pins[i];
@@ -92,9 +93,9 @@ impl Neighbours {
         &self.all[self.offsets[i]..self.offsets[i + 1]]
     }
 
-    /// Returns the vehicles in breadth-first order from `from`, and the parent of each; the vehicles of `from` are their own
-    /// parents. Within a layer the vehicle with the most unreached neighbours goes first. This keeps the tree distances across
-    /// the other edges short: a ladder gives a comb instead of its two rails.
+    /// Returns the vehicles in breadth-first order from `from`, and the parent of each; the vehicles of `from` are
+    /// their own parents. Within a layer the vehicle with the most unreached neighbours goes first. This keeps the tree
+    /// distances across the other edges short: a ladder gives a comb instead of its two rails.
     fn breadth_first(&self, from: Vec<usize>) -> (Vec<usize>, Vec<usize>) {
         let mut parent = vec![usize::MAX; self.offsets.len() - 1];
         for &i in &from {

@@ -1,4 +1,5 @@
-//! Control barrier functions: the acceleration nearest to that of a nominal controller that keeps every pair able to brake.
+//! Control barrier functions: the acceleration nearest to that of a nominal controller that keeps every pair able to
+//! brake.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -45,8 +46,9 @@ impl Default for CbfQpKeys {
     }
 }
 
-/// Safety barrier certificates (Wang, Ames, Egerstedt: Safety barrier certificates for collisions-free multirobot systems,
-/// 2017) around a proportional-derivative controller to the slot. Decentralised, with the same limit for all vehicles:
+/// Safety barrier certificates (Wang, Ames, Egerstedt: Safety barrier certificates for collisions-free multirobot
+/// systems, 2017) around a proportional-derivative controller to the slot. Decentralised, with the same limit for all
+/// vehicles:
 ///
 /// ```text
 /// U_i = r'' - c (v_i - V_i) - a22 v_i,   V_i = r' + min((k/c) |d_i|, v_max) d_i/|d_i|,   d_i = h_i + r - p_i
@@ -66,9 +68,9 @@ impl Default for CbfQpKeys {
 /// -n . (u_i - u_j) <= B,   B = gamma h^3 + (|w|^2 - (n . w)^2)/l + A n . w / sqrt(2 A (l - delta)) + a22 n . w
 /// ```
 ///
-/// Each vehicle of the pair ensures half of it: `n . u_i >= -B/2`. For a separation below delta the root in h is that of
-/// delta - l with a negative sign, which parts the pair. If the half-spaces have no common point, the acceleration with the
-/// least largest violation is commanded.
+/// Each vehicle of the pair ensures half of it: `n . u_i >= -B/2`. For a separation below delta the root in h is that
+/// of delta - l with a negative sign, which parts the pair. If the half-spaces have no common point, the acceleration
+/// with the least largest violation is commanded.
 ///
 /// # Guarantee
 /// None for a swarm. A single pair that starts with h >= 0 keeps delta, in continuous time with a22 = 0. A vehicle with
@@ -92,8 +94,8 @@ impl CbfQpLaw {
     /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or some
-    /// vehicle does not know the reference.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
@@ -157,9 +159,9 @@ impl CbfQpLaw {
     }
 }
 
-/// Returns the distance beyond which the half-spaces of a pair below the highest speed hold for every allowed acceleration
-/// \[m\]. With s = sqrt(2 A (l - delta)) at least the relative speed V, B is at least `gamma (s - V)^3 - A - a22 V`, and
-/// `-n . (u_i - u_j)` is at most A.
+/// Returns the distance beyond which the half-spaces of a pair below the highest speed hold for every allowed
+/// acceleration \[m\]. With s = sqrt(2 A (l - delta)) at least the relative speed V, B is at least `gamma (s - V)^3 - A
+/// - a22 V`, and `-n . (u_i - u_j)` is at most A.
 fn range_m(keys: &CbfQpKeys, delta_m: f64, a22_per_s: f64) -> f64 {
     let (both_m_s2, closing_m_s) = (2.0 * keys.max_accel_m_s2, 2.0 * keys.max_speed_m_s);
     let spare_m_s2 = 2.0 * both_m_s2 + a22_per_s.max(0.0) * closing_m_s;
@@ -200,8 +202,9 @@ impl Law for CbfQpLaw {
         }
     }
 
-    /// A vehicle without neighbours follows x'' = -c x' - k x. With neighbours in range no bound is known: a corner of several
-    /// half-spaces may move as fast as two of their planes close. The law controls absolute positions, and a22 is compensated.
+    /// A vehicle without neighbours follows x'' = -c x' - k x. With neighbours in range no bound is known: a corner of
+    /// several half-spaces may move as fast as two of their planes close. The law controls absolute positions, and a22
+    /// is compensated.
     fn rates(&self, at: &RateQuery) -> Rates {
         let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt());
         let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);

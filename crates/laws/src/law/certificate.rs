@@ -1,4 +1,4 @@
-//! Certificate of a law: a separation that is guaranteed before the first step, or the reasons why there is none.
+//! Certificates: the separation that a law guarantees before the first step, or the reasons why it guarantees none.
 
 use super::error::LawError;
 
@@ -14,8 +14,8 @@ pub struct Certificate {
     pub certified_room_m: Option<f64>,
     /// Energy E(0) of the start \[m^2/s^2\], if the law has an energy; also given when the certificate is void.
     pub energy_initial: Option<f64>,
-    /// Lower bound of the separation of linked pairs \[m\] while the energy does not exceed E(0). On an incomplete graph this
-    /// is no certificate, because unlinked pairs may come closer.
+    /// Lower bound of the separation of linked pairs \[m\] while the energy does not exceed E(0). On an incomplete
+    /// graph this is no certificate, because unlinked pairs may come closer.
     pub linked_m: Option<f64>,
     /// Every reason why the certificate is void.
     pub void: Vec<Void>,
@@ -131,9 +131,11 @@ impl Certificate {
         Self { void: vec![reason], ..Self::default() }
     }
 
-    /// Combines this certificate with a `later` one that was computed on leg `leg` (from 0) after its slots were spread: keeps
-    /// the smaller of each bound, and none where either has none. The legs of `later` are the spread slots, the slots of leg
-    /// `leg`, and the legs after it.
+    /// Combines this certificate with a `later` one that was computed on leg `leg` (from 0) after its slots were
+    /// spread.
+    ///
+    /// Keeps the smaller of each bound, and no bound if either certificate has none. The legs of `later` are the spread
+    /// slots, the slots of leg `leg`, and the legs after it.
     pub fn renew(&mut self, later: &Self, leg: usize) {
         if self.certified_m.is_none() {
             return;

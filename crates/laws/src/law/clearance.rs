@@ -8,8 +8,8 @@ use crate::space::Obstacle;
 use crate::target::Leg;
 use tautline_core::swarm::{Rows, row, set_row};
 
-/// Edge tension on the clearance margin of a vehicle at an obstacle: its distance from the surface less the clearance. It
-/// pushes where the margin is below a range, and becomes infinite as the margin vanishes.
+/// Edge tension on the clearance margin of a vehicle at an obstacle: its distance from the surface less the clearance.
+/// It pushes where the margin is below a range, and becomes infinite as the margin vanishes.
 ///
 /// Along the gradient of the margin at a convex obstacle the Hessian of V is V''. Across it the Hessian is V' times a
 /// curvature >= 0, and V' < 0. Hence it is at most V''.
@@ -75,7 +75,8 @@ impl ClearanceTension {
     }
 }
 
-/// Returns the smallest margin of any slot of any leg \[m\] for a reference at rest; infinite if slots have no fixed place.
+/// Returns the smallest margin of any slot of any leg \[m\] for a reference at rest; infinite if slots have no fixed
+/// place.
 pub(super) fn slot_room_m(context: &LawContext<'_>) -> Result<f64, ParameterError> {
     let Some(guidance) = context.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
         return Ok(f64::INFINITY);

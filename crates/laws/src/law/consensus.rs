@@ -29,8 +29,9 @@ pub(super) fn check_range(command: &Rows) -> Result<(), LawError> {
     first_row_not_finite(command).map_or(Ok(()), |_| Err(LawError::OutOfRange))
 }
 
-/// Adds `gain L_G X` to `sums`, N x 3. `x[axis](i)` is the entry of X for vehicle i. Row i gains `gain` times the sum of
-/// `x_i - x_j` over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)`, and all rows take O(N).
+/// Adds `gain L_G X` to `sums`, N x 3. `x[axis](i)` is the entry of X for vehicle i. Row i gains `gain` times the sum
+/// of `x_i - x_j` over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)`, and all rows take
+/// O(N).
 #[inline]
 pub(super) fn add_laplacian_product(graph: &Graph, x: &[impl Fn(usize) -> f64; 3], gain: f64, sums: &mut Rows) {
     let (count, sums) = (graph.count(), columns_mut(sums));
@@ -82,8 +83,8 @@ pub(super) fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vecto
     (0..count).map(|i| (x(i) - mean).norm_squared()).sum()
 }
 
-/// Returns the margin of a law that damps relative velocities by g/N times the graph's Laplacian: g lambda2/N - a22. For
-/// g < 0 the largest possible eigenvalue N replaces lambda2.
+/// Returns the margin of a law that damps relative velocities by g/N times the graph's Laplacian: g lambda2/N - a22.
+/// For g < 0 the largest possible eigenvalue N replaces lambda2.
 pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64, a22_per_s: f64) -> VelocityMargin {
     let count = count.max(1) as f64;
     let worst = if gain_per_s < 0.0 { count } else { connectivity };
@@ -113,8 +114,8 @@ pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -
     check_count(count, command.nrows())
 }
 
-/// Adds `term(i, own, j, heard)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and `heard`
-/// the state of j that i received.
+/// Adds `term(i, own, j, heard)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and
+/// `heard` the state of j that i received.
 pub(super) fn add_heard(
     at: &Observation<'_>,
     sums: &mut Rows,
@@ -135,8 +136,8 @@ pub(super) fn add_heard(
 }
 
 /// Adds the push of every near vehicle to the row of each vehicle. `push(i, j, apart_m)` returns the push on i and the
-/// potential of the pair for the position of i relative to j \[m\], or `None` out of range. It must be odd in `apart_m`.
-/// Returns the sum of the potentials over the near pairs if all vehicles share one state.
+/// potential of the pair for the position of i relative to j \[m\], or `None` out of range. It must be odd in
+/// `apart_m`. Returns the sum of the potentials over the near pairs if all vehicles share one state.
 pub(super) fn add_pushes(
     at: &Observation<'_>,
     sums: &mut Rows,

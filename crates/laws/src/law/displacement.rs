@@ -1,4 +1,5 @@
-//! The displacement law: consensus on slots over any connected graph, plus a one-sided edge tension between near vehicles.
+//! The displacement law: consensus on slots over any connected graph, plus a one-sided edge tension between near
+//! vehicles.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -56,10 +57,10 @@ impl Default for DisplacementKeys {
 ///
 /// # Reference
 /// If some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M replaces L
-/// ([`crate::graph::Pinning`]), and sigma is the inverse of its least eigenvalue. `k (e_i - r) + c (v_i - r')` is added to
-/// the sum of each vehicle that knows r, and `r'' - a22 r'` is fed forward to all vehicles. A leader flies
-/// `r'' - a22 r' - k (e - r) - c (v - r')`, independent of other vehicles. Energy and certificate are as below with
-/// v~ = v - r' and M for L; with a leader, its position and velocity replace the reference.
+/// ([`crate::graph::Pinning`]), and sigma is the inverse of its least eigenvalue. `k (e_i - r) + c (v_i - r')` is added
+/// to the sum of each vehicle that knows r, and `r'' - a22 r'` is fed forward to all vehicles. A leader flies `r'' -
+/// a22 r' - k (e - r) - c (v - r')`, independent of other vehicles. Energy and certificate are as below with v~ = v -
+/// r' and M for L; with a leader, its position and velocity replace the reference.
 ///
 /// # Energy
 /// ```text
@@ -70,25 +71,28 @@ impl Default for DisplacementKeys {
 /// because the sum over links of `|v_i - v_j|^2` is at least lambda2 times the sum of `|v~_i|^2`, v~ = v - mean v.
 ///
 /// # Certificate
-/// `V_R(l_ij(t)) <= E(0)` for *every* pair and all time, on *every* connected graph. Assumptions: exact states over links
-/// and of near pairs, a common compass, no delay, no saturation, continuous time.
+/// `V_R(l_ij(t)) <= E(0)` for *every* pair and all time, on *every* connected graph. Assumptions: exact states over
+/// links and of near pairs, a common compass, no delay, no saturation, continuous time.
 ///
 /// External accelerations w, such as wind, add at most the time integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
-/// zeta = `c - a22`. They add at most the integral of |w~|/sqrt 2 to sqrt E. The certificate then holds to the end of the
-/// run. w~ is relative to the same frame as v~: without a reference, an acceleration common to all vehicles adds nothing.
+/// zeta = `c - a22`. They add at most the integral of |w~|/sqrt 2 to sqrt E. The certificate then holds to the end of
+/// the run. w~ is relative to the same frame as v~: without a reference, an acceleration common to all vehicles adds
+/// nothing.
 ///
-/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`.
-/// The bound through all legs is therefore known before the first step.
+/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most `q(D) = sqrt(sigma k/2 tr(D' M
+/// D))`. The bound through all legs is therefore known before the first step.
 ///
 /// # Ellipsoids
 /// If the keep-out region of a vehicle is an ellipsoid, `l_ij` is the scaled length of the [`Metric`], and so are R and
-/// delta. A near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes; the certificate bounds scaled lengths.
+/// delta. A near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes; the certificate bounds scaled
+/// lengths.
 ///
 /// # Obstacles
 /// The same one-sided tension acts between vehicles and fixed obstacles, on the distance from the surface less the
 /// clearance. Its range is R - delta, or the smallest margin of a slot if slots have fixed places and that is smaller.
 /// E then contains these tensions and absolute velocities. The certificate for pairs and obstacles therefore needs a
-/// reference at rest, or no reference and a22 <= 0. A leader does not interact with others and keeps clear by its reference.
+/// reference at rest, or no reference and a22 <= 0. A leader does not interact with others and keeps clear by its
+/// reference.
 ///
 /// # Cost
 /// O(links + near pairs) per step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
@@ -127,8 +131,11 @@ impl DisplacementLaw {
     /// Builds the law on the links of the context. The smallest slot distance of any leg is the range of its tension.
     ///
     /// # Errors
-    /// [`ParameterError`] if graph and formation have different numbers of vehicles, the graph is not connected, no vehicle
-    /// knows the reference, a slot or a gain is not finite, or two slots are at most delta apart.
+    /// [`ParameterError`] in one of these cases:
+    ///
+    /// - graph and formation have different numbers of vehicles, or the graph is not connected;
+    /// - no vehicle knows the reference;
+    /// - a slot or a gain is not finite, or two slots are at most delta apart.
     pub fn new(context: &LawContext<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = context;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
@@ -289,9 +296,10 @@ fn tension_between(
 }
 
 impl DisplacementLaw {
-    /// With mu the largest eigenvalue of the graph's Laplacian, a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the
-    /// links add sigma k mu. The integrator follows damping while sigma c mu dt <= 0.5; `max_rate_dt` = 0.3 keeps this. In a
-    /// crowd several near pairs may add up to 3.6 times this amount to omega^2, and the step still follows.
+    /// With mu the largest eigenvalue of the graph's Laplacian, a near pair adds 2 `V_R''` at `nearest_m` to omega^2
+    /// and the links add sigma k mu. The integrator follows damping while sigma c mu dt <= 0.5; `max_rate_dt` = 0.3
+    /// keeps this. In a crowd several near pairs may add up to 3.6 times this amount to omega^2, and the step still
+    /// follows.
     fn fastest_per_s(&self, nearest_m: f64) -> f64 {
         const DAMPED: f64 = 0.3 / 0.5;
         let contact = if nearest_m < self.tension.rest_m() {
@@ -304,8 +312,8 @@ impl DisplacementLaw {
         omega.max(DAMPED * links * self.damping_per_s())
     }
 
-    /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1 or in the
-    /// limit of large m, where it tends to k/c.
+    /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1 or
+    /// in the limit of large m, where it tends to k/c.
     fn settling(&self) -> Settling {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let half = 0.5 * (c - self.a22_per_s);
@@ -448,8 +456,8 @@ impl DisplacementLaw {
             .map(|(before, next)| self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
     }
 
-    /// Returns the largest energy under wind before the first change of slots. This bounds later wind too: it adds less to
-    /// sqrt E at larger E. The certificate ends where its separation is within the position resolution of delta.
+    /// Returns the largest energy under wind before the first change of slots. This bounds later wind too: it adds less
+    /// to sqrt E at larger E. The certificate ends where its separation is within the position resolution of delta.
     fn bounded(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
         let Some(energy_bound) = &self.energy_bound else { return BoundedEnergy { energy, until_s: None } };
         let borne = self.tension.value(self.delta_m + energy_bound.resolution_m()).sqrt();
@@ -494,8 +502,8 @@ fn frame(context: &LawContext<'_>) -> Frame {
     if context.guidance.is_none() && context.obstacles.is_empty() { Frame::Mean } else { Frame::Ground }
 }
 
-/// Returns the bound on the energy under wind, where relative velocities are damped at `margin_per_s` \[1/s\]. Among obstacles
-/// without a reference absolute velocities count, and only drag (a22 < 0) damps them.
+/// Returns the bound on the energy under wind, where relative velocities are damped at `margin_per_s` \[1/s\]. Among
+/// obstacles without a reference absolute velocities count, and only drag (a22 < 0) damps them.
 fn energy_bound(context: &LawContext<'_>, margin_per_s: f64) -> Option<EnergyBound> {
     let exposure = context.exposure?;
     let damping_per_s = match (context.guidance, frame(context)) {

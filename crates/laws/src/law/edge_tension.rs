@@ -51,8 +51,8 @@ impl Default for EdgeTensionKeys {
 /// u_i = -(1/N) sum_{j in N_i} [ (1 + a22)(v_i - v_j) + w_ij (p_i - p_j) ],    w_ij = V'_ij(l_ij)/l_ij
 /// ```
 ///
-/// The desired distance of an edge is the distance of its two slots. The sum of all `u_i` is zero, so the law cannot move
-/// the centre of mass.
+/// The desired distance of an edge is the distance of its two slots. The sum of all `u_i` is zero, so the law cannot
+/// move the centre of mass.
 ///
 /// # Energy (theory section 4)
 /// ```text
@@ -168,7 +168,8 @@ impl EdgeTensionLaw {
         check_range(&control).map(|()| control)
     }
 
-    /// Returns the error of a state in which the kernel found a distance outside (delta, infinity): the first edge that is too short.
+    /// Returns the error of a state in which the kernel found a distance outside (delta, infinity): the first edge that
+    /// is too short.
     fn fault(&self, swarm: &Swarm) -> LawError {
         let delta_m = self.delta_m;
         self.graph
@@ -241,8 +242,9 @@ impl Law for EdgeTensionLaw {
         self.try_energy(at.own).ok()
     }
 
-    /// Complete graph only. All relative velocities are damped at 1 + a22. The stiffnesses are the eigenvalues of 1/N times the
-    /// sum over edges of V'' along the edge, because V' = 0 at the desired distance. They are 0 for rotations.
+    /// Complete graph only. All relative velocities are damped at 1 + a22. The stiffnesses are the eigenvalues of 1/N
+    /// times the sum over edges of V'' along the edge, because V' = 0 at the desired distance. They are 0 for
+    /// rotations.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
         /// Largest number of vehicles for the O(N^3) eigenvalue computation.
         const MOST: usize = 130;
@@ -267,15 +269,15 @@ impl Law for EdgeTensionLaw {
         Some(Linear { free: stiffnesses.iter().map(mode).collect(), stiffest_contact_mode: None, heard: None })
     }
 
-    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair and all time. As functions of s = (l - delta)/K all
-    /// tensions are the same, so the pair with the smallest K has the smallest bound. One root
+    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair and all time. As functions of s = (l - delta)/K
+    /// all tensions are the same, so the pair with the smallest K has the smallest bound. One root
     /// ([`EdgeTension::push_side_root`]) therefore bounds all pairs.
     ///
-    /// External accelerations w, such as wind, add at most the time integral of the sum of `|w_i - mean w|^2`/4 to E. An
-    /// acceleration that is common to all vehicles adds nothing.
+    /// External accelerations w, such as wind, add at most the time integral of the sum of `|w_i - mean w|^2`/4 to E.
+    /// An acceleration that is common to all vehicles adds nothing.
     ///
-    /// Assumptions: exact state, no delay, no saturation, no disturbance other than wind, continuous time. Without pairs there
-    /// is no bound, and the certificate is not void.
+    /// Assumptions: exact state, no delay, no saturation, no disturbance other than wind, continuous time. Without
+    /// pairs there is no bound, and the certificate is not void.
     fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         let energy = self.try_energy(start.own);
         let mut void = Vec::new();
@@ -324,16 +326,16 @@ impl Law for EdgeTensionLaw {
         }
     }
 
-    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
-    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V'' of any
-    /// pair within the query:
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in
+    /// the relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest
+    /// V'' of any pair within the query:
     ///
-    /// - On the pushing side V'' falls with l, and all tensions are one function of s. V''max is therefore V'' at `nearest_m`
-    ///   for the pair with the smallest K.
+    /// - On the pushing side V'' falls with l, and all tensions are one function of s. V''max is therefore V'' at
+    ///   `nearest_m` for the pair with the smallest K.
     /// - On the pulling side V'/l stays below alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d).
     ///
-    /// Hence the whole Hessian is at most (V''max/N) `L_G`, whose largest eigenvalue is at most V''max, so omega^2 <= V''max.
-    /// On the complete graph relative velocities decay at 1/s. The fastest rate is max(omega, 1/s).
+    /// Hence the whole Hessian is at most (V''max/N) `L_G`, whose largest eigenvalue is at most V''max, so omega^2 <=
+    /// V''max. On the complete graph relative velocities decay at 1/s. The fastest rate is max(omega, 1/s).
     fn rates(&self, at: &RateQuery) -> Rates {
         let fastest = |(of, nearest_m): (EdgeTension, f64)| of.second_derivative(nearest_m).sqrt().max(1.0);
         let gain_per_s = 1.0 + self.a22_per_s;

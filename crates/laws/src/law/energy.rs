@@ -18,8 +18,8 @@ pub(super) enum Frame {
     Ground,
 }
 
-/// Upper bound on an energy E under external accelerations w. The energy satisfies `E >= 1/2 sum |v~_i|^2`, and its law keeps
-/// `dE/dt <= -zeta sum |v~_i|^2` without disturbance. With |w|^2 = sum of `|w_i|^2`, both
+/// Upper bound on an energy E under external accelerations w. The energy satisfies `E >= 1/2 sum |v~_i|^2`, and its law
+/// keeps `dE/dt <= -zeta sum |v~_i|^2` without disturbance. With |w|^2 = sum of `|w_i|^2`, both
 ///
 /// ```text
 /// dE/dt <= -zeta |v~|^2 + |v~| |w| <= |w|^2/(4 zeta)          equality for w = 2 zeta v~
@@ -118,7 +118,8 @@ fn groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> 
     groups
 }
 
-/// Returns the sorted times at which a gust begins, reaches full strength, falls or ends, with the ends of the run \[s\].
+/// Returns the sorted times at which a gust begins, reaches full strength, falls or ends, with the ends of the run
+/// \[s\].
 fn corners_s(exposure: &WindExposure<'_>) -> Vec<f64> {
     let of_gusts = exposure.wind.gusts.iter().flat_map(Gust::corners_s);
     let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < exposure.until_s);
@@ -128,8 +129,8 @@ fn corners_s(exposure: &WindExposure<'_>) -> Vec<f64> {
     corners_s
 }
 
-/// Returns an upper bound of |w| in a span in which each gust rises or falls monotonically: |w| at the mean strengths plus
-/// half of the changes of all gusts.
+/// Returns an upper bound of |w| in a span in which each gust rises or falls monotonically: |w| at the mean strengths
+/// plus half of the changes of all gusts.
 fn most_m_s2(
     exposure: &WindExposure<'_>,
     groups: &[(Vec<bool>, usize)],
@@ -158,7 +159,8 @@ fn most_m_s2(
     exposure.drag_per_s * (middle + changes.sum::<f64>())
 }
 
-/// Potential part of an energy at the last positions. The command computes it, and the energy of the same instant reuses it.
+/// Potential part of an energy at the last positions. The command computes it, and the energy of the same instant
+/// reuses it.
 #[derive(Clone, Debug)]
 pub(super) struct PotentialCache {
     positions_m: Rows,

@@ -121,8 +121,8 @@ impl LawError {
         )
     }
 
-    /// Adds the true distance to an error that is based on sensed or received states, if the two distances differ. `metric`
-    /// measures separations.
+    /// Adds the true distance to an error that is based on sensed or received states, if the two distances differ.
+    /// `metric` measures separations.
     #[must_use]
     pub fn against_truth(self, truth: &Swarm, metric: Metric, obstacles: &[Obstacle]) -> Self {
         let place = |vehicle: usize| row(&truth.positions_m, vehicle);

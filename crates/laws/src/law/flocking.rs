@@ -32,8 +32,8 @@ pub struct FlockingKeys {
     /// Gain c1 on distances to near vehicles in 1/s^2; velocities are matched with 2 sqrt(c1).
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c1_alpha_per_s2: f64,
-    /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a flock
-    /// without an objective.
+    /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a
+    /// flock without an objective.
     #[schemars(extend("minimum" = 0))]
     pub c1_gamma_per_s2: f64,
     /// Highest acceleration that is commanded in m/s^2.
@@ -51,8 +51,9 @@ impl Default for FlockingKeys {
     }
 }
 
-/// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms and
-/// theory, 2006, algorithm 2). The pull of the objective is limited to `c1_gamma` times a metre, as in its algorithm 3:
+/// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms
+/// and theory, 2006, algorithm 2). The pull of the objective is limited to `c1_gamma` times a metre, as in its
+/// algorithm 3:
 ///
 /// ```text
 /// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i)
@@ -61,10 +62,10 @@ impl Default for FlockingKeys {
 /// phi_a(z) = rho(z/|r|_s) a s(z - |d|_s),   a_ij = rho(|q_ij|_s/|r|_s),   c2 = 2 sqrt(c1)
 /// ```
 ///
-/// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the centre of
-/// the slots moved by the reference, and `v_r` is r'. The source does not feed r'' forward. The formation is an
-/// alpha-lattice: all pairs nearer than r are d apart. The law does not assign places, so it reaches given slots only by
-/// chance.
+/// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the
+/// centre of the slots moved by the reference, and `v_r` is r'. The source does not feed r'' forward. The formation is
+/// an alpha-lattice: all pairs nearer than r are d apart. The law does not assign places, so it reaches given slots
+/// only by chance.
 ///
 /// # Guarantee
 /// None: the force between two vehicles is bounded, so a large enough speed overcomes it.
@@ -87,8 +88,8 @@ impl FlockingLaw {
     /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or some
-    /// vehicle does not know the reference.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, a22_per_s, .. } = context;
         let gains = [
@@ -204,10 +205,10 @@ impl Law for FlockingLaw {
         }
     }
 
-    /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to the
-    /// damping. The number of near vehicles is at most the number of balls of diameter `nearest_m` that fit around a vehicle. The
-    /// eigenvalues of a sum over pairs are at most twice the sum at a vehicle. While velocities differ, velocity matching also
-    /// varies with distance. The objective damps the mean velocity, and a22 is compensated.
+    /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to
+    /// the damping. The number of near vehicles is at most the number of balls of diameter `nearest_m` that fit around
+    /// a vehicle. The eigenvalues of a sum over pairs are at most twice the sum at a vehicle. While velocities differ,
+    /// velocity matching also varies with distance. The objective damps the mean velocity, and a22 is compensated.
     fn rates(&self, at: &RateQuery) -> Rates {
         let (alpha, gamma) = (self.keys.c1_alpha_per_s2, self.keys.c1_gamma_per_s2);
         let fastest_per_s = |nearest_m: f64| {

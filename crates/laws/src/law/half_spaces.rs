@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 /// Sine of the angle below which a flat and a plane count as parallel.
 const PARALLEL: f64 = 1e-8;
-/// Relative tolerances of a violation, as fractions of the lengths whose difference it is. The first is used normally. The
-/// others follow where nearly parallel planes leave no point within the first.
+/// Relative tolerances of a violation, as fractions of the lengths whose difference it is. The first is used normally.
+/// The others follow where nearly parallel planes leave no point within the first.
 const ROUNDING: [f64; 4] = [1e-12, 1e-10, 1e-8, 1e-6];
 
 /// Set of all x with `normal . x >= offset`.
@@ -31,14 +31,14 @@ impl HalfSpace {
 /// Half-spaces, with scratch memory of the search.
 ///
 /// # Method
-/// Half-spaces are added one by one. While the best point satisfies the next half-space, it stays the best. Otherwise the
-/// best point lies on the plane of that half-space, which is the same problem with one dimension less (Seidel,
+/// Half-spaces are added one by one. While the best point satisfies the next half-space, it stays the best. Otherwise
+/// the best point lies on the plane of that half-space, which is the same problem with one dimension less (Seidel,
 /// Small-dimensional linear programming and convex hulls made easy, 1991). If the intersection is empty, the largest
 /// violation becomes a fourth variable, and half-spaces are added by the same rule.
 ///
 /// The order is as given, so the same input gives the same bits. The cost is O(n) on average for an arbitrary order and
-/// O(n^3) at worst, plus the same for each half-space that cannot be satisfied. Nothing is allocated once the lists have
-/// grown. If target point and normals lie in the plane z = 0, the result does too, exactly.
+/// O(n^3) at worst, plus the same for each half-space that cannot be satisfied. Nothing is allocated once the lists
+/// have grown. If target point and normals lie in the plane z = 0, the result does too, exactly.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HalfSpaces {
     given: Vec<HalfSpace>,
@@ -63,9 +63,9 @@ impl HalfSpaces {
         self.given.push(half_space);
     }
 
-    /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. If there is no
-    /// such point, returns the nearest point of minimal largest violation. Violations are accurate to 1e-12 of the radius and
-    /// the offsets, and to 1e-6 with nearly parallel planes.
+    /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. If there
+    /// is no such point, returns the nearest point of minimal largest violation. Violations are accurate to 1e-12 of
+    /// the radius and the offsets, and to 1e-6 with nearly parallel planes.
     pub(super) fn nearest(&mut self, wish: Vector3<f64>, radius: f64) -> Nearest {
         let search = Search { aim: Aim::Near(wish), radius, slack: 0.0, rounding: ROUNDING[0] };
         match search.best(&self.given, &Flat::space()) {
@@ -177,7 +177,8 @@ impl Flat {
         Self { foot: Vector3::zeros(), kind: Kind::Space }
     }
 
-    /// Returns the component of a vector in the subspace. Projects twice to remove the rounding of a nearly perpendicular vector.
+    /// Returns the component of a vector in the subspace. Projects twice to remove the rounding of a nearly
+    /// perpendicular vector.
     fn part_of(&self, vector: Vector3<f64>) -> Vector3<f64> {
         self.projection(self.projection(vector))
     }

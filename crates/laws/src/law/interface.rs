@@ -17,14 +17,15 @@ use tautline_core::swarm::Rows;
 /// Control law: maps the states that the vehicles know to one acceleration per vehicle.
 ///
 /// A custom law implements [`Law::name`] and [`Law::command`] and runs like the built-in ones. The other methods have
-/// defaults. [`Law::capabilities`] states what the law senses and controls. [`Law::certificate`] and [`Law::energy`] give
-/// what is proved about it, [`Law::rates`] and [`Law::linear`] the rates of its closed loop. The internal state of a law
-/// is saved with a simulation, so it must be [`Clone`].
+/// defaults. [`Law::capabilities`] states what the law senses and controls. [`Law::certificate`] and [`Law::energy`]
+/// give what is proved about it, [`Law::rates`] and [`Law::linear`] the rates of its closed loop. The internal state of
+/// a law is saved with a simulation, so it must be [`Clone`].
 pub trait Law: DynClone + Send {
     /// Short name for reports, such as `edge-tension`.
     fn name(&self) -> &str;
 
-    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on what vehicle i knows.
+    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on what vehicle i
+    /// knows.
     ///
     /// Called once a step; implementations keep their scratch memory so that nothing is allocated here.
     ///
@@ -53,9 +54,10 @@ pub trait Law: DynClone + Send {
         None
     }
 
-    /// Returns the separation that the law guarantees from a start. A law with [`Capabilities::certifies_target_changes`]
-    /// accounts for a target that goes through the formations `ahead` at any times. Each change is immediate or moves slots
-    /// along straight lines. Other laws may ignore `ahead`: [`certificate_through`] voids their certificate.
+    /// Returns the separation that the law guarantees from a start. A law with
+    /// [`Capabilities::certifies_target_changes`] accounts for a target that goes through the formations `ahead` at any
+    /// times. Each change is immediate or moves slots along straight lines. Other laws may ignore `ahead`:
+    /// [`certificate_through`] voids their certificate.
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         Certificate::void(Void::NoBarrier)
     }
@@ -73,7 +75,8 @@ pub trait Law: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Law);
 
-/// Returns the certificate of a law from a start through the formations `ahead`; void if the law does not certify target changes.
+/// Returns the certificate of a law from a start through the formations `ahead`; void if the law does not certify
+/// target changes.
 #[must_use]
 pub fn certificate_through(law: &dyn Law, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
     let is_ignored = !ahead.is_empty() && !law.capabilities().certifies_target_changes;
@@ -88,8 +91,10 @@ pub struct Capabilities {
     pub needs: &'static [&'static str],
     /// Quantities that the law controls.
     pub controls: Controls,
-    /// Distance at which the law's barrier is infinite \[m\]. The simulation refuses a step that removes more than half of the
-    /// remaining distance to it from a linked pair, or from any pair if the law has a sensing range.
+    /// Distance at which the law's barrier is infinite \[m\].
+    ///
+    /// The simulation refuses a step that removes more than half of a pair's clearance above this distance. It checks
+    /// all pairs if the law has a sensing range, and otherwise linked pairs.
     pub barrier_m: Option<f64>,
     /// Distance up to which vehicles sense each other \[m\]; `None` for a law that uses links alone.
     pub sensing_range_m: Option<f64>,
@@ -103,10 +108,11 @@ pub struct Capabilities {
     pub certifies_target_changes: bool,
     /// Whether the law keeps vehicles clear of obstacles; otherwise obstacles void its certificate.
     pub avoids_obstacles: bool,
-    /// Whether the law must run on the calling thread. Otherwise the law of a large swarm runs in parallel with the audit.
+    /// Whether the law must run on the calling thread. Otherwise the law of a large swarm runs in parallel with the
+    /// audit.
     pub requires_calling_thread: bool,
-    /// Settling of position errors of an undisturbed swarm. Set for a law that can follow slots that are spread for a while
-    /// ([`crate::target::Breathing`]) and certifies again then.
+    /// Settling of position errors of an undisturbed swarm. Set for a law that can follow slots that are spread for a
+    /// while ([`crate::target::Breathing`]) and certifies again then.
     pub settling: Option<Settling>,
     /// Assumptions of the certified separation, as a sentence.
     pub assumptions: &'static str,
@@ -148,8 +154,8 @@ pub struct RateQuery {
 }
 
 impl RateQuery {
-    /// Query for vehicles with velocity coefficient a22 \[1/s\] and separations of at least `nearest_m`, without obstacles, on
-    /// a disconnected graph (connectivity 0).
+    /// Query for vehicles with velocity coefficient a22 \[1/s\] and separations of at least `nearest_m`, without
+    /// obstacles, on a disconnected graph (connectivity 0).
     #[must_use]
     pub fn new(a22_per_s: f64, nearest_m: Option<f64>) -> Self {
         Self { a22_per_s, nearest_m, obstacle_room_m: None, connectivity: 0.0 }
@@ -159,8 +165,8 @@ impl RateQuery {
 /// Bounds on the rates of the closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// Upper bound on the rates \[1/s\] without obstacles. `None` if no bound is known, or if it depends on a distance that the
-    /// query lacks.
+    /// Upper bound on the rates \[1/s\] without obstacles. `None` if no bound is known, or if it depends on a distance
+    /// that the query lacks.
     pub fastest_per_s: Option<f64>,
     /// Contribution of obstacles to the square of the fastest rate \[1/s^2\].
     pub obstacles_per_s2: f64,
@@ -181,8 +187,8 @@ impl Rates {
 /// Quantities that a law controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Controls {
-    /// Distances alone: forces act along the lines between vehicles, and a formation is reached up to rotation, reflection
-    /// and translation.
+    /// Distances alone: forces act along the lines between vehicles, and a formation is reached up to rotation,
+    /// reflection and translation.
     Distances,
     /// Relative positions in a common frame: a formation is reached up to translation.
     Displacements,

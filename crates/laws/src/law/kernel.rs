@@ -1,8 +1,9 @@
 //! Edge-tension sums over all edges, in blocks that fill the lanes of vector instructions.
 //!
-//! The loops over edges contain only IEEE additions, multiplications, divisions, square roots and selections. The compiler
-//! turns them into the vector instructions detected at run time. No operation is fused or reordered, and the edges alone
-//! fix the order of sums. The bits therefore depend neither on the vector width nor on the optimisation level.
+//! The loops over edges contain only IEEE additions, multiplications, divisions, square roots and selections. The
+//! compiler turns them into the vector instructions detected at run time. No operation is fused or reordered, and the
+//! edges alone fix the order of sums. The bits therefore depend neither on the vector width nor on the optimisation
+//! level.
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
 
 mod block;
@@ -18,11 +19,11 @@ use super::tension::OutOfDomain;
 use crate::graph::Graph;
 use tautline_core::swarm::{Rows, columns, columns_mut};
 
-/// Up to this number of vehicles the complete graph is stored as a list of edges, because short rows leave lanes empty. The
-/// order of sums differs, so this number affects the last bits of results.
+/// Up to this number of vehicles the complete graph is stored as a list of edges, because short rows leave lanes empty.
+/// The order of sums differs, so this number affects the last bits of results.
 const LISTED_UP_TO: usize = 16;
-/// From this number of vehicles all threads share the rows of the complete graph, in bands. Sums in bands differ from sums
-/// in rows in their last bits, so this number affects the last bits of results.
+/// From this number of vehicles all threads share the rows of the complete graph, in bands. Sums in bands differ from
+/// sums in rows in their last bits, so this number affects the last bits of results.
 const BANDED_FROM: usize = 640;
 /// Number of bands, and the largest number of threads with work. All bands have about the same number of edges.
 const BANDS: usize = 16;
@@ -70,8 +71,9 @@ impl Kernel {
         &mut self.inverse_k_per_m[..self.edges]
     }
 
-    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\]. Returns
-    /// (1/alpha) times the sum of V over all edges, which is almost free here. Both tables have one row per vehicle.
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
+    /// Returns (1/alpha) times the sum of V over all edges, which is almost free here. Both tables have one row per
+    /// vehicle.
     pub(super) fn add_pulls(&mut self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
         let mut bands = self.bands.take();
         let potential = self.add_pulls_in(bands.as_mut(), positions_m, sums);
@@ -189,8 +191,8 @@ impl WithSimd for AddList<'_> {
     }
 }
 
-/// Bands of rows of the complete graph, with a buffer for the sums of each band and a shared copy of the positions. Takes 48
-/// bytes per vehicle for one band, some 290 for 16.
+/// Bands of rows of the complete graph, with a buffer for the sums of each band and a shared copy of the positions.
+/// Takes 48 bytes per vehicle for one band, some 290 for 16.
 #[derive(Clone, Debug)]
 pub(super) struct Bands {
     /// Positions along each axis \[m\], followed by padding entries at one common place.
@@ -207,8 +209,8 @@ struct Band {
 }
 
 impl Bands {
-    /// Builds `bands` bands of `count` vehicles, with `room` padding entries at `beyond_m`. The number of bands fixes the order
-    /// of all sums, independent of the number of threads.
+    /// Builds `bands` bands of `count` vehicles, with `room` padding entries at `beyond_m`. The number of bands fixes
+    /// the order of all sums, independent of the number of threads.
     pub(super) fn new(count: usize, bands: usize, room: usize, beyond_m: f64) -> Self {
         // The rows from r on have about (N - r)^2/2 edges.
         let start = |band: usize| count - (count * count * (bands - band) / bands).isqrt();
@@ -220,10 +222,10 @@ impl Bands {
         Self { axes: [(); 3].map(|()| vec![beyond_m; count + room]), bands: (0..bands).map(band).collect() }
     }
 
-    /// Evaluates every band once, in parallel if there are threads. `evaluate` receives a range of rows, the padded positions
-    /// and padded sums that begin at the first of these rows. It adds the pulls of these rows to the sums and returns their
-    /// potential. Adds all bands to `sums` in order, so the bits are the same for any number of threads. Returns the sum of
-    /// the potentials.
+    /// Evaluates every band once, in parallel if there are threads. `evaluate` receives a range of rows, the padded
+    /// positions and padded sums that begin at the first of these rows. It adds the pulls of these rows to the sums and
+    /// returns their potential. Adds all bands to `sums` in order, so the bits are the same for any number of threads.
+    /// Returns the sum of the potentials.
     pub(super) fn add_to(
         &mut self,
         axes: [&[f64]; 3],

@@ -54,8 +54,8 @@ impl LaplacianKeys {
 /// u_i = -(1/N) sum_{j in N_i} [ f1 ((p_i - h_i) - (p_j - h_j)) + f2 (v_i - v_j) ]
 /// ```
 ///
-/// Reaches the slots `h_i` up to a common translation from any start on a connected graph. Does not keep vehicles apart. The
-/// source's gains are f1 = 1 and f2 = 1 + a22.
+/// Reaches the slots `h_i` up to a common translation from any start on a connected graph. Does not keep vehicles
+/// apart. The source's gains are f1 = 1 and f2 = 1 + a22.
 ///
 /// # Energy
 /// On the complete graph, with `e_i = p_i - h_i`,
@@ -137,8 +137,8 @@ impl Law for LaplacianLaw {
         Capabilities { needs: &["a common compass"], ..Capabilities::default() }
     }
 
-    /// The law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues 0 <= mu <= N of the
-    /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    /// The law is linear. With the eigenvalues 0 <= mu <= N of the graph's Laplacian, its modes are
+    /// `x'' = -(f1 mu/N) x - (f2 mu/N - a22) x'`. Their rates are at most `max(sqrt(f1), |f2 - a22|, |a22|)`.
     fn rates(&self, at: &RateQuery) -> Rates {
         let fastest = self.f1_per_s2.sqrt().max((self.f2_per_s - at.a22_per_s).abs()).max(at.a22_per_s.abs());
         Rates {

@@ -1,7 +1,8 @@
 //! Control laws: the acceleration that each vehicle commands, as a function of the states that it knows.
 //!
-//! Each law has one file with its scenario keys, bounds, energy, certificate and assumptions. `spec` lists the laws that
-//! scenarios may name. A custom law implements [`Law`] and runs like the built-in ones (see `examples/own_law.rs`).
+//! Each law has one file with its scenario keys, bounds, energy, certificate and assumptions. `spec` lists the laws
+//! that scenarios may name. A custom law implements [`Law`] and runs like the built-in ones (see
+//! `examples/own_law.rs`).
 
 mod cbf_qp;
 mod certificate;

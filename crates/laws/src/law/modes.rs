@@ -1,7 +1,7 @@
 //! Linearized motion about the slots, and its stability margins under delay and sampling.
 //!
-//! Near the slots the errors are sums of independent modes. If all states that a vehicle uses, its own included, are late by
-//! tau, a mode of stiffness K and damping C has the characteristic equation
+//! Near the slots the errors are sums of independent modes. If all states that a vehicle uses, its own included, are
+//! late by tau, a mode of stiffness K and damping C has the characteristic equation
 //!
 //! ```text
 //! s^2 - a22 s + (K + C s) e^(-s tau) = 0
@@ -24,8 +24,8 @@ use crate::space::NearPairs;
 pub struct Linear {
     /// Modes of relative motion without contact (no pair within the range of the barrier).
     pub free: Vec<Mode>,
-    /// Upper bound of the stiffest mode with the vehicles of the nearest slots at the edge of contact; `None` if it is unknown or
-    /// the law has no contact forces.
+    /// Upper bound of the stiffest mode with the vehicles of the nearest slots at the edge of contact; `None` if it is
+    /// unknown or the law has no contact forces.
     pub stiffest_contact_mode: Option<Mode>,
     /// Loop over received states, if its modes with late received and present own states are known.
     pub heard: Option<Heard>,
@@ -40,8 +40,8 @@ pub struct Mode {
     pub damping_per_s: f64,
 }
 
-/// Loop over received states: u = -(k + c s) (D - A e^(-s tau)) x with gains k and c on each link. D is diagonal: the number
-/// of neighbours of each vehicle, plus one if it knows a reference. A is the adjacency matrix.
+/// Loop over received states: u = -(k + c s) (D - A e^(-s tau)) x with gains k and c on each link. D is diagonal: the
+/// number of neighbours of each vehicle, plus one if it knows a reference. A is the adjacency matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heard {
     /// k \[1/s^2\] and c \[1/s\].
@@ -72,8 +72,8 @@ pub enum HeardLinks {
 }
 
 impl Linear {
-    /// Returns the longest delay \[s\] of all states, own included, below which every free mode is stable; infinite if every
-    /// delay is stable.
+    /// Returns the longest delay \[s\] of all states, own included, below which every free mode is stable; infinite if
+    /// every delay is stable.
     #[must_use]
     pub fn delay_margin_s(&self, a22_per_s: f64) -> f64 {
         self.free.iter().map(|mode| mode.delay_margin_s(a22_per_s)).fold(f64::INFINITY, f64::min)
@@ -97,8 +97,8 @@ impl Mode {
         self.damping_per_s > a22_per_s && self.stiffness_per_s2 >= 0.0
     }
 
-    /// Returns the longest delay \[s\] below which the mode is stable; 0 if it is unstable without delay, infinite if it is stable
-    /// with every delay.
+    /// Returns the longest delay \[s\] below which the mode is stable; 0 if it is unstable without delay, infinite if
+    /// it is stable with every delay.
     ///
     /// At the stability limit s = i omega, |K + i C omega| = |omega^2 + i a22 omega| gives
     /// omega^4 - (C^2 - a22^2) omega^2 - K^2 = 0. The angles give tau omega = atan(C omega/K) - atan(a22/omega).
@@ -119,8 +119,8 @@ impl Mode {
     /// Returns the longest sampling period \[s\] of held commands (zero-order hold) below which the mode is stable:
     /// min(2/C, 2 C/K) for a22 = 0.
     ///
-    /// From one command to the next the state is multiplied by a 2 x 2 matrix. Both eigenvalues lie within the unit circle if its
-    /// determinant is below 1 and 1 + trace + determinant is positive (Jury).
+    /// From one command to the next the state is multiplied by a 2 x 2 matrix. Both eigenvalues lie within the unit
+    /// circle if its determinant is below 1 and 1 + trace + determinant is positive (Jury).
     #[must_use]
     pub fn sampling_margin_s(self, a22_per_s: f64) -> f64 {
         /// Number of periods scanned, and the end of the scan in units of the time scale.
@@ -146,8 +146,8 @@ impl Mode {
     }
 }
 
-/// Returns the response over a period T: the growth e^(a22 T) of a velocity, the distance per unit of velocity \[s\], and the
-/// distance per unit of acceleration \[s^2\].
+/// Returns the response over a period T: the growth `e^(a22 T)` of a velocity, and the distances per unit of velocity
+/// \[s\] and per unit of acceleration \[s^2\].
 fn held(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
     let x = a22_per_s * period_s;
     let ratio = if x == 0.0 { 1.0 } else { libm::expm1(x) / x };
@@ -168,8 +168,8 @@ fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 impl Heard {
-    /// Returns the longest delay \[s\] of received states, with present own states, below which all modes are stable; infinite if
-    /// every delay is stable. `None` if the common motion is unstable (a22 > 0) and cannot be separated.
+    /// Returns the longest delay \[s\] of received states, with present own states, below which all modes are stable;
+    /// infinite if every delay is stable. `None` if the common motion is unstable (a22 > 0) and cannot be separated.
     ///
     /// The common motion counts if a22 <= 0: with a delay it is tied to past positions of the swarm.
     #[must_use]
@@ -193,8 +193,8 @@ impl Heard {
         Complex::new(omega * omega, a22_per_s * omega) / Complex::new(k, c * omega)
     }
 
-    /// Returns the delay margin of s^2 - a22 s + (k + c s) (d - alpha e^(-s tau)) = 0. At s = i omega the moduli give a quadratic
-    /// in omega^2, and the angles give the delay.
+    /// Returns the delay margin of s^2 - a22 s + (k + c s) (d - alpha e^(-s tau)) = 0. At s = i omega the moduli give a
+    /// quadratic in omega^2, and the angles give the delay.
     fn alike_s(&self, d: f64, alpha: f64, a22_per_s: f64) -> f64 {
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         let relative = d - alpha;
@@ -219,7 +219,8 @@ impl Heard {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the delay margin of hub and leaf mean: (hub - q)(leaf - q) = leaves e^(-2 s tau). Scans omega for equal moduli.
+    /// Returns the delay margin of hub and leaf mean: (hub - q)(leaf - q) = leaves e^(-2 s tau). Scans omega for equal
+    /// moduli.
     fn star_s(&self, hub: f64, leaf: f64, leaves: f64, a22_per_s: f64) -> f64 {
         const LOOKS: u32 = 4000;
         // Modes of the leaves alone have no received terms.
@@ -252,8 +253,8 @@ mod tests;
 /// Relative difference below which two slot distances count as equal.
 const SAME: f64 = 1e-6;
 
-/// Returns an upper bound of the stiffest mode with the nearest slots in contact. Contact adds at most `V_R''` at R times the
-/// largest Laplacian eigenvalue of the graph of nearest slots. `None` for fewer than two vehicles.
+/// Returns an upper bound of the stiffest mode with the nearest slots in contact. Contact adds at most `V_R''` at R
+/// times the largest Laplacian eigenvalue of the graph of nearest slots. `None` for fewer than two vehicles.
 pub(super) fn stiffest_contact_mode(free: Mode, tension: &EdgeTension, formation: &Formation) -> Option<Mode> {
     let (_, nearest_m) = formation.min_distance()?;
     let mut near = NearPairs::default();

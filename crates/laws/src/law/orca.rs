@@ -1,5 +1,5 @@
-//! Optimal reciprocal collision avoidance (ORCA): each vehicle takes the velocity nearest to its preferred one that avoids
-//! collisions if all vehicles do the same.
+//! Optimal reciprocal collision avoidance (ORCA): each vehicle takes the velocity nearest to its preferred one that
+//! avoids collisions if all vehicles do the same.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,8 @@ pub struct OrcaKeys {
     /// Time for which a velocity must be free of collisions in s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub horizon_s: f64,
-    /// Rate at which the chosen velocity is tracked in 1/s; vehicles that are too near each other part within its inverse.
+    /// Rate at which the chosen velocity is tracked in 1/s; vehicles that are too near each other part within its
+    /// inverse.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tracking_per_s: f64,
     /// Largest commanded acceleration in m/s^2.
@@ -47,8 +48,8 @@ pub struct OrcaKeys {
     /// Largest number of neighbours that a vehicle considers, the nearest ones.
     #[schemars(range(min = 1))]
     pub neighbours_max: usize,
-    /// Largest distance of a neighbour that a vehicle considers in m. By default delta + margin plus the distance that two
-    /// vehicles at their highest speeds approach each other within the horizon.
+    /// Largest distance of a neighbour that a vehicle considers in m. By default delta + margin plus the distance that
+    /// two vehicles at their highest speeds approach each other within the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_m: Option<f64>,
@@ -74,24 +75,24 @@ impl Default for OrcaKeys {
     }
 }
 
-/// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance, 2011) with
-/// half-spaces. Vehicles have diameter D = delta + margin and track the velocities V:
+/// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance,
+/// 2011) with half-spaces. Vehicles have diameter D = delta + margin and track the velocities V:
 ///
 /// ```text
 /// V_i   = velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i| with |v| <= v_max in all half-spaces of i,   d_i = h_i + r - p_i
 /// u_i   = r'' + tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
 /// ```
 ///
-/// The velocity obstacle of a pair is the set of relative velocities with a separation below D within the horizon: a cone
-/// with a round tip. Let w be the shortest vector from `v_i - v_j` to the boundary of that set, and n the outward normal
-/// there. The half-space of i is `n . (V - v_i - w/2) >= 0`, so each vehicle of the pair contributes half of w. If the
-/// half-spaces have no common point, the velocity with the least largest violation is taken. Two vehicles nearer than D
-/// part within 1/tracking.
+/// The velocity obstacle of a pair is the set of relative velocities with a separation below D within the horizon: a
+/// cone with a round tip. Let w be the shortest vector from `v_i - v_j` to the boundary of that set, and n the outward
+/// normal there. The half-space of i is `n . (V - v_i - w/2) >= 0`, so each vehicle of the pair contributes half of w.
+/// If the half-spaces have no common point, the velocity with the least largest violation is taken. Two vehicles nearer
+/// than D part within 1/tracking.
 ///
 /// # Guarantee
-/// None. Velocities that are free of conflicts, chosen continuously and taken on at once keep delta. Acceleration limits,
-/// velocity tracking and crowds without a free velocity break this. Without a margin, passing vehicles come to exactly D,
-/// and rounding decides.
+/// None. Velocities that are free of conflicts, chosen continuously and taken on at once keep delta. Acceleration
+/// limits, velocity tracking and crowds without a free velocity break this. Without a margin, passing vehicles come to
+/// exactly D, and rounding decides.
 ///
 /// # Cost
 /// O(near pairs) per step without allocation.
@@ -115,8 +116,8 @@ impl OrcaLaw {
     /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or some
-    /// vehicle does not know the reference.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
@@ -234,8 +235,8 @@ impl Law for OrcaLaw {
         }
     }
 
-    /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: the chosen
-    /// velocity may turn as fast as two vehicles pass. a22 is compensated, so the common mode does not grow.
+    /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: the
+    /// chosen velocity may turn as fast as two vehicles pass. a22 is compensated, so the common mode does not grow.
     fn rates(&self, at: &RateQuery) -> Rates {
         let OrcaKeys { tracking_per_s, k_per_s, .. } = self.keys;
         let alone_per_s = tracking_per_s.max((tracking_per_s * k_per_s).sqrt());
@@ -244,7 +245,8 @@ impl Law for OrcaLaw {
     }
 }
 
-/// Relative velocities of vehicle i with respect to vehicle j that bring the pair nearer than a diameter within the horizon.
+/// Relative velocities of vehicle i with respect to vehicle j that bring the pair nearer than a diameter within the
+/// horizon.
 struct VelocityObstacle {
     /// Vector from i to j \[m\], not zero.
     towards_m: Vector3<f64>,
@@ -255,12 +257,12 @@ struct VelocityObstacle {
 }
 
 impl VelocityObstacle {
-    /// Returns the outward normal at the boundary point nearest to a relative velocity, and the depth of the velocity inside
-    /// the set \[m/s\]; negative outside.
+    /// Returns the outward normal at the boundary point nearest to a relative velocity, and the depth of the velocity
+    /// inside the set \[m/s\]; negative outside.
     ///
-    /// The set is the ball of radius diameter/horizon about `towards_m`/horizon and its shadow away from the origin. The shadow
-    /// is a cone whose half-angle has the sine diameter/distance. The nearest point is on the ball if the vector from the
-    /// centre to the velocity points off the cone's lateral surface, and on that surface otherwise.
+    /// The set is the ball of radius diameter/horizon about `towards_m`/horizon and its shadow away from the origin.
+    /// The shadow is a cone whose half-angle has the sine diameter/distance. The nearest point is on the ball if the
+    /// vector from the centre to the velocity points off the cone's lateral surface, and on that surface otherwise.
     fn way_out(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
         let Self { towards_m, diameter_m, horizon_s, parting_s } = self;
         let distance_m = towards_m.norm();
@@ -286,8 +288,8 @@ impl VelocityObstacle {
     }
 }
 
-/// Returns the unit direction of a velocity across a line of sight. If it has none, returns left as seen from above, so that
-/// the two vehicles turn to different sides; along a vertical line of sight, x.
+/// Returns the unit direction of a velocity across a line of sight. If it has none, returns left as seen from above, so
+/// that the two vehicles turn to different sides; along a vertical line of sight, x.
 fn across(velocity_m_s: Vector3<f64>, sight: Vector3<f64>) -> Vector3<f64> {
     let rest = velocity_m_s - sight * sight.dot(&velocity_m_s);
     let rest = rest - sight * sight.dot(&rest);

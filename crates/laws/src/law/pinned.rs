@@ -42,8 +42,8 @@ impl PinnedConsensus {
         self.graph.pinned_connectivity(&self.pinning)
     }
 
-    /// Returns the linearized motion about the slots with `gain` times the pinned Laplacian M. A leader follows the reference
-    /// with the gains `lead`.
+    /// Returns the linearized motion about the slots with `gain` times the pinned Laplacian M. A leader follows the
+    /// reference with the gains `lead`.
     pub(super) fn linear(&self, gain: Mode, lead: Mode) -> Linear {
         let leads = self.pinning.leader().map(|_| lead);
         let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
@@ -123,8 +123,8 @@ impl PinnedConsensus {
         }
     }
 
-    /// Returns `e' M e` \[m^2\]: the sum of `|e_i - e_j|^2` over links, plus the sum of `|e_i|^2` over the vehicles that know
-    /// the reference. Errors are relative to the reference.
+    /// Returns `e' M e` \[m^2\]: the sum of `|e_i - e_j|^2` over links, plus the sum of `|e_i|^2` over the vehicles
+    /// that know the reference. Errors are relative to the reference.
     pub(super) fn stretch_m2(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
         let count = self.graph.count();
         let links = if self.graph.is_complete() {
@@ -136,8 +136,8 @@ impl PinnedConsensus {
         links + pinned.sum::<f64>()
     }
 
-    /// Returns `1/2 sum |v~_i|^2` \[m^2/s^2\]. Velocities v~ are relative to the mean without a reference, to the leader if
-    /// there is one, and otherwise to the reference.
+    /// Returns `1/2 sum |v~_i|^2` \[m^2/s^2\]. Velocities v~ are relative to the mean without a reference, to the
+    /// leader if there is one, and otherwise to the reference.
     pub(super) fn kinetic_energy(&self, swarm: &Swarm, reference: &Reference) -> f64 {
         let velocity_m_s = match self.pinning {
             Pinning::Nobody => return relative_kinetic_energy(swarm),

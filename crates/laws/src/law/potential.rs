@@ -60,11 +60,12 @@ impl Default for PotentialKeys {
 /// ```
 ///
 /// # Certificate
-/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. Assumptions: exact states over
-/// links and of near pairs, no limit on the acceleration, no disturbance, continuous time.
+/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. Assumptions: exact states
+/// over links and of near pairs, no limit on the acceleration, no disturbance, continuous time.
 ///
 /// # Cost
-/// O(links + near pairs) per step without allocation, energy included. The energy of any other state compares all pairs.
+/// O(links + near pairs) per step without allocation, energy included. The energy of any other state compares all
+/// pairs.
 #[derive(Clone, Debug)]
 pub struct PotentialLaw {
     graph: Graph,
@@ -83,8 +84,8 @@ impl PotentialLaw {
     /// Builds the law on the links of the context, with the smallest slot distance as its range.
     ///
     /// # Errors
-    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a gain is not finite, or two
-    /// slots are at most delta apart.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a gain is not finite, or
+    /// two slots are at most delta apart.
     pub fn new(context: &LawContext<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
         let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
         ParameterError::check(context.links, context.formation, &gains)?;
@@ -148,8 +149,8 @@ impl PotentialLaw {
     }
 }
 
-/// Returns R of a formation \[m\]: the smallest slot distance, which must exceed delta. Otherwise returns the pair and its
-/// distance as the error.
+/// Returns R of a formation \[m\]: the smallest slot distance, which must exceed delta. Otherwise returns the pair and
+/// its distance as the error.
 fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
     match formation.min_distance() {
         Some((pair, distance_m)) if distance_m <= delta_m => Err((pair, distance_m)),
@@ -158,10 +159,10 @@ fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
 }
 
 impl PotentialLaw {
-    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
-    /// `nearest_m` along its line, and less across it. The number of near vehicles is at most the number of balls of diameter
-    /// `nearest_m` that fit around a vehicle within R + `nearest_m`/2. The eigenvalues of a sum over pairs are at most twice the
-    /// sum at a vehicle.
+    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3`
+    /// at `nearest_m` along its line, and less across it. The number of near vehicles is at most the number of balls of
+    /// diameter `nearest_m` that fit around a vehicle within R + `nearest_m`/2. The eigenvalues of a sum over pairs are
+    /// at most twice the sum at a vehicle.
     fn fastest_per_s(&self, nearest_m: f64, a22_per_s: f64) -> Option<f64> {
         let nearest_m = nearest_m.min(self.range_m);
         let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;

@@ -21,10 +21,15 @@ const REST_DECAY_ROOT: f64 = 0.414_213_562_373_095_05;
 /// V is strictly convex, 0 at its minimum l = d, infinite at delta, and tends to a line of slope alpha/K for large l.
 ///
 /// # Accuracy
-/// With h = s - asinh(1) both V = alpha \[h - (sqrt 2 - 1)(1 - e^(-2h))/(1 - e^(-2s))\] and
-/// V' = (alpha/K) (1 - e^(-2h)) (1 - e^(-2(s + asinh 1))) / (1 - e^(-2s))^2 hold exactly. Neither subtracts nearly
-/// equal numbers at the barrier, and V' does not do so at the minimum either. The error of V' is a few units in its last
-/// place everywhere; the error of V is a few units in the last place of alpha h.
+/// With h = s - asinh(1) these forms hold exactly:
+///
+/// ```text
+/// V  = alpha [ h - (sqrt 2 - 1) (1 - e^(-2h))/(1 - e^(-2s)) ]
+/// V' = (alpha/K) (1 - e^(-2h)) (1 - e^(-2(s + asinh 1)))/(1 - e^(-2s))^2
+/// ```
+///
+/// Neither subtracts nearly equal numbers at the barrier, and V' does not do so at the minimum either. The error of V'
+/// is a few units in its last place everywhere; the error of V is a few units in the last place of alpha h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeTension {
     alpha: f64,
@@ -143,18 +148,19 @@ impl EdgeTension {
 
     /// Returns the distance l in (delta, d] on the pushing side of the minimum with V(l) = `value` \[m^2/s^2\].
     ///
-    /// Returns d for a value at or below 0, delta for an infinite value, NaN for NaN. If the clearance l - delta is below the
-    /// resolution of l, the result rounds to delta.
+    /// Returns d for a value at or below 0, delta for an infinite value, NaN for NaN. If the clearance l - delta is
+    /// below the resolution of l, the result rounds to delta.
     ///
     /// # Method
-    /// In s the equation coth(s) = V/alpha + sqrt 2 + asinh(1) - s has one root in (0, asinh(1)]. The inverse hyperbolic
-    /// cotangents of the right-hand side at both ends bracket the root; they differ by less than a factor of 2. Newton's
-    /// method runs on sqrt(V), which unlike V has a simple zero at the minimum. sqrt(V) is convex, so the steps from the lower
-    /// end climb to the root without passing it. A step that rounding takes out of the bracket is replaced by bisection.
+    /// In s the equation coth(s) = V/alpha + sqrt 2 + asinh(1) - s has one root in (0, asinh(1)]. The inverse
+    /// hyperbolic cotangents of the right-hand side at both ends bracket the root; they differ by less than a factor of
+    /// 2. Newton's method runs on sqrt(V), which unlike V has a simple zero at the minimum. The square root is convex
+    /// too, so the steps from the lower end climb to the root without passing it. A step that rounding takes out of the
+    /// bracket is replaced by bisection.
     ///
     /// # Guarantee
-    /// Every iteration keeps the root in the bracket. Iteration stops when a step falls below the resolution of s: in fewer
-    /// than 10 iterations in practice, and in 64 at most (54 bisections alone would give every digit).
+    /// Every iteration keeps the root in the bracket. Iteration stops when a step falls below the resolution of s: in
+    /// fewer than 10 iterations in practice, and in 64 at most (54 bisections alone would give every digit).
     #[must_use]
     pub fn push_side_root(&self, value: f64) -> f64 {
         if value.is_nan() {
@@ -232,7 +238,8 @@ pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64, power: f64) -> (
 
 /// Returns 1 - e^(-2s) and 1 - e^(-2h) for s > 0 and h = s - asinh(1), both to a few units in the last place.
 ///
-/// One exponential serves both: it is evaluated about the nearer zero, and the other follows from it without cancellation.
+/// One exponential serves both: it is evaluated about the nearer zero, and the other follows from it without
+/// cancellation.
 #[inline(always)]
 fn decay_complements(s: f64, h: f64) -> (f64, f64) {
     complements_from(s, expm1(exponent(s, h)))
@@ -260,8 +267,8 @@ fn is_near_barrier(s: f64) -> bool {
 
 /// Returns e^x - 1 for x <= 1, to two units in the last place.
 ///
-/// Consists of additions and multiplications without branches. The compiler can vectorise it for any width, and its bits
-/// are the same on every machine.
+/// Consists of additions and multiplications without branches. The compiler can vectorise it for any width, and its
+/// bits are the same on every machine.
 #[inline(always)]
 pub(super) fn expm1(x: f64) -> f64 {
     /// Adding this constant to a small number rounds it to an integer, held in the lowest bits of the sum.

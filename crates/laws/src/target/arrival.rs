@@ -10,10 +10,11 @@ use tautline_core::swarm::{Swarm, row, separation};
 /// Tolerance of `hold_s` \[s\], because times are sums and products of steps.
 const TIME_ROUNDING_S: f64 = 1e-9;
 
-/// Arrival criteria. A formation counts as reached if both limits hold to the end of the run, and at least for `hold_s`, and
-/// no vehicle is more than `edge_error_m` from its slot in the fitted formation. The fit may rotate and mirror the formation
-/// under a law that controls distances. It may translate it under a law that controls displacements. Under a law that
-/// follows a reference, the slots move with the reference.
+/// Arrival criteria. To the end of the run, and at least for `hold_s`, both limits must hold, and every vehicle must be
+/// within `edge_error_m` of its slot in the fitted formation.
+///
+/// Under a law that controls distances the fit may rotate, mirror and translate the formation. Under a law that
+/// controls displacements it may translate it. Under a law that follows a reference, the slots move with the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Arrival {
@@ -39,7 +40,8 @@ impl Default for Arrival {
 pub struct Distance {
     /// Largest error of a desired distance over the graph's edges \[m\].
     pub max_edge_error_m: f64,
-    /// Root mean square distance from the fitted formation \[m\]. The fit may rotate and mirror it if the law allows this.
+    /// Root mean square distance from the fitted formation \[m\]. The fit may rotate and mirror it if the law allows
+    /// this.
     pub rms_position_error_m: f64,
     /// Largest distance of a vehicle from its slot in the fitted formation \[m\].
     pub max_position_error_m: f64,
@@ -48,8 +50,8 @@ pub struct Distance {
 }
 
 impl Distance {
-    /// Computes the errors of a swarm with respect to a formation at the reference, fitted within `freedom`. Takes O(edges), with
-    /// the sampling of [`largest_edge_error_m`] on large complete graphs.
+    /// Computes the errors of a swarm with respect to a formation at the reference, fitted within `freedom`. Takes
+    /// O(edges), with the sampling of [`largest_edge_error_m`] on large complete graphs.
     #[must_use]
     pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
         let error = PositionError::of(&swarm.positions_m, formation, reference.position_m, freedom);
@@ -85,8 +87,9 @@ impl Distance {
 impl Arrival {
     /// Whether a swarm is within the limits, as [`Arrival::is_within`] of its [`Distance::of`].
     ///
-    /// Checks speeds first, then some edges, then positions. Checks all edges only if positions do not decide: vehicles within e
-    /// of their slots have distances within 2 e of the desired ones. O(N) except near the limits, without allocation.
+    /// Checks speeds first, then some edges, then positions. Checks all edges only if positions do not decide: vehicles
+    /// within e of their slots have distances within 2 e of the desired ones. O(N) except near the limits, without
+    /// allocation.
     #[must_use]
     pub fn holds(
         &self,

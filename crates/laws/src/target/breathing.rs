@@ -82,10 +82,11 @@ pub enum Change {
     },
 }
 
-/// Progress threshold: a root mean square speed below this fraction of (error times rate of the slowest mode) is no progress.
+/// Progress threshold: a root mean square speed below this fraction of (error times rate of the slowest mode) is no
+/// progress.
 const SLOW: f64 = 0.2;
-/// Time without progress that counts as a stall \[s\]. If longer, twice the time in which the law brings vehicles from rest to
-/// the threshold speed.
+/// Time without progress that counts as a stall \[s\]. If longer, twice the time in which the law brings vehicles from
+/// rest to the threshold speed.
 const STALLED_S: f64 = 2.0;
 /// Smallest error that justifies spreading, in units of the arrival limit.
 const WORTH: f64 = 2.0;
@@ -118,11 +119,11 @@ enum Phase {
 ///   ([`Settling`]).
 ///
 /// Slots are then scaled about their centre, or about a leader's slot. They are held at least for `hold_s`, until every
-/// vehicle is within a quarter of the smallest slot distance of its slot or there is no progress for 10 s. They close with
-/// a time constant of 2 s.
+/// vehicle is within a quarter of the smallest slot distance of its slot or there is no progress for 10 s. They close
+/// with a time constant of 2 s.
 ///
-/// Interchangeable vehicles are first reassigned to the slots with the least sum of squared distances. Slots are spread if
-/// the assignment is optimal already, or after `most` assignments on the leg.
+/// Interchangeable vehicles are first reassigned to the slots with the least sum of squared distances. Slots are spread
+/// if the assignment is optimal already, or after `most` assignments on the leg.
 #[derive(Clone, Debug)]
 pub(super) struct Breather {
     breathing: Breathing,
@@ -218,7 +219,8 @@ impl Breather {
         target.spread_formation(&leg.formation, scale, self.leader);
     }
 
-    /// Reassigns interchangeable vehicles. Returns false if no assignment is better or the limit of assignments is reached.
+    /// Reassigns interchangeable vehicles. Returns false if no assignment is better or the limit of assignments is
+    /// reached.
     fn assign(&mut self, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) -> bool {
         if !leg.interchangeable || self.assignments >= self.breathing.most {
             return false;
@@ -271,8 +273,8 @@ impl Breather {
 /// Relative decrease of the sum of squared distances that justifies a new assignment.
 const SHORTER: f64 = 1e-9;
 
-/// Returns the assignment with the least sum of squared distances if it is better than the present one; a leader keeps its
-/// slot. The result does not depend on a translation of the formation.
+/// Returns the assignment with the least sum of squared distances if it is better than the present one; a leader keeps
+/// its slot. The result does not depend on a translation of the formation.
 fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
     let found = match leader {
         Some(leader) => optimal_slots_around(positions_m, formation, leader)?,

@@ -25,8 +25,9 @@ impl Course {
         self.begun.push((time_s, leg));
     }
 
-    /// Records an assignment at a time \[s\]: on the present leg and the following ones, vehicle i goes to the slot of vehicle
-    /// `slots[i]` ([`assign_anew`]). Calls must be in order of time. Ignores `slots` that are not a permutation.
+    /// Records an assignment at a time \[s\]: on the present leg and the following ones, vehicle i goes to the slot of
+    /// vehicle `slots[i]` ([`assign_anew`]). Calls must be in order of time. Ignores `slots` that are not a
+    /// permutation.
     pub fn assign(&mut self, slots: &[usize], time_s: f64) {
         let leg = self.leg_at(time_s);
         let Some((_, legs)) = self.assigned.last() else { return };
@@ -58,8 +59,8 @@ impl Course {
         begun.map_or(0, |&(_, leg)| leg).min(self.count().saturating_sub(1))
     }
 
-    /// Returns the formations in order, as assigned, each with the time \[s\] from which it is the target; the first holds from
-    /// the start.
+    /// Returns the formations in order, as assigned, each with the time \[s\] from which it is the target; the first
+    /// holds from the start.
     #[must_use]
     pub fn formations(&self) -> Vec<(f64, &Formation)> {
         let mut times_s: Vec<f64> = self.assigned.iter().map(|&(from_s, _)| from_s).collect();

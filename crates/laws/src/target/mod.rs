@@ -47,8 +47,8 @@ impl Leg {
         Self { formation, begins: Begins::At(0.0), interchangeable: false }
     }
 
-    /// Returns the leg with its slots scaled by `scale` and rotated by `yaw_rad` (counterclockwise seen from above) about their
-    /// centre, and then moved by `offset_m`.
+    /// Returns the leg with its slots scaled by `scale` and rotated by `yaw_rad` (counterclockwise seen from above)
+    /// about their centre, and then moved by `offset_m`.
     #[must_use]
     pub fn placed(mut self, scale: f64, yaw_rad: f64, offset_m: Vector3<f64>) -> Self {
         let slots_m = &mut self.formation.slots_m;
@@ -134,8 +134,8 @@ impl CurrentTarget {
         self.spread_formation(formation, 1.0, None);
     }
 
-    /// Sets the slots within the leg to these, scaled by `spread` about the slot of a leader, or about their centre. Allocates
-    /// nothing if the number of slots stays the same.
+    /// Sets the slots within the leg to these, scaled by `spread` about the slot of a leader, or about their centre.
+    /// Allocates nothing if the number of slots stays the same.
     pub fn spread_formation(&mut self, formation: &Formation, spread: f64, leader: Option<usize>) {
         if self.formation.count() == formation.count() {
             self.formation.slots_m.copy_from(&formation.slots_m);

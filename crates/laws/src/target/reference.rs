@@ -64,8 +64,9 @@ pub enum ReferenceMotion {
         /// Period of one turn \[s\]; negative for clockwise.
         period_s: f64,
     },
-    /// From rest to rest between points along straight lines: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of the distance at the fraction x
-    /// of the time. The largest speed is 15/8 of the mean. At rest before the first and after the last point.
+    /// From rest to rest between points along straight lines: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of the distance at the
+    /// fraction x of the time. The largest speed is 15/8 of the mean. At rest before the first and after the last
+    /// point.
     WayPoints {
         /// Times \[s\] and positions \[m\], in order of time.
         points: Vec<(f64, Vector3<f64>)>,
@@ -118,8 +119,8 @@ impl ReferenceMotion {
         }
     }
 
-    /// Returns the shortest time scale of the motion \[s\]: a quarter period of a circle, the time between two way points, or
-    /// twice the shortest time between two table points.
+    /// Returns the shortest time scale of the motion \[s\]: a quarter period of a circle, the time between two way
+    /// points, or twice the shortest time between two table points.
     #[must_use]
     pub fn shortest_s(&self) -> f64 {
         let least = |times_s: &mut dyn Iterator<Item = f64>| {
@@ -201,7 +202,8 @@ struct Knot {
 }
 
 impl Spline {
-    /// Builds the spline through these points; `None` unless there is at least one, all are finite and times \[s\] increase.
+    /// Builds the spline through these points; `None` unless there is at least one, all are finite and times \[s\]
+    /// increase.
     #[must_use]
     pub fn through(points: &[(f64, Vector3<f64>)]) -> Option<Self> {
         let finite = |&(time_s, place): &(f64, Vector3<f64>)| time_s.is_finite() && place.iter().all(|x| x.is_finite());

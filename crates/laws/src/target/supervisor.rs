@@ -20,13 +20,14 @@ pub trait Supervisor: DynClone + Send {
         false
     }
 
-    /// Whether the supervisor goes through the formations of these legs in order, so that the certificate for them holds.
+    /// Whether the supervisor goes through the formations of these legs in order, so that the certificate for them
+    /// holds.
     fn keeps_to(&self, _legs: &[Leg]) -> bool {
         self.is_idle()
     }
 
-    /// Takes the last change within a leg that invalidates the certificate, which is then computed again. Returns each change
-    /// once.
+    /// Takes the last change within a leg that invalidates the certificate, which is then computed again. Returns each
+    /// change once.
     fn take_change(&mut self) -> Option<Change> {
         None
     }
@@ -42,8 +43,8 @@ pub trait Supervisor: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Supervisor);
 
-/// Goes from leg to leg by time, or when the previous leg has been reached and held. If the swarm is stalled, may reassign
-/// interchangeable vehicles or spread the slots of a leg ([`Breathing`]).
+/// Goes from leg to leg by time, or when the previous leg has been reached and held. If the swarm is stalled, may
+/// reassign interchangeable vehicles or spread the slots of a leg ([`Breathing`]).
 #[derive(Clone, Debug)]
 pub struct Schedule {
     legs: Vec<Leg>,
@@ -79,8 +80,8 @@ impl Schedule {
         self
     }
 
-    /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled. `settling`
-    /// describes the law. Call after [`Schedule::free_by`].
+    /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled.
+    /// `settling` describes the law. Call after [`Schedule::free_by`].
     #[must_use]
     pub fn breathing(mut self, breathing: Breathing, settling: Settling, leader: Option<usize>) -> Self {
         self.breather =
@@ -88,8 +89,8 @@ impl Schedule {
         self
     }
 
-    /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps all
-    /// vehicles off their slots. Call after [`Schedule::breathing`].
+    /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps
+    /// all vehicles off their slots. Call after [`Schedule::breathing`].
     #[must_use]
     pub fn blown(mut self, is_blown: bool) -> Self {
         if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {

@@ -10,8 +10,8 @@ use super::spec::WindSpec;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, set_row};
 
-/// Rate at which turbulence is drawn \[Hz\]; in between it is linear. At 20 m/s the smallest length scale of 3 m gets 39
-/// samples, and less than 1 % of the variance is lost.
+/// Rate at which turbulence is drawn \[Hz\]; in between it is linear. At 20 m/s the smallest length scale of 3 m gets
+/// 39 samples, and less than 1 % of the variance is lost.
 const TURBULENCE_HZ: f64 = 256.0;
 
 /// First random stream of the wind, separate from other users of the same seed.
@@ -60,7 +60,8 @@ impl Wind {
         self.now_s
     }
 
-    /// Returns the next time \[s\] at which turbulence changes slope. Until then only gusts change the derivative of the wind.
+    /// Returns the next time \[s\] at which turbulence changes slope. Until then only gusts change the derivative of
+    /// the wind.
     #[must_use]
     pub fn next_turn_s(&self, time_s: f64) -> f64 {
         // A change within rounding of `time_s` counts as passed.

@@ -21,8 +21,8 @@ const SHORT: f64 = 1e-3;
 /// ```
 ///
 /// u is along the horizontal part of the mean wind (along x without one), v across it and w up. The air is frozen and
-/// carried past vehicles at the mean wind's speed V, and at 1 m/s at least. With x = V|t|/L the correlation over a time t
-/// is sigma^2 e^-x for u and sigma^2 e^-x (1 - x/2) for v and w.
+/// carried past vehicles at the mean wind's speed V, and at 1 m/s at least. With x = V|t|/L the correlation over a time
+/// t is sigma^2 e^-x for u and sigma^2 e^-x (1 - x/2) for v and w.
 #[derive(Clone, Copy, Debug, serde::Deserialize, PartialEq, serde::Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(description = "Intensity and length scales of the turbulence.")]
@@ -102,8 +102,11 @@ impl Along {
 /// y+ = p (y + d x) + l21 xi1 + l22 xi2,   x+ = p x + l11 xi1,   out = sqrt 3 x + (1 - sqrt 3) y
 /// ```
 ///
-/// with the Cholesky factors of the covariance of the noise of a step,
-/// Q11 = (1 - p^2)/2, Q12 = (1 - (1 + 2d) p^2)/4, Q22 = (1 - (1 + 2d + 2d^2) p^2)/4.
+/// with the Cholesky factors of the covariance of the noise of a step:
+///
+/// ```text
+/// Q11 = (1 - p^2)/2,   Q12 = (1 - (1 + 2d) p^2)/4,   Q22 = (1 - (1 + 2d + 2d^2) p^2)/4
+/// ```
 #[derive(Clone, Copy, Debug)]
 struct Across {
     p: f64,

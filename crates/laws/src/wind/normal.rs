@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-/// Generator of normal numbers of mean 0 and variance 1: Box-Muller pairs from `ChaCha8` words, with `libm` functions only.
+/// Generator of normal numbers of mean 0 and variance 1: Box-Muller pairs from `ChaCha8` words, with `libm` functions
+/// only.
 #[derive(Clone, Debug)]
 pub struct Normals {
     random: ChaCha8Rng,

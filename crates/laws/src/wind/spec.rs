@@ -23,7 +23,8 @@ pub struct WindSpec {
     #[serde(rename = "gust", skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("default" = []))]
     pub gusts: Vec<Gust>,
-    /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed and at least at 1 m/s.
+    /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed and at least at
+    /// 1 m/s.
     #[serde(rename = "dryden", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Dryden")]
     pub turbulence: Option<Dryden>,
@@ -46,8 +47,8 @@ impl Default for WindSpec {
 /// V/2 (1 + cos(pi (t - t_fall)/fall))      for fall seconds from there, t_fall = at + rise + hold
 /// ```
 ///
-/// Without a hold and with equal slopes this is the gust of airworthiness rules, a full period of 1 - cos. A hold to the end
-/// of the run gives the gust of MIL-F-8785C, which rises and stays.
+/// Without a hold and with equal slopes this is the gust of airworthiness rules, a full period of 1 - cos. A hold to
+/// the end of the run gives the gust of MIL-F-8785C, which rises and stays.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(description = "Gust that rises to a velocity as 1 - cos, holds it, and falls back in the same way.")]
@@ -169,8 +170,8 @@ impl WindSpec {
         met.fold(self.mean_m_s, |sum, gust| sum + gust.share(time_s) * gust.velocity_m_s)
     }
 
-    /// Returns an upper bound of the speed of the air at any vehicle \[m/s\]. With turbulence, which is unbounded, the bound is an
-    /// estimate that is rarely exceeded.
+    /// Returns an upper bound of the speed of the air at any vehicle \[m/s\]. With turbulence, which is unbounded, the
+    /// bound is an estimate that is rarely exceeded.
     #[must_use]
     pub fn fastest_m_s(&self) -> f64 {
         let gusts: f64 = self.gusts.iter().map(|gust| gust.velocity_m_s.norm()).sum();

@@ -11,7 +11,7 @@ fn slots(drawing: Result<Drawing, DrawingError>, count: usize) -> Formation {
     drawing.and_then(|drawing| drawing.slots(count)).expect("a drawing")
 }
 
-/// Distance of each slot to its nearest one, smallest first.
+/// Returns the distance of each slot to its nearest one, smallest first.
 fn nearest_m(formation: &Formation) -> Vec<f64> {
     let count = formation.count();
     let others = |i: usize| (0..count).filter(move |&j| j != i);
@@ -21,20 +21,20 @@ fn nearest_m(formation: &Formation) -> Vec<f64> {
     nearest
 }
 
-/// Whether all slots are about as far from their nearest one, as no dot of an i is.
+/// Whether all slots have about the same distance to their nearest one.
 fn is_even(formation: &Formation) -> bool {
     let nearest_m = nearest_m(formation);
     let median_m = nearest_m[nearest_m.len() / 2];
     nearest_m[0] > 0.65 * median_m && nearest_m[nearest_m.len() - 1] < 1.6 * median_m
 }
 
-/// Number of slots in a part of the drawing, in parts of its longer side from its middle.
+/// Returns the number of slots in a part of the drawing. Coordinates are relative to its centre and longer side.
 fn within(formation: &Formation, x: std::ops::Range<f64>, y: std::ops::Range<f64>) -> usize {
     let slots_m = &formation.slots_m;
     (0..formation.count()).filter(|&i| x.contains(&slots_m[(i, 0)]) && y.contains(&slots_m[(i, 1)])).count()
 }
 
-/// A picture whose pixels are given by column and row from above.
+/// Returns a PNG file whose pixels are given by column and row from above.
 fn png(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
@@ -95,7 +95,7 @@ fn the_same_drawing_has_the_same_slots_and_neighbours_have_near_numbers() {
 
 #[test]
 fn letters_have_their_forms_side_by_side() {
-    // Upright of L on the left, foot below, nothing at the upper right; T the other way about.
+    // The upright of L is on the left and its foot below, with nothing at the upper right. T is the opposite.
     let l = slots(Drawing::text("L"), 30);
     assert_eq!(within(&l, 0.0..1.0, -0.3..1.0), 0);
     assert!(within(&l, -1.0..-0.1, -0.3..1.0) > 12 && within(&l, 0.0..1.0, -1.0..-0.4) > 3);
@@ -125,7 +125,7 @@ fn an_svg_file_is_drawn_as_it_looks() {
     let outline = slots(Ok(drawing), 30);
     let on_it = |x: f64, y: f64| (x.abs() - 0.5).abs() < 1e-6 || (y.abs() - 0.25).abs() < 1e-6;
     assert!((0..30).all(|i| on_it(outline.slots_m[(i, 0)], outline.slots_m[(i, 1)])));
-    // y counts downwards: the tip is above.
+    // y points downwards in SVG, so the tip is above.
     let tip = slots(Drawing::svg(file("<polygon points='50,0 100,100 0,100'/>").as_bytes(), true), 60);
     assert!(within(&tip, -1.0..1.0, 0.0..1.0) < 20);
     for nothing in [
@@ -140,7 +140,7 @@ fn an_svg_file_is_drawn_as_it_looks() {
 
 #[test]
 fn a_picture_is_drawn_where_its_ink_is() {
-    // Dark on the upper left of white, with a frame that is cropped.
+    // Dark on the upper left of white, with a margin that is cropped.
     let dark =
         png(60, 60, |x, y| if (10..50).contains(&x) && (10..50).contains(&y) && x + y < 60 { BLACK } else { WHITE });
     let corner = slots(Drawing::png(&dark, None), 50);

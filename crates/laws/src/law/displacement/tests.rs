@@ -38,8 +38,8 @@ fn graphs() -> [Graph; 5] {
     [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7), all_but_one]
 }
 
-/// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
-/// the sum of `|w_i|^2` added to `fed`.
+/// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the
+/// integral of the sum of `|w_i|^2` added to `fed`.
 fn pushed(
     swarm: &Swarm,
     dt_s: f64,
@@ -68,8 +68,8 @@ fn pushed(
     }
 }
 
-/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly: the push 2 zeta v~ adds all that the bound allows, one half or
-/// twice as strong less, and one against v~ takes energy away.
+/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly: the push 2 zeta v~ adds all that the bound allows, one
+/// half or twice as strong less, and one against v~ takes energy away.
 #[test]
 fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> {
     let (links, formation) = (Graph::complete(7), Formation::grid(7, 2.0));
@@ -231,8 +231,8 @@ fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
     assert_eq!(law.rates(&RateQuery::new(A22_PER_S, None)).fastest_per_s, None);
 }
 
-/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how far that
-/// rises above its start, as a share of it, where the force is made by `push`.
+/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how
+/// far that rises above its start, as a share of it, where the force is made by `push`.
 fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
     const STEP_S: f64 = 2e-4;
     let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or(0.0, |(_, of_pair)| of_pair);

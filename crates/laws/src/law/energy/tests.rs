@@ -36,7 +36,8 @@ fn a_short_gust_adds_to_the_root() {
     // About the mean of four a push of one is the less by 3/4 in its square.
     let (large, mean) = (bounded(&wind, Frame::Ground, 1e6), bounded(&wind, Frame::Mean, 1e6));
     assert!(((mean.energy - 1e6) / (large.energy - 1e6) - 0.75).abs() < 1e-3);
-    // 1/4 zeta of the integral of the square of a slope, 3/8 of its length, and of what is held: within the parts' 0.3 %.
+    // 1/4 zeta of the integral of the square of a slope, 3/8 of its length, and of what is held: within the parts' 0.3
+    // %.
     let exact = 0.25 * (2.0 * 2.0 * 0.375 + 1.0) / 3.2;
     let ratio = (large.energy - 1e6) / exact;
     assert!((1.0..1.003).contains(&ratio), "{ratio}");

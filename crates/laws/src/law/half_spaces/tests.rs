@@ -18,8 +18,8 @@ fn nearest(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Nearest {
     HalfSpaces { given: given.to_vec(), ..HalfSpaces::default() }.nearest(wish, radius)
 }
 
-/// Minimises `1/2 curvature |x|^2 + linear . x` over x, whose first three components are in the ball, with `rows . x <= limits`;
-/// `None` where clarabel does not come to an end, as in one of some thousand sets that are nearly flat.
+/// Minimises `1/2 curvature |x|^2 + linear . x` over x, whose first three components are in the ball, with `rows . x <=
+/// limits`; `None` where clarabel does not come to an end, as in one of some thousand sets that are nearly flat.
 fn clarabel<const N: usize>(
     mut rows: Vec<[f64; N]>,
     mut limits: Vec<f64>,
@@ -64,8 +64,8 @@ fn shifted(given: &[HalfSpace], by: f64) -> Vec<HalfSpace> {
     given.iter().map(|given| HalfSpace { offset: given.offset + by, ..*given }).collect()
 }
 
-/// Whether an answer is clarabel's: in the ball, with the least largest violation, and as near as any such point; where the set
-/// of these has no inside, no nearer than a wider set, in which the answer is clarabel's.
+/// Whether an answer is clarabel's: in the ball, with the least largest violation, and as near as any such point; where
+/// the set of these has no inside, no nearer than a wider set, in which the answer is clarabel's.
 fn check(given: &[HalfSpace], wish: Vector3<f64>, radius: f64, found: Nearest) -> Result<(), String> {
     let expect = |holds: bool, said: &str| if holds { Ok(()) } else { Err(format!("{said}: {found:?}")) };
     expect(found.point.norm() <= radius * (1.0 + 1e-12), "outside of the ball")?;
@@ -95,7 +95,8 @@ fn general() -> impl Strategy<Value = Vec<HalfSpace>> {
     prop::collection::vec((normals(), -1.0..0.7_f64).prop_map(|(normal, offset)| half_space(normal, offset)), 0..9)
 }
 
-/// Planes along the axes and diagonals: parallel ones, opposite ones, the same one again; turned by up to one of these angles.
+/// Planes along the axes and diagonals: parallel ones, opposite ones, the same one again; turned by up to one of these
+/// angles.
 fn degenerate(turned: &'static [f64]) -> impl Strategy<Value = Vec<HalfSpace>> {
     let whole = prop::array::uniform3(-1..2_i32).prop_filter("a direction", |v| *v != [0; 3]);
     let one = (whole, prop::sample::select(turned), -3..3_i32).prop_map(|(v, by, offset)| {

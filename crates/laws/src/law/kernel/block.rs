@@ -1,15 +1,15 @@
 //! Evaluation of the edge tension for a block of edges, stage by stage.
 //!
-//! The pull between two vehicles takes a chain of some forty dependent operations. A stage is a short part of the chain for
-//! all edges of a block, so the processor overlaps the operations of many edges.
+//! The pull between two vehicles takes a chain of some forty dependent operations. A stage is a short part of the chain
+//! for all edges of a block, so the processor overlaps the operations of many edges.
 #![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
 
 use pulp::Simd;
 
 use crate::law::tension::{self, OutOfDomain};
 
-/// Number of partial sums of a long sum, independent of the machine's vector width. Edges are processed in groups of this
-/// size, so tables of edges or vehicles are padded to a multiple of it.
+/// Number of partial sums of a long sum, independent of the machine's vector width. Edges are processed in groups of
+/// this size, so tables of edges or vehicles are padded to a multiple of it.
 pub(super) const LANES: usize = 8;
 
 pub(super) type Lanes = [f64; LANES];
@@ -33,8 +33,8 @@ pub(super) struct Block<const B: usize> {
     is_inside: bool,
 }
 
-/// Other ends of `count` edges. Each slice has whole lanes. Padding lanes have any 1/K, positions at [`NOWHERE_M`] (pull
-/// with weight 0), and sums that no vehicle reads.
+/// Other ends of `count` edges. Each slice has whole lanes. Padding lanes have any 1/K, positions at [`NOWHERE_M`]
+/// (pull with weight 0), and sums that no vehicle reads.
 pub(super) struct Ends<'a> {
     pub(super) count: usize,
     pub(super) inverse_k_per_m: &'a [f64],
@@ -51,8 +51,8 @@ impl<const B: usize> Block<B> {
         Self { delta_m, edges: [zeros; 3], lengths_m: zeros, scaled: zeros, decays: zeros, potential, is_inside: false }
     }
 
-    /// Subtracts the pull of each edge on a vehicle at `own` \[m\] from the sums of its other end. The pull is `w_ij/alpha`
-    /// times the edge, with `w_ij = V'/l`. Returns the pulls along each axis, in whole lanes.
+    /// Subtracts the pull of each edge on a vehicle at `own` \[m\] from the sums of its other end. The pull is
+    /// `w_ij/alpha` times the edge, with `w_ij = V'/l`. Returns the pulls along each axis, in whole lanes.
     #[inline(always)]
     pub(super) fn pull<S: Simd>(&mut self, simd: S, own: [f64; 3], to: Ends<'_>) -> [&[f64]; 3] {
         let lanes = to.inverse_k_per_m.len();
@@ -70,7 +70,8 @@ impl<const B: usize> Block<B> {
         [&x[..lanes], &y[..lanes], &z[..lanes]]
     }
 
-    /// Returns (1/alpha) times the sum of V. Fails if an edge is not longer than delta or a position gives no finite value.
+    /// Returns (1/alpha) times the sum of V. Fails if an edge is not longer than delta or a position gives no finite
+    /// value.
     #[inline(always)]
     pub(super) fn finish(self) -> Result<f64, OutOfDomain> {
         let potential = total(self.potential);

@@ -114,8 +114,8 @@ fn determinant(
     .determinant()
 }
 
-/// Whether some root is to the right of the imaginary axis, but for those at the origin: turns of the determinant along the
-/// edge of a large half disc, a little off the axis (the principle of the argument).
+/// Whether some root is to the right of the imaginary axis, but for those at the origin: turns of the determinant along
+/// the edge of a large half disc, a little off the axis (the principle of the argument).
 fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> bool {
     const PARTS: u32 = 60_000;
     const RADIUS: f64 = 60.0;

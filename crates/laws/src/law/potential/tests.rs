@@ -111,8 +111,8 @@ fn no_more_push_a_vehicle_than_balls_fit_around_it() {
         let law = law(&Graph::star(count), &Formation::grid(count, 2.0));
         law.rates(&RateQuery::new(A22_PER_S, Some(0.75 * law.range_m))).fastest_per_s.expect("a rate")
     };
-    // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by their volume, one of them
-    // the vehicle's own.
+    // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by their volume, one
+    // of them the vehicle's own.
     assert!(rate_per_s(49) < rate_per_s(50));
     assert_eq!(rate_per_s(50), rate_per_s(300));
 }

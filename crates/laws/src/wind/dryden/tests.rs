@@ -55,8 +55,8 @@ fn correlations_are_those_of_the_formula() {
     }
 }
 
-/// A published way to make the same turbulence: the filter's differential equation under white noise of variance 1 a step,
-/// which is not scaled by the step. It has another variance at every step.
+/// A published way to make the same turbulence: the filter's differential equation under white noise of variance 1 a
+/// step, which is not scaled by the step. It has another variance at every step.
 #[test]
 fn white_noise_that_is_not_scaled_by_the_step_has_another_variance() {
     let naive = |d: f64| {
