@@ -147,13 +147,14 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn no_other_order_has_a_smaller_sum(
+        fn assignment_is_optimal(
             positions in prop::collection::vec(-5.0..5.0_f64, 18), slots in prop::collection::vec(-5.0..5.0_f64, 18),
         ) {
             let (positions_m, formation) =
                 (Rows::from_column_slice(&positions), Formation::points(Rows::from_column_slice(&slots)));
             let found = optimal_slots(&positions_m, &formation, Freedom::Translation).expect("finite numbers");
-            let least = orders(6).iter().map(|order| sum(&positions_m, &formation, order)).fold(f64::INFINITY, f64::min);
+            let sums = orders(6).into_iter().map(|order| sum(&positions_m, &formation, &order));
+            let least = sums.fold(f64::INFINITY, f64::min);
             prop_assert!((sum(&positions_m, &formation, &found) - least).abs() < 1e-9 * (1.0 + least));
             // Monge property: relative positions of vehicles and of their slots never point in opposite directions.
             let given = formation.reordered(&found);
@@ -166,7 +167,7 @@ mod tests {
         }
 
         #[test]
-        fn around_a_leader_no_other_order_of_the_others_has_a_smaller_sum(
+        fn assignment_around_a_leader_is_optimal(
             positions in prop::collection::vec(-5.0..5.0_f64, 15), slots in prop::collection::vec(-5.0..5.0_f64, 15),
             leader in 0..5_usize,
         ) {
@@ -194,14 +195,15 @@ mod tests {
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
             let flip = if mirror { -1.0 } else { 1.0 };
             let shuffled = formation.reordered(&[3, 0, 4, 2, 1]);
-            let moved = map(&shuffled.slots_m, |slot| turn * Vector3::new(slot.x, flip * slot.y, 0.0) + Vector3::repeat(9.0));
+            let motion = |slot: Vector3<f64>| turn * Vector3::new(slot.x, flip * slot.y, 0.0) + Vector3::repeat(9.0);
+            let moved = map(&shuffled.slots_m, motion);
             let found = optimal_slots(&moved, &formation, Freedom::RigidMotion).expect("finite numbers");
             prop_assert_eq!(found, [3, 0, 4, 2, 1]);
         }
     }
 
     #[test]
-    fn what_cannot_be_assigned_is_not() {
+    fn invalid_assignments_return_none() {
         let formation = Formation::line(3, 1.0);
         assert_eq!(optimal_slots(&Rows::zeros(2), &formation, Freedom::Translation), None);
         let lost = Rows::from_element(3, f64::NAN);

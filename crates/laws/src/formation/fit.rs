@@ -171,7 +171,7 @@ fn is_bounded(graph: &Graph) -> bool {
 
 /// Largest error of a desired distance over the edges of the graph, `max |l_ij - d_ij|` \[m\]; 0 without edges.
 ///
-/// On a complete graph of more than a million edges (1414 vehicles) it is an upper bound, in O(N): the error of a
+/// On a complete graph of more than a million edges (1414 vehicles) it is an upper bound, in O(N). The error of a
 /// distance is at most the sum of the distances of its two vehicles from their slots. The bound adds the two largest of
 /// these distances after [`best_rigid_motion`](super::best_rigid_motion). Two vehicles displaced in opposite directions
 /// attain it.

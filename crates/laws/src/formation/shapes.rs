@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_v_that_is_too_narrow_has_slots_nearer_than_the_spacing() {
+    fn a_too_narrow_v_has_slots_nearer_than_the_spacing() {
         assert!(nearest_m(&Formation::v(3, 2.0, 0.9 * NARROWEST_V_RAD)) < 1.9);
     }
 
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wedge_has_rows_of_1_2_3_and_a_last_one_in_the_middle() {
+    fn a_wedge_has_rows_of_1_2_3_and_a_centred_last_row() {
         let rows_of = |count| {
             let wedge = Formation::wedge(count, 1.0).slots_m;
             (0..count).map(|i| (-wedge[(i, 0)] / 0.75_f64.sqrt()).round()).collect::<Vec<_>>()
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn rings_hold_1_6_12_and_the_last_is_even() {
+    fn rings_have_1_6_12_slots_and_an_even_last_ring() {
         let rings = Formation::rings(1 + 6 + 12 + 3, 2.0);
         let radii: Vec<f64> = (0..22).map(|i| row(&rings.slots_m, i).norm().round()).collect();
         assert_eq!(radii, [vec![0.0], vec![2.0; 6], vec![4.0; 12], vec![6.0; 3]].concat());
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_helix_rises_by_its_pitch_and_knows_its_nearest_slots() {
+    fn a_helix_rises_by_its_pitch_and_gives_its_smallest_slot_distance() {
         let (radius_m, pitch_m) = (3.0, 0.5);
         let helix = Formation::helix(13, radius_m, pitch_m, TAU / 12.0);
         assert!((row(&helix.slots_m, 12) - Vector3::new(radius_m, 0.0, pitch_m)).norm() < ROUNDING);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_is_as_wide_as_deep_as_high() {
+    fn a_cube_has_equal_sides() {
         let cube = Formation::cube(1000, 2.0).slots_m;
         assert_eq!(row(&cube, 999), Vector3::repeat(18.0));
         assert_eq!(row(&Formation::cube(9, 1.0).slots_m, 8), Vector3::new(2.0, 0.0, 1.0));

@@ -25,12 +25,12 @@ const MOST_VISITS: u64 = 4_000_000_000;
 pub(super) struct Operator<'a> {
     graph: &'a Graph,
     pinning: &'a Pinning,
-    near: Near,
+    preconditioner: Preconditioner,
     visits: u64,
 }
 
 /// Preconditioner: an approximation of M that is quick to solve.
-enum Near {
+enum Preconditioner {
     Tree(SpanningTree),
     /// Diagonal of M.
     Diagonal(Vec<f64>),
@@ -39,19 +39,21 @@ enum Near {
 impl<'a> Operator<'a> {
     /// Builds the operator of a connected graph.
     pub(super) fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
-        let near = SpanningTree::where_it_pays(graph, pinning).map_or_else(
+        let preconditioner = SpanningTree::new_if_worthwhile(graph, pinning).map_or_else(
             || {
                 let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
-                Near::Diagonal(degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect())
+                Preconditioner::Diagonal(
+                    degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect(),
+                )
             },
-            Near::Tree,
+            Preconditioner::Tree,
         );
-        Self { graph, pinning, near, visits: 0 }
+        Self { graph, pinning, preconditioner, visits: 0 }
     }
 
     /// Exhausts the work limit.
     #[cfg(test)]
-    pub(super) fn tire(&mut self) {
+    pub(super) fn exhaust(&mut self) {
         self.visits = MOST_VISITS + 1;
     }
 
@@ -154,7 +156,7 @@ impl<'a> Operator<'a> {
                 self.solve(eigenvalues[k], x.as_mut_slice())?;
             }
             let added = &next - &block * block.tr_mul(&next);
-            searched = beside(&[&next, &solved, &added]);
+            searched = concatenated(&[&next, &solved, &added]);
             block = next;
         }
     }
@@ -167,7 +169,7 @@ impl<'a> Operator<'a> {
         let mut image = vec![0.0; x.len()];
         self.product(&y, &mut image);
         let mut residual: Vec<f64> = x.iter().zip(&image).map(|(x, image)| x - image).collect();
-        let mut z = self.nearly_solved(&residual);
+        let mut z = self.preconditioned(&residual);
         let mut direction = z.clone();
         let (mut size, enough) = (dot(&residual, &z), (SOLVED * SOLVED) * dot(x, x));
         for _ in 0..10 * x.len() {
@@ -181,7 +183,7 @@ impl<'a> Operator<'a> {
             let step = size / dot(&direction, &image);
             y.iter_mut().zip(&direction).for_each(|(y, d)| *y += step * d);
             residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
-            z = self.nearly_solved(&residual);
+            z = self.preconditioned(&residual);
             let next = dot(&residual, &z);
             direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + next / size * *d);
             size = next;
@@ -191,14 +193,16 @@ impl<'a> Operator<'a> {
         Some(())
     }
 
-    fn nearly_solved(&mut self, residual: &[f64]) -> Vec<f64> {
+    fn preconditioned(&mut self, residual: &[f64]) -> Vec<f64> {
         let mut near = residual.to_vec();
-        match &self.near {
-            Near::Tree(tree) => {
+        match &self.preconditioner {
+            Preconditioner::Tree(tree) => {
                 self.visits += 2 * residual.len() as u64;
                 tree.solve(&mut near);
             }
-            Near::Diagonal(diagonal) => near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal),
+            Preconditioner::Diagonal(diagonal) => {
+                near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal)
+            }
         }
         self.project(&mut near);
         near
@@ -206,7 +210,7 @@ impl<'a> Operator<'a> {
 }
 
 /// Concatenates the columns of matrices with equal numbers of rows.
-fn beside(blocks: &[&DMatrix<f64>]) -> DMatrix<f64> {
+fn concatenated(blocks: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.column_iter()).collect();
     DMatrix::from_columns(&columns)
 }
@@ -217,7 +221,7 @@ mod tests {
 
     /// Eigenvalues close to each other: the legs of a spider, and a path with every third vehicle pinned.
     #[test]
-    fn crowded_eigenvalues_are_solved_and_not_bounded() {
+    fn clustered_eigenvalues_are_solved_accurately() {
         let solved = |graph: &Graph, pinning: &Pinning| {
             Operator::new(graph, pinning, &graph.degrees()).inverse_iteration().expect("solved")
         };
@@ -244,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn long_thin_graphs_of_thousands_are_solved_and_not_bounded() {
+    fn long_thin_graphs_are_solved_accurately() {
         let count = 10_000;
         let path = Graph::path(count);
         let degrees = vec![2; count];
@@ -267,9 +271,12 @@ mod tests {
 
     /// Exact least eigenvalue of a ring of N vehicles with vehicle 0 pinned.
     ///
-    /// `x_k = cos(q (N/2 - k))` has the eigenvalue 2 - 2 cos q at every other vehicle. At vehicle 0 this requires `2
-    /// (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2)`, solved for the smallest q by
-    /// bisection.
+    /// `x_k = cos(q (N/2 - k))` has the eigenvalue 2 - 2 cos q at every other vehicle. At vehicle 0 this requires the
+    /// following equation, solved for the smallest q by bisection:
+    ///
+    /// ```text
+    /// 2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2)
+    /// ```
     fn ring_pinned_at_one(count: usize) -> f64 {
         let half = 0.5 * count as f64;
         let off = |q: f64| {

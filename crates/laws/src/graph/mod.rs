@@ -26,12 +26,12 @@ pub use pinning::Pinning;
 pub struct Graph {
     count: usize,
     edges: Edges,
-    known: Arc<Known>,
+    cache: Arc<EigenvalueCache>,
 }
 
 /// Cache of eigenvalues, shared by copies of a graph and ignored by comparisons.
 #[derive(Debug, Default)]
-struct Known {
+struct EigenvalueCache {
     algebraic: OnceLock<f64>,
     /// Value of the first pinning that was queried.
     pinned: OnceLock<(Pinning, f64)>,
@@ -39,13 +39,13 @@ struct Known {
     bounded: OnceLock<()>,
 }
 
-impl PartialEq for Known {
+impl PartialEq for EigenvalueCache {
     fn eq(&self, _other: &Self) -> bool {
         true
     }
 }
 
-impl Eq for Known {}
+impl Eq for EigenvalueCache {}
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Edges {
@@ -116,7 +116,7 @@ impl Graph {
     /// Returns the complete graph: every pair of vehicles is joined.
     #[must_use]
     pub fn complete(count: usize) -> Self {
-        Self { count, edges: Edges::All, known: Arc::default() }
+        Self { count, edges: Edges::All, cache: Arc::default() }
     }
 
     /// Returns the star about vehicle 0: it is joined to all others, and they are not joined to each other.
@@ -188,7 +188,7 @@ impl Graph {
         for i in 0..count {
             offsets[i + 1] += offsets[i];
         }
-        Self { count, edges: Edges::Listed { offsets, neighbours }, known: Arc::default() }
+        Self { count, edges: Edges::Listed { offsets, neighbours }, cache: Arc::default() }
     }
 
     /// Number of vehicles N.

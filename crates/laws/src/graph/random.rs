@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_random_graph_is_connected_and_has_the_edges_that_are_asked_for() {
+    fn a_random_graph_is_connected_and_has_the_given_number_of_edges() {
         for count in [1, 2, 3, 7, 40] {
             let all = pair_count(count);
             for edges in
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn extra_edges_join_any_two_alike() {
+    fn extra_edges_are_uniformly_distributed() {
         // Count how often each pair of 6 vehicles is joined in 2,000 graphs. With 8 edges the edges are drawn, with 12
         // the missing pairs.
         for edges in [8, 12] {
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_graph_that_lacks_few_pairs_is_drawn_by_them() {
+    fn a_nearly_complete_graph_is_drawn_by_its_missing_pairs() {
         let drawn = std::cell::Cell::new(0);
         let mut numbers = numbers(5);
         let counted = |end: usize| {

@@ -37,16 +37,16 @@ impl Graph {
     #[must_use]
     pub fn pinned_connectivity(&self, pinning: &Pinning) -> f64 {
         if *pinning == Pinning::Nobody {
-            return *self.known.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
+            return *self.cache.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
         }
-        let (first, least) = self.known.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
+        let (first, least) = self.cache.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
         if first == pinning { *least } else { self.least_eigenvalue(pinning) }
     }
 
     /// Whether a lower bound replaced a connectivity that was queried before, on this graph or on a copy.
     #[must_use]
     pub fn connectivity_is_bound(&self) -> bool {
-        self.known.bounded.get().is_some()
+        self.cache.bounded.get().is_some()
     }
 
     fn least_eigenvalue(&self, pinning: &Pinning) -> f64 {
@@ -69,12 +69,12 @@ impl Graph {
     /// Marks the connectivity as a bound, so that tests of reports need no graph that takes half a minute.
     #[doc(hidden)]
     pub fn pretend_a_bound(&self) {
-        self.known.bounded.get_or_init(|| ());
+        self.cache.bounded.get_or_init(|| ());
     }
 
     fn solved_or_bounded(&self, pinning: &Pinning, operator: &mut Operator<'_>) -> f64 {
         operator.inverse_iteration().unwrap_or_else(|| {
-            self.known.bounded.get_or_init(|| ());
+            self.cache.bounded.get_or_init(|| ());
             let count = self.count() as f64;
             if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
         })
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_forms_are_the_eigenvalues_of_the_matrix() {
+    fn closed_forms_match_the_eigenvalues_of_the_matrix() {
         for count in 2..12 {
             for graph in [Graph::complete(count), Graph::star(count), Graph::ring(count), Graph::path(count)] {
                 let eigenvalues = dense(&graph);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_graph_without_a_name_has_the_eigenvalue_of_its_matrix() {
+    fn connectivity_of_a_large_general_graph_matches_the_dense_solver() {
         for (count, extra) in [(450, 0), (450, 60), (450, 900)] {
             let graph = random(count, extra);
             let eigenvalues = dense(&graph);
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn pinned_graphs_have_the_least_eigenvalue_of_their_matrix() {
+    fn pinned_connectivity_matches_the_dense_solver() {
         for count in 2..12 {
             for graph in [Graph::complete(count), Graph::star(count), Graph::ring(count), Graph::path(count)] {
                 for pinning in pinnings(count) {
@@ -285,28 +285,28 @@ mod tests {
         assert_eq!(apart.pinned_connectivity(&Pinning::All), 0.0);
         let star = Graph::star(9);
         let bounds = [Pinning::Leader(0), Pinning::Leader(3), Pinning::All].map(|p| star.largest_eigenvalue_bound(&p));
-        assert_eq!(bounds, [1.0, 9.0, 10.0], "whoever hears a leader in the middle hears nobody else");
+        assert_eq!(bounds, [1.0, 9.0, 10.0], "followers of a leader at the hub have no other neighbour");
     }
 
     #[test]
-    fn a_bound_stands_in_where_the_work_is_too_much_and_the_graph_says_so() {
+    fn a_lower_bound_replaces_the_connectivity_at_the_work_limit() {
         let graph = random(420, 0);
         let exact = graph.algebraic_connectivity();
         assert!(!graph.connectivity_is_bound());
-        let mut tired = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
-        tired.tire();
+        let mut exhausted = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
+        exhausted.exhaust();
         let copy = graph.clone();
-        let bound = copy.solved_or_bounded(&Pinning::Nobody, &mut tired);
+        let bound = copy.solved_or_bounded(&Pinning::Nobody, &mut exhausted);
         assert!(0.0 < bound && bound <= exact && graph.connectivity_is_bound(), "{bound} {exact}");
         let (leader, exact) = (Pinning::Leader(7), least(&graph, &Pinning::Leader(7)));
-        let mut tired = Operator::new(&graph, &leader, &graph.degrees());
-        tired.tire();
-        let bound = graph.solved_or_bounded(&leader, &mut tired);
+        let mut exhausted = Operator::new(&graph, &leader, &graph.degrees());
+        exhausted.exhaust();
+        let bound = graph.solved_or_bounded(&leader, &mut exhausted);
         assert!(0.0 < bound && bound <= exact, "{bound} {exact}");
     }
 
     #[test]
-    fn large_pinned_graphs_without_a_name_have_the_eigenvalue_of_their_matrix() {
+    fn connectivity_of_large_pinned_graphs_matches_the_dense_solver() {
         let graph = random(420, 60);
         for pinning in [Pinning::Listed(vec![3, 200, 400]), Pinning::Leader(7)] {
             let (found, expected) = (graph.pinned_connectivity(&pinning), least(&graph, &pinning));

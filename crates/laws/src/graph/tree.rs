@@ -16,19 +16,19 @@ pub(super) struct SpanningTree {
 
 /// Factor of the choice of preconditioner: the tree is used if `54 lacks <= reach^2`.
 ///
-/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work, where `2
-/// lacks reach` bounds the sum of tree distances across the edges that the tree lacks. With the diagonal they need
-/// about `reach` iterations. Hence 3 (2 lacks reach)^(1/3) <= reach.
-const PAYS: usize = 54;
+/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work. Here
+/// `2 lacks reach` bounds the sum of tree distances across the `lacks` edges beyond the tree. With the diagonal they
+/// need about `reach` iterations. The tree is faster if `3 (2 lacks reach)^(1/3) <= reach`.
+const THRESHOLD: usize = 54;
 
 impl SpanningTree {
     /// Returns the tree if it is the faster preconditioner: on long thin graphs and on graphs with few edges beyond a
     /// tree.
-    pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
+    pub(super) fn new_if_worthwhile(graph: &Graph, pinning: &Pinning) -> Option<Self> {
         let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
         let neighbours = Neighbours::of(graph);
         let reach = neighbours.reach(pinning);
-        (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
+        (THRESHOLD.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
     }
 
     /// Builds the tree of a connected graph with at least one vehicle, breadth first from a leader or from vehicle 0.
@@ -145,23 +145,23 @@ mod tests {
     }
 
     #[test]
-    fn trees_lead_on_long_thin_graphs_alone() {
-        let pays = |graph: &Graph, pinning: &Pinning| SpanningTree::where_it_pays(graph, pinning).is_some();
+    fn the_tree_is_chosen_on_long_thin_graphs() {
+        let is_chosen = |graph: &Graph, pinning: &Pinning| SpanningTree::new_if_worthwhile(graph, pinning).is_some();
         let half = |graph: &Graph| Pinning::Listed((0..graph.count()).step_by(2).collect());
         let (path, ladder) = (Graph::path(1000), ladder(1000));
-        assert!(pays(&path, &Pinning::Nobody) && pays(&path, &half(&path)), "it is the graph itself");
-        assert!(pays(&Graph::star(1000), &Pinning::Leader(3)));
-        assert!(pays(&ladder, &Pinning::Nobody) && pays(&ladder, &Pinning::Leader(7)));
-        assert!(!pays(&ladder, &half(&ladder)), "nobody is far from who is pinned");
+        assert!(is_chosen(&path, &Pinning::Nobody) && is_chosen(&path, &half(&path)), "the tree is the graph itself");
+        assert!(is_chosen(&Graph::star(1000), &Pinning::Leader(3)));
+        assert!(is_chosen(&ladder, &Pinning::Nobody) && is_chosen(&ladder, &Pinning::Leader(7)));
+        assert!(!is_chosen(&ladder, &half(&ladder)), "every vehicle is near a pinned one");
         let side = 40;
         let right = (0..side * side).filter(|i| i % side + 1 < side).map(|i| (i, i + 1));
         let grid: Vec<_> = right.chain((side..side * side).map(|i| (i - side, i))).collect();
         let grid = Graph::from_edges(side * side, &grid).expect("a grid");
-        assert!(!pays(&grid, &Pinning::Nobody));
+        assert!(!is_chosen(&grid, &Pinning::Nobody));
     }
 
     #[test]
-    fn edges_that_the_tree_of_a_ladder_lacks_span_little_however_it_is_numbered() {
+    fn the_tree_of_a_ladder_has_short_distances_for_any_numbering() {
         let rungs = 60;
         let (interleaved, rail_by_rail) = (ladder(rungs), |i: usize| i / 2 + rungs * (i % 2));
         let renumbered: Vec<_> = interleaved.edges().map(|(i, j)| (rail_by_rail(i), rail_by_rail(j))).collect();
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ladder_of_thousands_is_solved() {
+    fn the_connectivity_of_a_large_ladder_is_exact() {
         // The slowest mode of a ladder is that of one rail.
         let rungs = 3000;
         let graph = ladder(rungs);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_solution_on_a_tree_is_that_of_its_matrix() {
+    fn the_solution_on_a_tree_solves_its_matrix() {
         let edges = [(0, 1), (1, 2), (1, 3), (3, 4), (3, 5), (5, 6), (0, 7)];
         let graph = Graph::from_edges(8, &edges).expect("a tree");
         let right: Vec<f64> = (0..8).map(|i| (3.0 * f64::from(i)).sin()).collect();

@@ -159,9 +159,11 @@ impl CbfQpLaw {
     }
 }
 
-/// Returns the distance beyond which the half-spaces of a pair below the highest speed hold for every allowed
-/// acceleration \[m\]. With s = sqrt(2 A (l - delta)) at least the relative speed V, B is at least `gamma (s - V)^3 - A
-/// - a22 V`, and `-n . (u_i - u_j)` is at most A.
+/// Returns the distance beyond which the half-spaces of a pair below the highest speed contain every allowed
+/// acceleration \[m\].
+///
+/// With s = sqrt(2 A (l - delta)) at least the relative speed V, B is at least `gamma (s - V)^3 - A - a22 V`. The
+/// closing acceleration `-n . (u_i - u_j)` is at most A.
 fn range_m(keys: &CbfQpKeys, delta_m: f64, a22_per_s: f64) -> f64 {
     let (both_m_s2, closing_m_s) = (2.0 * keys.max_accel_m_s2, 2.0 * keys.max_speed_m_s);
     let spare_m_s2 = 2.0 * both_m_s2 + a22_per_s.max(0.0) * closing_m_s;

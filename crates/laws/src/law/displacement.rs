@@ -58,9 +58,15 @@ impl Default for DisplacementKeys {
 /// # Reference
 /// If some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M replaces L
 /// ([`crate::graph::Pinning`]), and sigma is the inverse of its least eigenvalue. `k (e_i - r) + c (v_i - r')` is added
-/// to the sum of each vehicle that knows r, and `r'' - a22 r'` is fed forward to all vehicles. A leader flies `r'' -
-/// a22 r' - k (e - r) - c (v - r')`, independent of other vehicles. Energy and certificate are as below with v~ = v -
-/// r' and M for L; with a leader, its position and velocity replace the reference.
+/// to the sum of each vehicle that knows r, and `r'' - a22 r'` is fed forward to all vehicles. A leader follows the
+/// reference independent of other vehicles:
+///
+/// ```text
+/// u = r'' - a22 r' - k (e - r) - c (v - r')
+/// ```
+///
+/// Energy and certificate are as below with v~ = v - r' and M for L. With a leader, its position and velocity replace
+/// the reference.
 ///
 /// # Energy
 /// ```text
@@ -79,8 +85,8 @@ impl Default for DisplacementKeys {
 /// the run. w~ is relative to the same frame as v~: without a reference, an acceleration common to all vehicles adds
 /// nothing.
 ///
-/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most `q(D) = sqrt(sigma k/2 tr(D' M
-/// D))`. The bound through all legs is therefore known before the first step.
+/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most
+/// `q(D) = sqrt(sigma k/2 tr(D' M D))`. The bound through all legs is therefore known before the first step.
 ///
 /// # Ellipsoids
 /// If the keep-out region of a vehicle is an ellipsoid, `l_ij` is the scaled length of the [`Metric`], and so are R and

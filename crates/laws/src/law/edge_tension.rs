@@ -54,7 +54,7 @@ impl Default for EdgeTensionKeys {
 /// The desired distance of an edge is the distance of its two slots. The sum of all `u_i` is zero, so the law cannot
 /// move the centre of mass.
 ///
-/// # Energy (theory section 4)
+/// # Energy
 /// ```text
 /// E = 1/2 sum |v_i - mean v|^2 + (1/N) sum over edges of V_ij(l_ij)
 /// dE/dt = -sum |v_i - mean v|^2                                        complete graph, for every a22
@@ -319,8 +319,8 @@ impl Law for EdgeTensionLaw {
             controls: Controls::Distances,
             barrier_m: Some(self.delta_m),
             certifies_under_wind: true,
-            assumptions: "The certified separation holds for the complete graph, exact states of all vehicles, no delay, \
-                          no limit on the control and continuous time. The wind of the scenario is the only \
+            assumptions: "The certified separation holds for the complete graph, exact states of all vehicles, no \
+                          delay, no limit on the control and continuous time. The wind of the scenario is the only \
                           disturbance: it adds a bounded energy, so no pair's tension exceeds N times the sum.",
             ..Capabilities::default()
         }

@@ -44,8 +44,8 @@ pub enum LawError {
     },
     /// A pair is at or inside the barrier distance by a sensed or received state, though not in truth.
     #[error(
-        "vehicles {pair} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; their \
-     true separation is {true_m} m"
+        "vehicles {pair} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
+         their true separation is {true_m} m"
     )]
     KnownCollision {
         /// The first such pair in index order.
@@ -59,8 +59,8 @@ pub enum LawError {
     },
     /// A vehicle is at or inside the clearance of an obstacle by its sensed position, though not in truth.
     #[error(
-    "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; its \
-     true distance is {true_m} m",
+        "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; its \
+         true distance is {true_m} m",
         vehicle + 1,
         obstacle + 1
     )]

@@ -133,9 +133,9 @@ impl Default for Capabilities {
             avoids_obstacles: false,
             requires_calling_thread: false,
             settling: None,
-            assumptions: "The certified separation holds for exact received and sensed states, no delay, no limit on the \
-                          control and continuous time. The wind of the scenario is the only disturbance: it adds a \
-                          bounded energy, and the tension of no pair exceeds the sum.",
+            assumptions: "The certified separation holds for exact received and sensed states, no delay, no limit on \
+                          the control and continuous time. The wind of the scenario is the only disturbance: it adds \
+                          a bounded energy, and the tension of no pair exceeds the sum.",
         }
     }
 }

@@ -134,7 +134,7 @@ impl Mode {
             return f64::INFINITY;
         }
         let is_stable = |period_s: f64| {
-            let (bounded, moved_s, pushed_s2) = held(a22_per_s, period_s);
+            let (bounded, moved_s, pushed_s2) = zero_order_hold(a22_per_s, period_s);
             let trace = 1.0 + bounded - k * pushed_s2 - c * moved_s;
             let determinant = bounded - c * moved_s + k * (moved_s * moved_s - bounded * pushed_s2);
             determinant < 1.0 && 1.0 + trace + determinant > 0.0
@@ -148,7 +148,7 @@ impl Mode {
 
 /// Returns the response over a period T: the growth `e^(a22 T)` of a velocity, and the distances per unit of velocity
 /// \[s\] and per unit of acceleration \[s^2\].
-fn held(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
+fn zero_order_hold(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
     let x = a22_per_s * period_s;
     let ratio = if x == 0.0 { 1.0 } else { libm::expm1(x) / x };
     // (e^x - 1 - x)/x^2, as a series where the difference cancels.

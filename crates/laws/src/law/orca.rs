@@ -79,7 +79,8 @@ impl Default for OrcaKeys {
 /// 2011) with half-spaces. Vehicles have diameter D = delta + margin and track the velocities V:
 ///
 /// ```text
-/// V_i   = velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i| with |v| <= v_max in all half-spaces of i,   d_i = h_i + r - p_i
+/// V_i   = velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i| with |v| <= v_max in all half-spaces of i
+/// d_i   = h_i + r - p_i
 /// u_i   = r'' + tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
 /// ```
 ///

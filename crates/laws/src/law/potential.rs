@@ -56,7 +56,8 @@ impl Default for PotentialKeys {
 ///
 /// # Energy
 /// ```text
-/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U,   dE/dt = (a22 - c) sum |v_i|^2
+/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U
+/// dE/dt = (a22 - c) sum |v_i|^2
 /// ```
 ///
 /// # Certificate

@@ -246,13 +246,20 @@ mod tests {
         ]
     }
 
+    fn points() -> impl Strategy<Value = Vec<[f64; 3]>> {
+        prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..60)
+    }
+
+    /// Ranges with extreme and invalid values.
+    const RANGES_M: [f64; 8] = [0.0, 1.0, 1e-9, 1e3, 1e10, f64::MAX, -1.0, f64::NAN];
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(512))]
 
         #[test]
-        fn cells_find_what_comparing_all_pairs_finds(
-            tables in prop::collection::vec(prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..60), 1..4),
-            range_m in prop_oneof![0.0..3.0, prop::sample::select(vec![0.0, 1.0, 1e-9, 1e3, 1e10, f64::MAX, -1.0, f64::NAN])],
+        fn cells_find_the_same_pairs_as_a_full_search(
+            tables in prop::collection::vec(points(), 1..4),
+            range_m in prop_oneof![0.0..3.0, prop::sample::select(RANGES_M.to_vec())],
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
         ) {
             let mut near = NearPairs::default();
@@ -267,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_swarm_in_the_plane_and_in_space_is_searched_whole() {
+    fn all_near_pairs_of_a_large_swarm_are_found() {
         for (count, depth) in [(1500_u32, 0.0), (1500, 1.0)] {
             let place = |k: u32| {
                 let [x, y, z] =
@@ -287,7 +294,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_pair_within_the_range_is_ever_missing(
+        fn kept_pairs_contain_every_pair_within_the_range(
             start in prop::collection::vec(-4.0..4.0_f64, 90),
             steps in prop::collection::vec((prop::collection::vec(-1.0..1.0_f64, 90), 0.01..0.6_f64), 1..12),
             ranges_m in prop::collection::vec(prop::sample::select(vec![0.5, 1.5, 1.5, 1.5]), 12),
@@ -309,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_move_little_are_not_searched_anew_and_what_is_no_number_is() {
+    fn the_search_repeats_after_large_moves_and_for_nan() {
         let mut kept = KeptPairs::default();
         let mut positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 1.2, 0.0, 0.0]);
         kept.update(&positions_m, 1.0);
@@ -325,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn each_vehicle_has_its_others_in_index_order() {
+    fn near_lists_are_in_index_order() {
         let mut lists = NearLists::default();
         for (pairs, expected) in [
             (&[(0, 2), (0, 3), (1, 2), (2, 4)][..], [&[2, 3][..], &[2], &[0, 1, 4], &[0], &[2]]),

@@ -160,13 +160,13 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
-        fn distances_are_those_of_parry(shape in shape(), point in vector(5.0)) {
+        fn distances_match_parry(shape in shape(), point in vector(5.0)) {
             let (distance_m, _) = shape.signed_distance_m(point);
             prop_assert!((distance_m - by_parry(&shape, point)).abs() < TOLERANCE_M, "{shape:?}: {distance_m}");
         }
 
         #[test]
-        fn the_surface_is_as_far_as_said_along_the_normal_and_nowhere_nearer(
+        fn the_surface_lies_at_the_distance_along_the_normal(
             shape in shape(), point in vector(5.0), directions in prop::collection::vec(vector(1.0), 200),
         ) {
             let (distance_m, normal) = shape.signed_distance_m(point);
@@ -180,7 +180,7 @@ mod tests {
         }
 
         #[test]
-        fn the_normal_is_where_the_distance_grows(shape in shape(), point in vector(5.0)) {
+        fn the_normal_is_the_gradient_of_the_distance(shape in shape(), point in vector(5.0)) {
             const STEP_M: f64 = 1e-6;
             let (distance_m, normal) = shape.signed_distance_m(point);
             let (farther_m, same) = shape.signed_distance_m(point + normal * STEP_M);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_with_many_nearest_surface_points_has_the_normal_of_one() {
+    fn the_normal_is_defined_where_several_surface_points_are_nearest() {
         let up = Vector3::z();
         assert_eq!(Shape::Ball { radius_m: 2.0 }.signed_distance_m(Vector3::zeros()), (-2.0, up));
         let capsule = |to_m| Shape::Capsule { from_m: Vector3::zeros(), to_m, radius_m: 0.5 };

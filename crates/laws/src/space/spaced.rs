@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_at_exactly_the_distance_is_too_near_and_one_beyond_is_not() {
+    fn a_point_at_the_minimum_spacing_is_rejected() {
         let mut spaced = Spaced::new(2.0);
         assert_eq!(spaced.insert(Vector3::zeros()), Ok(()));
         assert_eq!(spaced.insert(Vector3::new(2.0, 0.0, 0.0)), Err((0, 2.0)));
@@ -111,7 +111,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn cells_find_what_comparing_all_pairs_finds(
+        fn cells_find_the_same_pairs_as_a_full_search(
             points in prop::collection::vec([-3.0..3.0, -3.0..3.0, -0.5..0.5], 1..40),
             distance_m in 0.05..1.5,
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
@@ -137,20 +137,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_closest_pair_is_that_of_the_full_search(
+        fn the_closest_pair_matches_a_full_search(
             points in prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..30),
         ) {
             let positions_m = Rows::from_row_slice(&points.concat());
             let distances = (0..points.len()).flat_map(|i| (i + 1..points.len()).map(move |j| Pair::new(i, j)));
             let distances = distances.map(|pair| (separation(&positions_m, pair.first(), pair.second()), pair));
             let is_finite = points.iter().flatten().all(|x| x.is_finite());
-            let expected = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).filter(|_| is_finite).map(|(distance_m, pair)| (pair, distance_m));
+            let least = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).filter(|_| is_finite);
+            let expected = least.map(|(distance_m, pair)| (pair, distance_m));
             prop_assert_eq!(closest_pair(&positions_m), expected);
         }
     }
 
     #[test]
-    fn the_closest_pair_of_less_than_two_or_not_finite_positions_is_none() {
+    fn the_closest_pair_needs_two_finite_positions() {
         let rows = |points: &[[f64; 3]]| Rows::from_row_slice(&points.concat());
         assert_eq!(closest_pair(&Rows::zeros(1)), None);
         assert_eq!(closest_pair(&rows(&[[0.0; 3], [f64::NAN; 3], [1.0; 3]])), None);

@@ -135,7 +135,7 @@ mod tests {
     use tautline_core::swarm::set_row;
 
     #[test]
-    fn every_limit_is_a_limit_and_what_is_not_a_number_is_not_within() {
+    fn each_arrival_limit_counts_and_nan_is_outside() {
         let arrival = Arrival::default();
         let good = Distance {
             max_edge_error_m: 0.01,
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn one_vehicle_beside_its_slot_keeps_many_from_having_arrived_on_graphs_that_do_not_feel_it() {
+    fn one_displaced_vehicle_prevents_arrival_without_edge_errors() {
         let count = 400;
         let formation = Formation::grid(count, 2.0);
         let graph = Graph::star(count);
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn held_means_for_as_long_as_asked_but_for_rounding() {
+    fn hold_time_tolerates_rounding() {
         let arrival = Arrival { hold_s: 0.3, ..Arrival::default() };
         assert!(arrival.is_held(0.1, 0.1 + 0.1 + 0.2) && !arrival.is_held(0.1, 0.399));
     }

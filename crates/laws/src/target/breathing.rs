@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn a_swarm_that_stands_elsewhere_breathes_once_it_has_for_long_enough() {
+    fn slots_spread_after_a_stall_and_close_again() {
         let found = spreads(Breathing::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
         assert_eq!(found[..13], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
         // Settled at 6 s: from then on 1 + exp(-t/2), until it falls below 1.01.
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_slots_are_held_as_long_as_is_asked_for() {
+    fn spread_slots_are_held_for_the_given_time() {
         let breathing = Breathing { hold_s: 9.0, ..Breathing::default() };
         let found = spreads(breathing, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
         // Spread at 2 s, settled at 6 s, held to 11 s.
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn the_next_breath_is_deeper_and_after_the_last_there_is_none() {
+    fn slots_spread_further_each_time_up_to_the_limit() {
         let breathing = Breathing { most: 2, ..Breathing::default() };
         // Settles whenever slots are spread, and has an error again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn who_arrives_or_moves_or_is_not_to_breathe_does_not_and_who_begins_so_does() {
+    fn slots_stay_on_arrival_or_with_mode_off_and_spread_with_mode_start() {
         assert!(spreads(Breathing::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
         let off = Breathing { mode: BreathingMode::Off, most: 0, ..Breathing::default() };
         assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn interchangeable_vehicles_get_the_nearest_slots_and_breathe_only_where_they_have_them() {
+    fn interchangeable_vehicles_are_reassigned_before_slots_spread() {
         let given = Leg::first(Formation::line(3, 2.0));
         let leg = Leg { interchangeable: true, ..given.clone() };
         let assigned = |slots: [usize; 3]| Change::Assigned { slots: slots.to_vec() };

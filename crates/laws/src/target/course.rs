@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leg_is_under_way_from_its_beginning_to_that_of_the_next() {
+    fn a_leg_lasts_until_the_next_one_begins() {
         let mut course = Course::new(&[legs([false; 3]), legs([false; 3])].concat());
         course.begin(1, 2.0);
         course.begin(2, 2.0);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_assigned_anew_goes_to_another_slot_from_then_on_and_on_the_legs_that_follow_on_from_it() {
+    fn an_assignment_holds_for_following_interchangeable_legs() {
         let mut course = Course::new(&legs([true, true, false]));
         let given = slots(&course, 0.0);
         course.assign(&[2, 0, 1], 3.0);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_order_of_the_vehicles_changes_nothing() {
+    fn an_invalid_permutation_changes_nothing() {
         for wrong in [&[0, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 0]] {
             let mut course = Course::new(&legs([true; 3]));
             course.assign(wrong, 1.0);

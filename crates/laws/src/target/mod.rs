@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_placed_leg_is_scaled_and_turned_about_its_centre_and_then_moved() {
+    fn placing_a_leg_scales_rotates_and_then_moves_it() {
         let leg =
             Leg::first(Formation::line(2, 2.0)).placed(3.0, std::f64::consts::FRAC_PI_2, Vector3::new(10.0, 0.0, 5.0));
         let slots = &leg.formation.slots_m;
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn new_slots_are_told_by_the_revision() {
+    fn new_slots_raise_the_revision() {
         let legs = [Leg::first(Formation::line(2, 2.0)), Leg::first(Formation::line(2, 3.0))];
         let mut target = CurrentTarget::first_of(&legs).expect("legs");
         assert_eq!(target.view(), Target::at_rest(&legs[0].formation));

@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_passed_at_their_times_and_the_way_between_is_within_reach() {
+    fn points_are_passed_at_their_times_within_the_reach() {
         for motion in motions() {
             if let ReferenceMotion::WayPoints { points } = &motion {
                 for &(at_s, place_m) in points {
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_through_a_straight_line_is_the_line_and_what_does_not_grow_is_none() {
+    fn a_spline_through_a_line_is_the_line_and_times_must_increase() {
         let line: Vec<_> = [0.0, 1.0, 2.5, 4.0].map(|t| (t, Vector3::new(2.0 * t, -t, 1.0))).to_vec();
         let spline = ReferenceMotion::Table(Spline::through(&line).expect("a spline"));
         for time_s in [-1.0, 0.3, 2.0, 7.0] {

@@ -180,13 +180,13 @@ mod tests {
     }
 
     #[test]
-    fn legs_begin_at_their_times_and_two_may_be_due_at_once() {
+    fn legs_begin_at_their_times_also_two_at_once() {
         assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
         assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
     }
 
     #[test]
-    fn a_leg_that_is_reached_and_held_ends_and_one_that_is_lost_does_not() {
+    fn a_leg_ends_only_when_its_formation_is_held() {
         let legs = legs([Begins::Reached, Begins::Reached]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s > 1.0)), [0, 0, 1, 1, 1, 2, 2, 2]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s == 0.5)), [0, 0, 0, 0, 1, 1, 1, 1]);

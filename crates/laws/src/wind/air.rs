@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wind_is_a_function_of_time_and_seed_however_time_is_cut() {
+    fn the_wind_is_a_function_of_time_and_seed() {
         for shared in [true, false] {
             let coarse = flown(&mut Wind::new(&stormy(shared), 3, 5), 40, 1);
             let fine = flown(&mut Wind::new(&stormy(shared), 3, 5), 40, 64);
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_is_taken_back_and_flown_in_halves_is_the_same_wind_and_so_is_a_copy() {
+    fn undoing_halving_and_cloning_steps_keep_the_wind() {
         let (mut straight, mut halting) = (Wind::new(&stormy(false), 3, 1), Wind::new(&stormy(false), 3, 1));
         let mut copy = straight.clone();
         for step in 0..200 {
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn one_turbulence_is_shared_or_each_vehicle_has_its_own() {
+    fn turbulence_is_shared_or_separate() {
         for shared in [true, false] {
             let mut wind = Wind::new(&stormy(shared), 3, 5);
             wind.advance(0.7);

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_normal_and_streams_are_their_own() {
+    fn numbers_are_normal_and_streams_independent() {
         let count = 200_000_u32;
         let (mut one, mut other) = (Normals::new(7, 1), Normals::new(7, 2));
         let pairs: Vec<_> = (0..count).map(|_| (one.next(), other.next())).collect();

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gust_is_added_to_the_mean_for_those_whom_it_meets() {
+    fn a_gust_adds_to_the_mean_wind_of_listed_vehicles() {
         let gusts = vec![Gust { vehicles: Some(vec![1, 3]), ..gust() }];
         let wind = WindSpec { mean_m_s: Vector3::x(), gusts, ..WindSpec::default() };
         assert!(!wind.is_still() && WindSpec::default().is_still());

@@ -188,8 +188,8 @@ impl Field {
         moved
     }
 
-    /// Returns the sample around a slot that is farthest from the nearest other slot, with the square of that distance;
-    /// the slot itself and `least` if no sample is farther than `least`.
+    /// Returns the sample around a slot that is farthest from the nearest other slot, with the square of that distance.
+    /// If no sample is farther than `least`, returns the slot itself and `least`.
     fn widest(&self, i: usize, least: f64, near: &mut Vec<(usize, Point)>) -> (f64, Slot) {
         let mut widest = (least, self.slots[i]);
         for &cell in &self.around[self.slots[i].cell] {
