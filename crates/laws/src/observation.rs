@@ -44,7 +44,7 @@ pub enum Others<'a> {
     Held(&'a dyn Picture),
 }
 
-/// Received and sensed states of every vehicle by every other.
+/// Received and sensed states that each vehicle has of every other.
 pub trait Picture: fmt::Debug + Sync {
     /// State of vehicle `j` as vehicle `i` last received it; without a link from j to i the value is unspecified.
     fn heard(&self, i: usize, j: usize) -> Neighbour;

@@ -125,7 +125,7 @@ impl CbfQpLaw {
         let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
         let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        self.reference_use.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
+        self.reference_use.feed_forward_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
     }
 
     /// Returns the half-space of accelerations of vehicle i that vehicle j allows; `None` out of range.

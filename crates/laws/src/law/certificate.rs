@@ -46,11 +46,11 @@ pub enum Void {
     /// The velocity gain a22 of the vehicles exceeds the damping of the law, so the energy may grow.
     #[error("The velocity gain a22 of the vehicles exceeds the damping of the law: the energy may grow.")]
     VelocityUndamped,
-    /// The law limits its command, and the barrier may need a larger acceleration.
-    #[error("The law limits its command: the barrier may need a larger acceleration.")]
+    /// The law limits its command, and the acceleration that keeps vehicles apart may be larger.
+    #[error("The law limits its command: the acceleration that keeps vehicles apart may exceed the limit.")]
     CommandLimited,
     /// The target changes during the run.
-    #[error("The target changes during the run: the law's proof covers a single formation.")]
+    #[error("The target changes during the run: the law's proof does not cover the change.")]
     TargetChanges,
     /// The law receives inexact states, or its commands arrive changed.
     #[error("The states that the law receives, or the commands that arrive, are not exact.")]
@@ -58,7 +58,7 @@ pub enum Void {
     /// Sensed states, the vehicle's own included, are late.
     #[error(
         "The sensed states are late: vehicles have moved since the measurement \
-     (sensing.latency_s, sensing.near_latency_s, sensing.rate_hz)."
+         (sensing.latency_s, sensing.near_latency_s, sensing.rate_hz)."
     )]
     KnownLate,
     /// Sensed states have errors.
@@ -67,7 +67,7 @@ pub enum Void {
     /// Received states of other vehicles are late.
     #[error(
         "The received states are late: each message has a latency and is used until the next one arrives \
-     (network.latency_s, network.rate_hz)."
+         (network.latency_s, network.rate_hz)."
     )]
     HeardLate,
     /// Some messages are lost.
@@ -76,7 +76,10 @@ pub enum Void {
     )]
     MessagesLost,
     /// The acceleration of each vehicle is limited.
-    #[error("The acceleration is limited: the barrier may need a larger one (actuation.max_accel_m_s2).")]
+    #[error(
+        "The acceleration is limited: the one that keeps vehicles apart may exceed the limit \
+         (actuation.max_accel_m_s2)."
+    )]
     AccelerationLimited,
     /// Accelerations follow the commands with a lag.
     #[error("The acceleration follows the command with a lag (actuation.lag_s).")]
@@ -97,11 +100,9 @@ pub enum Void {
     #[error("The wind is turbulent (wind.dryden): its contribution to the energy has no bound.")]
     WindUnbounded,
     /// The wind pushes the leader off the reference, and the law's proof assumes that the leader flies it exactly.
-    #[error(
-        "The wind pushes the leader off the reference: the law's proof assumes that it flies the reference exactly."
-    )]
+    #[error("The wind pushes the leader off the reference: the law's proof assumes a leader exactly on it.")]
     LeaderBlown,
-    /// Vehicles are bodies with attitude and rotor dynamics, so commands are carried out with delay.
+    /// Vehicles have dynamics of their own, so they carry out commands with delay and error.
     #[error("The vehicles are not points: they carry out a command with delay and error (vehicle.model).")]
     NotAPoint,
     /// The motion of the reference is not fed forward to the vehicles.

@@ -12,7 +12,7 @@ use tautline_core::swarm::{Rows, row, set_row};
 /// It pushes where the margin is below a range, and becomes infinite as the margin vanishes.
 ///
 /// Along the gradient of the margin at a convex obstacle the Hessian of V is V''. Across it the Hessian is V' times a
-/// curvature >= 0, and V' < 0. Hence it is at most V''.
+/// curvature >= 0, and V' < 0. Hence the Hessian is at most V''.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClearanceTension {
     /// Tension with its barrier at margin 0.

@@ -13,7 +13,7 @@ use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
 use super::interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin};
 use super::modes::{Linear, Mode, stiffest_contact_mode};
-use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
+use super::pinned::{Gains, PinnedConsensus, error_m, feed_forward_acceleration};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
@@ -111,7 +111,7 @@ pub struct DisplacementLaw {
     metric: Metric,
     a22_per_s: f64,
     /// Whether `r'' - a22 r'` is fed forward to the followers.
-    is_fed: bool,
+    has_feed_forward: bool,
     /// Reasons that void the certificate from any start.
     voids: Vec<Void>,
     /// Bound on the energy under wind, if there is wind.
@@ -154,7 +154,7 @@ impl DisplacementLaw {
         let pulls = PinnedConsensus::new(links, context.pinning());
         let connectivity = pulls.connectivity();
         if connectivity <= 0.0 {
-            return Err(ParameterError::NobodyKnowsTheReference);
+            return Err(ParameterError::ReferenceUnknown);
         }
         let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, (delta_m, metric))?, f64::INFINITY);
         for leg in later {
@@ -180,7 +180,7 @@ impl DisplacementLaw {
             delta_m,
             metric,
             a22_per_s,
-            is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            has_feed_forward: guidance.is_none_or(|guidance| guidance.feed_forward),
             energy_bound,
             voids: voids(context),
             connectivity,
@@ -267,8 +267,8 @@ impl DisplacementLaw {
             self.cache.keep(&at.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
-            if self.is_fed {
-                let fed = fed_forward(&at.target.reference, self.a22_per_s);
+            if self.has_feed_forward {
+                let fed = feed_forward_acceleration(&at.target.reference, self.a22_per_s);
                 (0..command.nrows()).for_each(|i| {
                     let sum = row(command, i) + fed;
                     set_row(command, i, sum);

@@ -59,8 +59,8 @@ pub enum LawError {
     },
     /// A vehicle is at or inside the clearance of an obstacle by its sensed position, though not in truth.
     #[error(
-        "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; its \
-         true distance is {true_m} m",
+        "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; \
+         its true distance is {true_m} m",
         vehicle + 1,
         obstacle + 1
     )]
@@ -189,7 +189,7 @@ pub enum ParameterError {
     },
     /// The scenario has a reference, and no vehicle knows it.
     #[error("no vehicle knows the reference")]
-    NobodyKnowsTheReference,
+    ReferenceUnknown,
     /// Some vehicles do not know the reference, and the law has no links over which they could follow it.
     #[error("the law has no links over which vehicles that do not know the reference could follow it")]
     ReferenceNotHeard,

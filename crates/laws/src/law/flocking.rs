@@ -36,7 +36,7 @@ pub struct FlockingKeys {
     /// flock without an objective.
     #[schemars(extend("minimum" = 0))]
     pub c1_gamma_per_s2: f64,
-    /// Highest acceleration that is commanded in m/s^2.
+    /// Largest commanded acceleration in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
     /// Distance d of near vehicles in m; by default the smallest slot distance.
@@ -127,7 +127,7 @@ impl FlockingLaw {
         let own_m_s = row(&at.own.velocities_m_s, i);
         let off_m_s = own_m_s - reference.velocity_m_s;
         let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
-        self.reference_use.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
+        self.reference_use.feed_forward_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// Sine of the angle below which a flat and a plane count as parallel.
+/// Sine of the angle below which an affine subspace and a plane count as parallel.
 const PARALLEL: f64 = 1e-8;
 /// Relative tolerances of a violation, as fractions of the lengths whose difference it is. The first is used normally.
 /// The others follow where nearly parallel planes leave no point within the first.
@@ -67,10 +67,10 @@ impl HalfSpaces {
     /// is no such point, returns the nearest point of minimal largest violation. Violations are accurate to 1e-12 of
     /// the radius and the offsets, and to 1e-6 with nearly parallel planes.
     pub(super) fn nearest(&mut self, wish: Vector3<f64>, radius: f64) -> Nearest {
-        let search = Search { aim: Aim::Near(wish), radius, slack: 0.0, rounding: ROUNDING[0] };
-        match search.best(&self.given, &Flat::space()) {
+        let search = Search { objective: Objective::Near(wish), radius, slack: 0.0, rounding: ROUNDING[0] };
+        match search.best(&self.given, &Subspace::space()) {
             Ok(point) => Nearest { point, violation: 0.0 },
-            Err(Nowhere { place, last }) => {
+            Err(Infeasible { place, last }) => {
                 let least = self.violate_least(place, last, radius);
                 let relaxed = Search { slack: self.largest_violation(&least), ..search };
                 let point = relaxed.best_but_for_rounding(&self.given).unwrap_or(least);
@@ -89,7 +89,8 @@ impl HalfSpaces {
             }
             no_worse.clear();
             no_worse.extend(given[..i].iter().filter_map(|other| difference(other, worst)));
-            let search = Search { aim: Aim::Along(worst.normal), radius, slack: 0.0, rounding: ROUNDING[0] };
+            let search =
+                Search { objective: Objective::Along(worst.normal), radius, slack: 0.0, rounding: ROUNDING[0] };
             point = search.best_but_for_rounding(no_worse).unwrap_or(point);
             largest = given[..=i].iter().map(|given| given.violation(&point)).fold(0.0, f64::max);
         }
@@ -101,7 +102,7 @@ impl HalfSpaces {
     }
 }
 
-/// Returns the half-space where `other` is violated no more than `worst`; `None` if that is everywhere or nowhere.
+/// Returns the half-space where `other` is violated no more than `worst`; `None` if that is everywhere or infeasible.
 fn difference(other: &HalfSpace, worst: &HalfSpace) -> Option<HalfSpace> {
     let normal = other.normal - worst.normal;
     let length = normal.norm();
@@ -110,7 +111,7 @@ fn difference(other: &HalfSpace, worst: &HalfSpace) -> Option<HalfSpace> {
 
 /// Objective of a search.
 #[derive(Clone, Copy)]
-enum Aim {
+enum Objective {
     /// Minimize the distance to this point.
     Near(Vector3<f64>),
     /// Maximize the extent in this direction.
@@ -119,7 +120,7 @@ enum Aim {
 
 /// No point is in all half-spaces up to the one at `place`.
 #[derive(Clone, Copy)]
-struct Nowhere {
+struct Infeasible {
     place: usize,
     /// Best point in the half-spaces before `place`.
     last: Vector3<f64>,
@@ -128,7 +129,7 @@ struct Nowhere {
 /// Search for the best point in half-spaces and a ball.
 #[derive(Clone, Copy)]
 struct Search {
-    aim: Aim,
+    objective: Objective,
     radius: f64,
     /// Distance by which each half-space is widened.
     slack: f64,
@@ -136,14 +137,15 @@ struct Search {
 }
 
 impl Search {
-    /// Returns the best point in a flat.
-    fn best(&self, within: &[HalfSpace], flat: &Flat) -> Result<Vector3<f64>, Nowhere> {
-        let mut point = flat.best(self.radius, self.aim).ok_or(Nowhere { place: 0, last: Vector3::zeros() })?;
+    /// Returns the best point in an affine subspace.
+    fn best(&self, within: &[HalfSpace], subspace: &Subspace) -> Result<Vector3<f64>, Infeasible> {
+        let mut point =
+            subspace.best(self.radius, self.objective).ok_or(Infeasible { place: 0, last: Vector3::zeros() })?;
         for (place, half_space) in within.iter().enumerate() {
-            let nowhere = Nowhere { place, last: point };
+            let infeasible = Infeasible { place, last: point };
             if half_space.violation(&point) > self.slack + self.rounding * half_space.size(self.radius) {
-                let edge = flat.cut(half_space, self.slack).ok_or(nowhere)?;
-                point = self.best(&within[..place], &edge).map_err(|_| nowhere)?;
+                let edge = subspace.cut(half_space, self.slack).ok_or(infeasible)?;
+                point = self.best(&within[..place], &edge).map_err(|_| infeasible)?;
             }
         }
         Ok(point)
@@ -151,13 +153,13 @@ impl Search {
 
     /// Returns the best point when one exists up to rounding; tries growing tolerances.
     fn best_but_for_rounding(&self, within: &[HalfSpace]) -> Option<Vector3<f64>> {
-        let rounded = |rounding| Self { rounding, ..*self }.best(within, &Flat::space()).ok();
+        let rounded = |rounding| Self { rounding, ..*self }.best(within, &Subspace::space()).ok();
         ROUNDING.into_iter().find_map(rounded)
     }
 }
 
 /// Affine subspace: a point, a line, a plane or the whole space.
-struct Flat {
+struct Subspace {
     /// Its point nearest to the origin.
     foot: Vector3<f64>,
     kind: Kind,
@@ -172,7 +174,7 @@ enum Kind {
     Point,
 }
 
-impl Flat {
+impl Subspace {
     fn space() -> Self {
         Self { foot: Vector3::zeros(), kind: Kind::Space }
     }
@@ -193,14 +195,14 @@ impl Flat {
     }
 
     /// Returns the best point in the ball; `None` if the subspace does not meet the ball.
-    fn best(&self, radius: f64, aim: Aim) -> Option<Vector3<f64>> {
+    fn best(&self, radius: f64, objective: Objective) -> Option<Vector3<f64>> {
         let room = radius * radius - self.foot.norm_squared();
         if room < 0.0 {
             return None;
         }
-        let from_foot = match aim {
-            Aim::Near(wish) => self.part_of(wish - self.foot).cap_magnitude(room.sqrt()),
-            Aim::Along(direction) => {
+        let from_foot = match objective {
+            Objective::Near(wish) => self.part_of(wish - self.foot).cap_magnitude(room.sqrt()),
+            Objective::Along(direction) => {
                 let part = self.part_of(direction);
                 let length = part.norm();
                 if length > PARALLEL { part * (room.sqrt() / length) } else { Vector3::zeros() }

@@ -284,7 +284,7 @@ pub(super) struct ReferenceUse {
     /// Whether the scenario has a reference.
     is_guided: bool,
     /// Whether the vehicles know the acceleration of the reference.
-    is_fed: bool,
+    has_feed_forward: bool,
 }
 
 impl ReferenceUse {
@@ -293,16 +293,16 @@ impl ReferenceUse {
     /// # Errors
     /// [`ParameterError::ReferenceNotHeard`] if some vehicle does not know the reference.
     pub(super) fn new(context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let Some(guidance) = context.guidance else { return Ok(Self { is_guided: false, is_fed: false }) };
+        let Some(guidance) = context.guidance else { return Ok(Self { is_guided: false, has_feed_forward: false }) };
         match guidance.known_by {
-            Pinning::All => Ok(Self { is_guided: true, is_fed: guidance.feed_forward }),
+            Pinning::All => Ok(Self { is_guided: true, has_feed_forward: guidance.feed_forward }),
             Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => Err(ParameterError::ReferenceNotHeard),
         }
     }
 
     /// Returns the feed-forward acceleration r'' of the reference \[m/s^2\], or zero without feed-forward.
-    pub(super) fn fed_m_s2(self, reference: &Reference) -> Vector3<f64> {
-        if self.is_fed { reference.acceleration_m_s2 } else { Vector3::zeros() }
+    pub(super) fn feed_forward_m_s2(self, reference: &Reference) -> Vector3<f64> {
+        if self.has_feed_forward { reference.acceleration_m_s2 } else { Vector3::zeros() }
     }
 
     /// Returns the controls and needs of a law that uses the reference in this way.

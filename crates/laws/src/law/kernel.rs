@@ -14,7 +14,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::iter::{IndexedParallelIterator as _, IntoParallelRefMutIterator as _, ParallelIterator as _};
 
-use self::block::{Block, Ends, LANES, NOWHERE_M, add_lanes, total};
+use self::block::{Block, Ends, LANES, PADDING_M, add_lanes, total};
 use super::tension::OutOfDomain;
 use crate::graph::Graph;
 use tautline_core::swarm::{Rows, columns, columns_mut};
@@ -60,7 +60,7 @@ impl Kernel {
             delta_m,
             edges,
             inverse_k_per_m,
-            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, NOWHERE_M)),
+            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, PADDING_M)),
             list: if is_listed { graph.edges().map(|(i, j)| [i, j]).collect() } else { Vec::new() },
             arch: pulp::Arch::new(),
         })
@@ -102,7 +102,7 @@ struct AddRows<'a> {
     kernel: &'a Kernel,
     count: usize,
     rows: Range<usize>,
-    /// Positions along each axis; [`NOWHERE_M`] in the padding lanes.
+    /// Positions along each axis; [`PADDING_M`] in the padding lanes.
     axes: [&'a [f64]; 3],
     /// Sums along each axis from the first of the rows on, padded to whole lanes.
     sums: [&'a mut [f64]; 3],
@@ -164,7 +164,7 @@ impl WithSimd for AddList<'_> {
         while first < kernel.list.len() {
             let list = &kernel.list[first..kernel.list.len().min(first + LIST_BLOCK)];
             // Each edge begins at the origin and ends at the position of its second vehicle relative to its first.
-            let (mut ends_m, mut of_ends) = ([[NOWHERE_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
+            let (mut ends_m, mut of_ends) = ([[PADDING_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
             for axis in 0..3 {
                 for k in 0..list.len() {
                     ends_m[axis][k] = axes[axis][list[k][1]] - axes[axis][list[k][0]];

@@ -124,8 +124,8 @@ impl Mode {
     #[must_use]
     pub fn sampling_margin_s(self, a22_per_s: f64) -> f64 {
         /// Number of periods scanned, and the end of the scan in units of the time scale.
-        const LOOKS: u32 = 4000;
-        const SCALES: f64 = 20.0;
+        const SCAN_STEPS: u32 = 4000;
+        const SCAN_END: f64 = 20.0;
         let Self { stiffness_per_s2: k, damping_per_s: c } = self;
         if !self.is_stable(a22_per_s) {
             return 0.0;
@@ -140,9 +140,9 @@ impl Mode {
             determinant < 1.0 && 1.0 + trace + determinant > 0.0
         };
         let scale_s = if k > 0.0 { (2.0 / c.abs()).min(2.0 * c.abs() / k) } else { 2.0 / c.abs() };
-        let look_s = |look: u32| SCALES * scale_s * f64::from(look) / f64::from(LOOKS);
-        let Some(beyond) = (1..=LOOKS).find(|&look| !is_stable(look_s(look))) else { return f64::INFINITY };
-        bisect(look_s(beyond - 1), look_s(beyond), is_stable)
+        let period_at_s = |step: u32| SCAN_END * scale_s * f64::from(step) / f64::from(SCAN_STEPS);
+        let Some(beyond) = (1..=SCAN_STEPS).find(|&step| !is_stable(period_at_s(step))) else { return f64::INFINITY };
+        bisect(period_at_s(beyond - 1), period_at_s(beyond), is_stable)
     }
 }
 
@@ -188,7 +188,7 @@ impl Heard {
     }
 
     /// Returns q(i omega) for s^2 - a22 s = -(k + c s) q.
-    fn turned(&self, omega: f64, a22_per_s: f64) -> Complex<f64> {
+    fn link_ratio(&self, omega: f64, a22_per_s: f64) -> Complex<f64> {
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         Complex::new(omega * omega, a22_per_s * omega) / Complex::new(k, c * omega)
     }
@@ -213,8 +213,8 @@ impl Heard {
             .filter(|&squared| crosses && squared > 1e-12 * half.abs())
             .map(|squared| {
                 let omega = squared.sqrt();
-                let turned = (Complex::new(d, 0.0) - self.turned(omega, a22_per_s)) / alpha;
-                (-turned.arg()).rem_euclid(TAU) / omega
+                let link_ratio = (Complex::new(d, 0.0) - self.link_ratio(omega, a22_per_s)) / alpha;
+                (-link_ratio.arg()).rem_euclid(TAU) / omega
             })
             .fold(f64::INFINITY, f64::min)
     }
@@ -222,25 +222,25 @@ impl Heard {
     /// Returns the delay margin of hub and leaf mean: (hub - q)(leaf - q) = leaves e^(-2 s tau). Scans omega for equal
     /// moduli.
     fn star_s(&self, hub: f64, leaf: f64, leaves: f64, a22_per_s: f64) -> f64 {
-        const LOOKS: u32 = 4000;
+        const SCAN_STEPS: u32 = 4000;
         // Modes of the leaves alone have no received terms.
         if !self.gain.times(leaf).is_stable(a22_per_s) {
             return 0.0;
         }
         let ratio = |omega: f64| {
-            let q = self.turned(omega, a22_per_s);
+            let q = self.link_ratio(omega, a22_per_s);
             (Complex::new(hub, 0.0) - q) * (Complex::new(leaf, 0.0) - q) / leaves
         };
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         // Above this frequency the left side is larger.
         let fastest = 4.0 * (hub + leaf + leaves) * (c + k.sqrt()) + 4.0 * a22_per_s.abs();
-        let look = |step: u32| fastest * libm::pow(10.0, 6.0 * (f64::from(step) / f64::from(LOOKS) - 1.0));
+        let omega_at = |step: u32| fastest * libm::pow(10.0, 6.0 * (f64::from(step) / f64::from(SCAN_STEPS) - 1.0));
         let is_below = |omega: f64| ratio(omega).norm() < 1.0;
-        let crossings = (1..=LOOKS).filter(|&step| is_below(look(step - 1)) != is_below(look(step)));
+        let crossings = (1..=SCAN_STEPS).filter(|&step| is_below(omega_at(step - 1)) != is_below(omega_at(step)));
         crossings
             .map(|step| {
-                let below = is_below(look(step - 1));
-                let omega = bisect(look(step - 1), look(step), |omega| is_below(omega) == below);
+                let below = is_below(omega_at(step - 1));
+                let omega = bisect(omega_at(step - 1), omega_at(step), |omega| is_below(omega) == below);
                 (-ratio(omega).arg()).rem_euclid(TAU) / (2.0 * omega)
             })
             .fold(f64::INFINITY, f64::min)

@@ -214,11 +214,11 @@ impl Law for OrcaLaw {
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(at, command)?;
-        let fed_m_s2 = self.reference_use.fed_m_s2(&at.target.reference);
+        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&at.target.reference);
         for i in 0..self.count {
             let own_m_s = row(&at.own.velocities_m_s, i);
             let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
-            let wanted = fed_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
+            let wanted = feed_forward_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
             set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
         }
         check_range(command)

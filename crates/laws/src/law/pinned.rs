@@ -119,7 +119,7 @@ impl PinnedConsensus {
         if let Some(leader) = self.pinning.leader() {
             let (error_m, velocity_m_s) = off_reference(at, leader);
             let back = gains.position * error_m + gains.velocity * velocity_m_s;
-            set_row(command, leader, fed_forward(&at.target.reference, a22_per_s) - back);
+            set_row(command, leader, feed_forward_acceleration(&at.target.reference, a22_per_s) - back);
         }
     }
 
@@ -162,6 +162,6 @@ pub(super) fn error_m(positions_m: &Rows, formation: &Formation, place_m: Vector
 }
 
 /// Returns the acceleration `r'' - a22 r'` \[m/s^2\] that keeps a vehicle on the reference.
-pub(super) fn fed_forward(reference: &Reference, a22_per_s: f64) -> Vector3<f64> {
+pub(super) fn feed_forward_acceleration(reference: &Reference, a22_per_s: f64) -> Vector3<f64> {
     reference.acceleration_m_s2 - a22_per_s * reference.velocity_m_s
 }

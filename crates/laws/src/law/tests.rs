@@ -74,15 +74,15 @@ fn a_command_depends_only_on_the_tables_of_its_vehicle() {
     for spec in LawSpec::all() {
         for links in [Graph::complete(COUNT), Graph::star(COUNT), Graph::ring(COUNT)] {
             let mut law = built(&spec, &links, &formation);
-            let mut asked = |vehicle: Option<usize>| {
+            let mut command_with = |vehicle: Option<usize>| {
                 let held = pictures(vehicle);
                 let at = Observation { others: Others::Held(&held), ..Observation::exact(&swarm, &links, &formation) };
                 command(law.as_mut(), &at)
             };
-            let plain = asked(None);
+            let plain = command_with(None);
             let mut own = 0;
             for vehicle in 0..COUNT {
-                let other = asked(Some(vehicle));
+                let other = command_with(Some(vehicle));
                 let changed = |i: usize| (0..3).any(|axis| other[(i, axis)] != plain[(i, axis)]);
                 own += u32::from(changed(vehicle));
                 assert!(

@@ -12,9 +12,9 @@ const BITS: u32 = 21;
 const MOST_CELLS: f64 = (1_u64 << (BITS - 1)) as f64;
 /// Ratio of cell size to range: exceeds the rounding of up to [`MOST_CELLS`] cells, so that points within the range are
 /// in the same or adjacent cells.
-const WIDER: f64 = 1.0 + 1e-6;
+const CELL_MARGIN: f64 = 1.0 + 1e-6;
 /// Factor for the comparison of squared distances: exceeds the rounding of a square.
-const SQUARED: f64 = 1.0 + 1e-12;
+const SQUARE_MARGIN: f64 = 1.0 + 1e-12;
 const ALONG_Y: u64 = 1 << BITS;
 const ALONG_Z: u64 = 1 << (2 * BITS);
 /// Offsets from a cell to the later rows of cells that touch it.
@@ -55,7 +55,7 @@ impl NearPairs {
         let finite = || (0..positions_m.nrows()).map(|i| (i, row(positions_m, i))).filter(|(_, p)| is_finite(p));
         let none = Vector3::repeat(f64::INFINITY);
         let (low, high) = finite().fold((none, -none), |(low, high), (_, p)| (low.inf(&p), high.sup(&p)));
-        let cell_m = (range_m * WIDER).max((high - low).max() / MOST_CELLS);
+        let cell_m = (range_m * CELL_MARGIN).max((high - low).max() / MOST_CELLS);
         // With a cell width of 0 or infinity all points are in one cell.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most MOST_CELLS, and from 1")]
         let number = |offset_m: f64| (offset_m / cell_m) as u64 + 1;
@@ -72,7 +72,7 @@ impl NearPairs {
     /// Compares each point with later points in its own row of cells and in the four later rows that touch its cell.
     fn sweep(&mut self, range_m: f64) {
         let Self { cells, points, found, .. } = self;
-        let squared = range_m * range_m * SQUARED;
+        let squared = range_m * range_m * SQUARE_MARGIN;
         let mut starts = [0; LATER_ROWS.len()];
         found.clear();
         for (place, (&(cell, i), &point)) in cells.iter().zip(points.iter()).enumerate() {

@@ -51,7 +51,7 @@ pub struct Distance {
 
 impl Distance {
     /// Computes the errors of a swarm with respect to a formation at the reference, fitted within `freedom`. Takes
-    /// O(edges), with the sampling of [`largest_edge_error_m`] on large complete graphs.
+    /// O(edges), or O(N) if [`largest_edge_error_m`] uses its bound.
     #[must_use]
     pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
         let error = PositionError::of(&swarm.positions_m, formation, reference.position_m, freedom);

@@ -84,18 +84,18 @@ pub enum Change {
 
 /// Progress threshold: a root mean square speed below this fraction of (error times rate of the slowest mode) is no
 /// progress.
-const SLOW: f64 = 0.2;
-/// Time without progress that counts as a stall \[s\]. If longer, twice the time in which the law brings vehicles from
-/// rest to the threshold speed.
+const PROGRESS: f64 = 0.2;
+/// Time without progress that counts as a stall \[s\], unless twice the time in which the law brings vehicles from rest
+/// to the threshold speed is longer.
 const STALLED_S: f64 = 2.0;
 /// Smallest error that justifies spreading, in units of the arrival limit.
-const WORTH: f64 = 2.0;
+const MIN_ERROR: f64 = 2.0;
 /// Time without progress after which spread slots are given up \[s\].
 const GIVEN_UP_S: f64 = 10.0;
 /// Largest error at which spread slots are closed, as a fraction of the smallest slot distance.
 const SETTLED: f64 = 0.25;
 /// Time constant with which spread slots close \[s\].
-const FOLDING_S: f64 = 2.0;
+const CLOSING_S: f64 = 2.0;
 /// Excess scale below which the slots are those of the leg again.
 const CLOSED: f64 = 0.01;
 
@@ -173,12 +173,12 @@ impl Breather {
         freedom: Freedom,
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
-        let tolerance_m = WORTH * arrival.edge_error_m;
+        let tolerance_m = MIN_ERROR * arrival.edge_error_m;
         Self { breathing, settling, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
     }
 
     /// Removes the common position error of all vehicles from the errors.
-    pub(super) fn forgive_common_errors(&mut self) {
+    pub(super) fn ignore_common_errors(&mut self) {
         self.freedom = Freedom::Translation;
     }
 
@@ -199,12 +199,12 @@ impl Breather {
     }
 
     fn is_idle(&self, errors: &Errors) -> bool {
-        errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.settling.rate_per_s * errors.rms_m
+        errors.max_m > self.tolerance_m && errors.rms_m_s < PROGRESS * self.settling.rate_per_s * errors.rms_m
     }
 
     /// Returns the time without progress that counts as a stall \[s\].
     fn stalled_s(&self) -> f64 {
-        STALLED_S.max(2.0 * SLOW * self.settling.response_s)
+        STALLED_S.max(2.0 * PROGRESS * self.settling.response_s)
     }
 
     /// Spreads the slots of a leg, unless the limit of times is reached.
@@ -225,7 +225,7 @@ impl Breather {
         if !leg.interchangeable || self.assignments >= self.breathing.most {
             return false;
         }
-        let Some(slots) = shorter_ways(&sensed.positions_m, &leg.formation, self.leader) else { return false };
+        let Some(slots) = better_assignment(&sensed.positions_m, &leg.formation, self.leader) else { return false };
         self.assignments += 1;
         target.set_formation(&leg.formation.reordered(&slots));
         self.change = Some(Change::Assigned { slots });
@@ -258,7 +258,7 @@ impl Breather {
                 }
             }
             Phase::Closing { scale, since_s } => {
-                let beyond = (scale - 1.0) * libm::exp((since_s - time_s) / FOLDING_S);
+                let beyond = (scale - 1.0) * libm::exp((since_s - time_s) / CLOSING_S);
                 if beyond < CLOSED {
                     self.phase = Phase::Flying { idle_since_s: None };
                     target.set_formation(&leg.formation);
@@ -271,11 +271,11 @@ impl Breather {
 }
 
 /// Relative decrease of the sum of squared distances that justifies a new assignment.
-const SHORTER: f64 = 1e-9;
+const IMPROVEMENT: f64 = 1e-9;
 
 /// Returns the assignment with the least sum of squared distances if it is better than the present one; a leader keeps
 /// its slot. The result does not depend on a translation of the formation.
-fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
+fn better_assignment(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
     let found = match leader {
         Some(leader) => optimal_slots_around(positions_m, formation, leader)?,
         None => optimal_slots(positions_m, formation, Freedom::Fixed)?,
@@ -285,7 +285,7 @@ fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>
     let way = |i: usize, slot: usize| row(positions_m, i) - row(&formation.slots_m, slot);
     let mean_m = free().map(|i| way(i, i)).sum::<Vector3<f64>>() / free().count().max(1) as f64;
     let sum = |slot: &dyn Fn(usize) -> usize| free().map(|i| (way(i, slot(i)) - mean_m).norm_squared()).sum::<f64>();
-    (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - SHORTER)).then_some(found)
+    (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - IMPROVEMENT)).then_some(found)
 }
 
 impl Leg {

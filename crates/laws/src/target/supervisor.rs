@@ -94,7 +94,7 @@ impl Schedule {
     #[must_use]
     pub fn blown(mut self, is_blown: bool) -> Self {
         if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {
-            breather.forgive_common_errors();
+            breather.ignore_common_errors();
         }
         self
     }

@@ -173,7 +173,7 @@ fn vehicles_on_the_reference_get_its_feed_forward() {
         set_row(&mut swarm.positions_m, i, place_m);
         set_row(&mut swarm.velocities_m_s, i, reference.velocity_m_s);
     }
-    let expected = fed_forward(&reference, A22_PER_S);
+    let expected = feed_forward_acceleration(&reference, A22_PER_S);
     for links in graphs() {
         for known_by in pinnings() {
             let mut law = law(&links, &formation, &[], &guidance(&known_by));
@@ -226,14 +226,14 @@ fn a_moving_reference_without_feed_forward_voids_the_certificate() {
     let swarm = Swarm::at_rest(formation.slots_m.clone());
     let at_rest = ReferenceMotion::Rest { position_m: Vector3::zeros() };
     for (motion, holds) in [(at_rest, true), (guidance(&Pinning::All).motion, false)] {
-        let untold = Guidance { motion, feed_forward: false, known_by: Pinning::All };
-        let law = law(&links, &formation, &[], &untold);
-        let certificate = law.certificate(&observation(&swarm, &links, &formation, untold.motion.at(0.0)), &[]);
+        let not_fed = Guidance { motion, feed_forward: false, known_by: Pinning::All };
+        let law = law(&links, &formation, &[], &not_fed);
+        let certificate = law.certificate(&observation(&swarm, &links, &formation, not_fed.motion.at(0.0)), &[]);
         assert_eq!(certificate.certified_m.is_some(), holds);
         assert_eq!(certificate.void.contains(&Void::ReferenceNotFed), !holds);
     }
-    let nobody = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
-    let context = LawContext { guidance: Some(&nobody), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
+    let unknown = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
+    let context = LawContext { guidance: Some(&unknown), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
     let refused = DisplacementLaw::new(&context, DisplacementKeys::default());
-    assert!(matches!(refused, Err(ParameterError::NobodyKnowsTheReference)));
+    assert!(matches!(refused, Err(ParameterError::ReferenceUnknown)));
 }

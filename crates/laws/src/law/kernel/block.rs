@@ -15,7 +15,7 @@ pub(super) const LANES: usize = 8;
 pub(super) type Lanes = [f64; LANES];
 
 /// Coordinate of padding lanes: so far away that the pull is 0.
-pub(super) const NOWHERE_M: f64 = f64::MAX;
+pub(super) const PADDING_M: f64 = f64::MAX;
 
 /// Evaluates edges from one vehicle to others, at most B at a time. B is a multiple of the number of lanes.
 pub(super) struct Block<const B: usize> {
@@ -33,7 +33,7 @@ pub(super) struct Block<const B: usize> {
     is_inside: bool,
 }
 
-/// Other ends of `count` edges. Each slice has whole lanes. Padding lanes have any 1/K, positions at [`NOWHERE_M`]
+/// Other ends of `count` edges. Each slice has whole lanes. Padding lanes have any 1/K, positions at [`PADDING_M`]
 /// (pull with weight 0), and sums that no vehicle reads.
 pub(super) struct Ends<'a> {
     pub(super) count: usize,

@@ -127,7 +127,7 @@ fn the_bits_of_bands_do_not_depend_on_the_number_of_threads() {
     let (mut kernel, positions_m, _) = fixture(&graph);
     let mut whole = Rows::zeros(graph.count());
     let mut in_one = kernel.clone();
-    in_one.bands = Some(Bands::new(graph.count(), 1, LANES, NOWHERE_M));
+    in_one.bands = Some(Bands::new(graph.count(), 1, LANES, PADDING_M));
     let potential = in_one.add_pulls(&positions_m, &mut whole).expect("far apart");
 
     let mut on = |threads: usize| {
