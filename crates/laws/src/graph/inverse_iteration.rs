@@ -201,7 +201,7 @@ impl<'a> Operator<'a> {
                 tree.solve(&mut near);
             }
             Preconditioner::Diagonal(diagonal) => {
-                near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal)
+                near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal);
             }
         }
         self.project(&mut near);

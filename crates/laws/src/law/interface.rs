@@ -24,8 +24,8 @@ pub trait Law: DynClone + Send {
     /// Short name for reports, such as `edge-tension`.
     fn name(&self) -> &str;
 
-    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on what vehicle i
-    /// knows.
+    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on the states
+    /// that vehicle i knows.
     ///
     /// Called once a step; implementations keep their scratch memory so that nothing is allocated here.
     ///
@@ -85,7 +85,7 @@ pub fn certificate_through(law: &dyn Law, start: &Observation<'_>, ahead: &[&For
 
 /// Needs, limits, controlled quantities and assumptions of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
+#[expect(clippy::struct_excessive_bools, reason = "the properties are independent")]
 pub struct Capabilities {
     /// Needs of a vehicle besides states received over links, as short phrases: a common compass, a sensor.
     pub needs: &'static [&'static str],

@@ -4,7 +4,7 @@
 //! compiler turns them into the vector instructions detected at run time. No operation is fused or reordered, and the
 //! edges alone fix the order of sums. The bits therefore depend neither on the vector width nor on the optimisation
 //! level.
-#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for the instructions detected at run time")]
 
 mod block;
 

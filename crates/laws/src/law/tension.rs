@@ -1,5 +1,5 @@
 //! The edge tension (5), (6): a potential of one pair with a barrier at delta and its minimum at the desired distance.
-#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel are made of the functions here")]
+#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel inline these functions")]
 
 use std::hint::select_unpredictable;
 

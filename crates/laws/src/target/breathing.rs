@@ -39,7 +39,7 @@ pub struct Breathing {
     pub hold_s: f64,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(hold_s: &f64) -> bool {
     *hold_s == 0.0
 }

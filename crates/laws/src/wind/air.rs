@@ -172,7 +172,11 @@ impl Turbulence {
     fn at(&self, vehicle: usize, time_s: f64) -> Vector3<f64> {
         let stream = if self.eddies.len() == 1 { 0 } else { vehicle };
         let place = (time_s * TURBULENCE_HZ - self.first as f64).clamp(0.0, (self.window.len() - 1) as f64);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the window")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the index is clamped to the window"
+        )]
         let before = (place as usize).min(self.window.len() - 2);
         let (from, to) = (self.window[before][stream], self.window[before + 1][stream]);
         from + (place - before as f64) * (to - from)

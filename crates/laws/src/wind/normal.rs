@@ -24,7 +24,7 @@ impl Normals {
     }
 
     /// Returns the next normal number (mean 0, variance 1).
-    #[expect(clippy::should_implement_trait, reason = "it never ends, and is no Option")]
+    #[expect(clippy::should_implement_trait, reason = "the generator never ends and returns no Option")]
     pub fn next(&mut self) -> f64 {
         if let Some(second) = self.second.take() {
             return second;

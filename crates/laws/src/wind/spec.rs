@@ -103,14 +103,15 @@ mod point {
 mod vehicles {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-    #[expect(clippy::ref_option, reason = "serde asks for a reference to the field")]
+    #[expect(clippy::ref_option, reason = "serde passes a reference to the field")]
     pub(super) fn serialize<S: Serializer>(met: &Option<Vec<usize>>, serializer: S) -> Result<S::Ok, S::Error> {
         met.as_ref().map(|met| met.iter().map(|&vehicle| vehicle as u64 + 1).collect::<Vec<_>>()).serialize(serializer)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<usize>>, D::Error> {
         let numbers = Vec::<usize>::deserialize(deserializer)?.into_iter();
-        let indices = numbers.map(|number| number.checked_sub(1).ok_or_else(|| D::Error::custom("vehicle 0")));
+        let indices = numbers
+            .map(|number| number.checked_sub(1).ok_or_else(|| D::Error::custom("vehicles are counted from 1, got 0")));
         let mut met = indices.collect::<Result<Vec<_>, _>>()?;
         met.sort_unstable();
         met.dedup();

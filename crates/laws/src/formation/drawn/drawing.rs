@@ -163,7 +163,7 @@ pub const MAX_TEXT_CHARS: usize = 1000;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum DrawingError {
     /// A character that the font does not have.
-    #[error("the font has no {0:?}")]
+    #[error("the font has no glyph for {0:?}")]
     Glyph(char),
     /// A text that is too long.
     #[error("a text of {0} characters; at most {MAX_TEXT_CHARS} are drawn")]
@@ -177,16 +177,16 @@ pub enum DrawingError {
         letters: usize,
     },
     /// Path data that cannot be read.
-    #[error("this is no SVG path: {0}")]
+    #[error("invalid SVG path: {0}")]
     Path(String),
     /// An SVG file that cannot be read.
-    #[error("this is no SVG file: {0}")]
+    #[error("invalid SVG file: {0}")]
     Svg(String),
     /// An SVG file whose elements are nested too deeply.
     #[error("elements of the SVG file are nested more than {0} deep")]
     Nesting(usize),
     /// A picture that cannot be read.
-    #[error("this is no PNG picture: {0}")]
+    #[error("invalid PNG picture: {0}")]
     Png(String),
     /// A picture that is too large.
     #[error("{width} x {height} pixels; at most {MAX_PIXELS} in all are read")]

@@ -225,7 +225,7 @@ fn occupied(samples: &[Point], side: f64) -> Vec<[i64; 2]> {
 fn cell(point: Point, side: f64) -> [i64; 2] {
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "a drawing is within 1 x 1, and a cell not smaller than a sample's step"
+        reason = "a drawing is within 1 x 1, and cells are at least as large as the sample spacing"
     )]
     let number = point.map(|x| (x / side).floor() as i64);
     number

@@ -2,7 +2,7 @@
 //!
 //! The pull between two vehicles takes a chain of some forty dependent operations. A stage is a short part of the chain
 //! for all edges of a block, so the processor overlaps the operations of many edges.
-#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for the instructions detected at run time")]
 
 use pulp::Simd;
 
@@ -80,10 +80,7 @@ impl<const B: usize> Block<B> {
 }
 
 /// Computes edges, lengths, s and exponents. Returns whether some edge is not longer than delta.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "what arguments point at is known to be apart, which vector instructions need"
-)]
+#[expect(clippy::too_many_arguments, reason = "separate slice arguments do not alias, which vectorisation needs")]
 #[inline(always)]
 fn measure(
     delta_m: f64,

@@ -158,7 +158,7 @@ fn delay_margins_of_received_states_match_the_roots_of_the_swarm() {
         let links = crate::law::pinned::PinnedConsensus::new(&graph, pinning.clone());
         let gain = mode(1.0, 1.0 + a22).times(1.0 / graph.pinned_connectivity(&pinning));
         let heard = links.linear(gain, gain).heard.expect("a graph of the list");
-        let margin_s = heard.delay_margin_s(a22).expect("told apart");
+        let margin_s = heard.delay_margin_s(a22).expect("a margin");
         if margin_s.is_infinite() {
             assert!(!grows(&heard, &graph, &pinning, (a22, 30.0)), "{graph:?}");
             continue;
