@@ -108,7 +108,7 @@ fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_n
     for part in [
         "CLEAR: never closer than",
         "certified 2.055307 m",
-        "The certified distance holds for the complete graph",
+        "The certified separation holds for the complete graph",
         "Everything is computed in double precision",
         "tautline run pentagon --set &#39;time.duration_s=2&#39;",
         "kind = &quot;rapier&quot;",

@@ -2,12 +2,12 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`law`] | a file a law: its keys, bounds, energy and certificate; [`law::Law`] is the trait for one of your own |
+//! | [`law`] | one file per law: scenario keys, bounds, energy, certificate; [`law::Law`] is the trait for custom laws |
 //! | [`observation`] | input of a law: own state, received and sensed states of other vehicles, target |
 //! | [`graph`] | which vehicles exchange states: Laplacians, algebraic connectivity |
 //! | [`formation`] | target shapes, desired distances, the error of a shape up to a rigid motion |
-//! | [`target`] | legs of formations, what counts as reached, which vehicle flies to which slot |
-//! | [`space`] | neighbours by distance, points that keep apart, shapes of obstacles |
+//! | [`target`] | legs of formations, arrival criteria, assignment of vehicles to slots |
+//! | [`space`] | neighbours by distance, point sets with a minimum spacing, shapes of obstacles |
 //! | [`wind`] | mean wind, gusts and turbulence by exact filters |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]

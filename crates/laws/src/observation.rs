@@ -1,8 +1,9 @@
-//! What a law is told at one instant.
+//! Input of a control law at one instant.
 //!
-//! Vehicle i knows its own state, the target, and of each other vehicle j what it *heard* (over a link of the graph, with
-//! the age of the message) and what it *sees* (with a sensor of its own). Where every vehicle knows the true present
-//! state of every other, all of these are one table that nobody copies.
+//! Vehicle i knows its own state and the target. Of each other vehicle j it has two states. The state that it *heard*
+//! was received over a link of the graph, with the age of the message. The state that it *sees* is measured by its own
+//! sensor. If every vehicle knows the true present state of every other, all of these are one shared table without
+//! copies.
 
 use std::fmt;
 
@@ -14,77 +15,77 @@ use crate::space::Obstacle;
 use crate::target::Target;
 use tautline_core::swarm::{Rows, Swarm, row};
 
-/// What a law is told at one instant. SI units, one inertial frame.
+/// Input of a control law at one instant. SI units, one inertial frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
     /// Time of the flight \[s\].
     pub time_s: f64,
-    /// What each vehicle knows of itself: row i is vehicle i's own.
+    /// Own states as the vehicles know them: row i is the state of vehicle i as vehicle i knows it.
     pub own: &'a Swarm,
-    /// What vehicles know of each other.
+    /// States of other vehicles as each vehicle knows them.
     pub others: Others<'a>,
-    /// Where they shall go.
+    /// Formation and reference to reach.
     pub target: Target<'a>,
-    /// Who talks to whom.
+    /// Communication links.
     pub links: &'a Graph,
-    /// Pairs i < j within the law's sensing range ([`crate::law::Capabilities::sensing_range_m`]) of each other, and perhaps some a
-    /// little farther apart, in index order; none for a law that senses nobody.
+    /// Pairs i < j within the law's sensing range ([`crate::law::Capabilities::sensing_range_m`]), in index order. May
+    /// contain pairs that are slightly farther apart. Empty for a law without a sensing range.
     pub near: &'a [(usize, usize)],
-    /// What stands in the way.
+    /// Obstacles in the world.
     pub obstacles: &'a [Obstacle],
 }
 
-/// What vehicles know of each other.
+/// States of other vehicles as each vehicle knows them.
 #[derive(Clone, Copy, Debug)]
 pub enum Others<'a> {
-    /// Everybody knows what everybody knows of himself: [`Observation::own`] is all there is.
+    /// Every vehicle knows all own states exactly: [`Observation::own`] holds them.
     Shared,
-    /// Each vehicle holds its own picture of the others.
+    /// Each vehicle has its own received and sensed states of the others.
     Held(&'a dyn Picture),
 }
 
-/// What each vehicle knows of each other, however it is kept.
+/// Received and sensed states that each vehicle has of every other.
 pub trait Picture: fmt::Debug + Sync {
-    /// What vehicle `i` heard of vehicle `j` over a link; of one without a link whatever is at hand.
+    /// State of vehicle `j` as vehicle `i` last received it; without a link from j to i the value is unspecified.
     fn heard(&self, i: usize, j: usize) -> Neighbour;
 
-    /// What vehicle `i` sees of vehicle `j`.
+    /// State of vehicle `j` as vehicle `i` senses it.
     fn seen(&self, i: usize, j: usize) -> Neighbour;
 
-    /// Whether it is of so many vehicles.
+    /// Whether the tables are of `count` vehicles.
     fn is_of(&self, count: usize) -> bool;
 
-    /// The first vehicle of which somebody holds what is not finite.
+    /// First vehicle whose received or sensed state is not finite in some table.
     fn first_not_finite(&self) -> Option<usize> {
         None
     }
 
-    /// Where vehicles are found to be near each other, and by how much more than the sensing range apart \[m\] they may be
-    /// there who hold each other for near; their own states unless given.
+    /// Positions for the search of near pairs, with the distance \[m\] to add to the sensing range. With this addition
+    /// the search finds every pair whose sensed separation is in range. `None`: own positions and no addition.
     fn near_from(&self) -> Option<(&Rows, f64)> {
         None
     }
 }
 
-/// A picture of the swarm for each vehicle, as tables: 100 bytes for every two vehicles.
+/// Received and sensed states as dense tables: 100 bytes per ordered pair of vehicles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
-    /// `heard[i]` has in row j what vehicle i last heard of vehicle j.
+    /// Row j of `heard[i]` is the state of vehicle j that vehicle i last received.
     pub heard: Vec<Swarm>,
-    /// `ages_s[i][j]` is how old that was when it was heard and since \[s\].
+    /// `ages_s[i][j]` is the present age of that state \[s\].
     pub ages_s: Vec<Vec<f64>>,
-    /// `seen[i]` has in row j what vehicle i sees of vehicle j.
+    /// Row j of `seen[i]` is the state of vehicle j that vehicle i senses.
     pub seen: Vec<Swarm>,
 }
 
-/// What one vehicle knows of another.
+/// State of one vehicle as another knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
     /// Position \[m\].
     pub position_m: Vector3<f64>,
     /// Velocity \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// Time since this was so \[s\].
+    /// Age of the state \[s\].
     pub age_s: f64,
 }
 
@@ -111,7 +112,7 @@ impl Picture for Held {
 }
 
 impl Neighbour {
-    /// State of vehicle `j` of a swarm, `age_s` old \[s\].
+    /// Returns the state of vehicle `j` of a swarm with age `age_s` \[s\].
     #[must_use]
     pub fn of(swarm: &Swarm, j: usize, age_s: f64) -> Self {
         Self { position_m: row(&swarm.positions_m, j), velocity_m_s: row(&swarm.velocities_m_s, j), age_s }
@@ -119,8 +120,8 @@ impl Neighbour {
 }
 
 impl<'a> Observation<'a> {
-    /// The true present state, known to everybody, of a swarm on its way to a formation at rest. Near pairs and obstacles
-    /// are for the caller to add.
+    /// Observation where every vehicle knows the true present states and the target is a formation at rest. The caller
+    /// adds near pairs and obstacles.
     #[must_use]
     pub fn exact(swarm: &'a Swarm, links: &'a Graph, formation: &'a Formation) -> Self {
         Self {
@@ -134,13 +135,13 @@ impl<'a> Observation<'a> {
         }
     }
 
-    /// The one state that all vehicles share, where they do.
+    /// Returns the state table that all vehicles share, if they share one.
     #[must_use]
     pub fn shared(&self) -> Option<&'a Swarm> {
         matches!(self.others, Others::Shared).then_some(self.own)
     }
 
-    /// What vehicle `i` heard of vehicle `j` over a link.
+    /// Returns the state of vehicle `j` that vehicle `i` received over a link.
     ///
     /// # Panics
     /// If a vehicle is out of range.
@@ -152,7 +153,7 @@ impl<'a> Observation<'a> {
         }
     }
 
-    /// What vehicle `i` sees of vehicle `j`.
+    /// Returns the state of vehicle `j` that vehicle `i` senses.
     ///
     /// # Panics
     /// If a vehicle is out of range.
@@ -170,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shared_state_is_what_everybody_hears_and_sees_and_a_held_one_is_each_vehicles_own() {
+    fn heard_and_seen_states_come_from_the_shared_table_or_from_each_vehicle() {
         let at = |x: f64| Swarm::at_rest(Formation::line(2, x).slots_m);
         let (own, graph, formation) = (at(1.0), Graph::complete(2), Formation::line(2, 1.0));
         let exact = Observation::exact(&own, &graph, &formation);

@@ -1,12 +1,12 @@
-//! Who flies to which slot, where vehicles are interchangeable.
+//! Optimal assignment of interchangeable vehicles to slots.
 
 use nalgebra::{Rotation3, Vector3};
 
 use super::{Formation, Freedom, best_rigid_motion};
 use tautline_core::swarm::{Rows, mean_row, row, set_row};
 
-/// Most vehicles that are assigned to a formation that is free to be moved so: the table of all distances takes 8 N^2 bytes,
-/// and assigning them O(N^3), dozens of times where the formation may be turned.
+/// Returns the largest number of vehicles for an assignment within `freedom`. The table of squared distances takes 8
+/// N^2 bytes. Each assignment takes O(N^3), dozens of times for rigid motions.
 #[must_use]
 pub const fn most_assigned(freedom: Freedom) -> usize {
     match freedom {
@@ -14,21 +14,22 @@ pub const fn most_assigned(freedom: Freedom) -> usize {
         Freedom::RigidMotion => 500,
     }
 }
-/// Up to here a formation that may be turned is tried in [`TURNS`] directions, beyond in one.
+/// Largest number of vehicles for which a rotatable formation starts from [`TURNS`] directions; beyond, from one.
 const TURNED_UP_TO: usize = 200;
-/// Directions in which it is tried first.
+/// Number of start directions.
 const TURNS: u32 = 8;
-/// Assignments and fits that follow each other: each lowers the sum, so few are needed.
+/// Largest number of alternating assignments and fits. Each lowers the sum, so few are needed.
 const MOST_ROUNDS: usize = 50;
 
-/// For each vehicle the slot that it is given, so that the sum of squared distances from the positions to their slots, once
-/// the formation is moved as it may be, is least: exactly where it may not be turned. For rigid motions assignment and
-/// best fit take turns from several directions, which finds a sum that no single turn betters.
+/// Returns for each vehicle the slot that minimizes the sum of squared distances after the best motion within
+/// `freedom`. The result is exact unless the formation may rotate. For rigid motions, assignment and best fit alternate
+/// from several start directions until no single step lowers the sum.
 ///
 /// Straight lines to such slots keep their distance: `(p_i - p_j).(h_i - h_j) >= 0` for every pair (Turpin, Michael and
 /// Kumar 2014).
 ///
-/// `None` for different numbers of positions and slots, for more than [`most_assigned`], or where a number is not finite.
+/// `None` for different numbers of positions and slots, more vehicles than [`most_assigned`], or values that are not
+/// finite.
 #[must_use]
 pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom) -> Option<Vec<usize>> {
     let count = positions_m.nrows();
@@ -60,8 +61,8 @@ pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom
     best.map(|(slots, _)| slots)
 }
 
-/// The same for all but a leader, who keeps its slot: the formation is laid around it, and wherever that is, the same slots are
-/// best for the others.
+/// As [`optimal_slots`], but a leader keeps its slot and the formation is placed around it. The best slots of the
+/// others do not depend on the position of the formation.
 #[must_use]
 pub fn optimal_slots_around(positions_m: &Rows, formation: &Formation, leader: usize) -> Option<Vec<usize>> {
     let count = positions_m.nrows();
@@ -76,7 +77,7 @@ pub fn optimal_slots_around(positions_m: &Rows, formation: &Formation, leader: u
     Some(given)
 }
 
-/// Assigns to the slots as they lie, lays the formation anew over what was assigned, and so on until nothing changes.
+/// Alternates assignment and best fit until the assignment stays the same.
 fn settle(positions_m: &Rows, slots: &Formation, mut placed_m: Rows) -> Option<(Vec<usize>, f64)> {
     let mut found = assign(positions_m, &placed_m)?;
     for _ in 0..MOST_ROUNDS {
@@ -92,7 +93,7 @@ fn settle(positions_m: &Rows, slots: &Formation, mut placed_m: Rows) -> Option<(
     Some(found)
 }
 
-/// The slot of each vehicle, and the sum of squared distances \[m^2\].
+/// Returns the slot of each vehicle, and the sum of squared distances \[m^2\].
 fn assign(positions_m: &Rows, slots_m: &Rows) -> Option<(Vec<usize>, f64)> {
     let count = positions_m.nrows();
     let square = |i: usize, j: usize| (row(positions_m, i) - row(slots_m, j)).norm_squared();
@@ -127,7 +128,7 @@ mod tests {
         (0..slots.len()).map(|i| (row(positions_m, i) - row(&given.slots_m, i) - offset).norm_squared()).sum()
     }
 
-    /// Every order of 0..count.
+    /// Returns every permutation of 0..count.
     fn orders(count: usize) -> Vec<Vec<usize>> {
         if count == 0 {
             return vec![Vec::new()];
@@ -146,15 +147,16 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
         #[test]
-        fn no_other_order_has_a_smaller_sum(
+        fn assignment_is_optimal(
             positions in prop::collection::vec(-5.0..5.0_f64, 18), slots in prop::collection::vec(-5.0..5.0_f64, 18),
         ) {
             let (positions_m, formation) =
                 (Rows::from_column_slice(&positions), Formation::points(Rows::from_column_slice(&slots)));
             let found = optimal_slots(&positions_m, &formation, Freedom::Translation).expect("finite numbers");
-            let least = orders(6).iter().map(|order| sum(&positions_m, &formation, order)).fold(f64::INFINITY, f64::min);
+            let sums = orders(6).into_iter().map(|order| sum(&positions_m, &formation, &order));
+            let least = sums.fold(f64::INFINITY, f64::min);
             prop_assert!((sum(&positions_m, &formation, &found) - least).abs() < 1e-9 * (1.0 + least));
-            // Monge: who is apart is apart by its slots in no opposite direction.
+            // Monge property: relative positions of vehicles and of their slots never point in opposite directions.
             let given = formation.reordered(&found);
             for i in 0..6 {
                 for j in 0..i {
@@ -165,7 +167,7 @@ mod tests {
         }
 
         #[test]
-        fn around_a_leader_no_other_order_of_the_others_has_a_smaller_sum(
+        fn assignment_around_a_leader_is_optimal(
             positions in prop::collection::vec(-5.0..5.0_f64, 15), slots in prop::collection::vec(-5.0..5.0_f64, 15),
             leader in 0..5_usize,
         ) {
@@ -193,14 +195,15 @@ mod tests {
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
             let flip = if mirror { -1.0 } else { 1.0 };
             let shuffled = formation.reordered(&[3, 0, 4, 2, 1]);
-            let moved = map(&shuffled.slots_m, |slot| turn * Vector3::new(slot.x, flip * slot.y, 0.0) + Vector3::repeat(9.0));
+            let motion = |slot: Vector3<f64>| turn * Vector3::new(slot.x, flip * slot.y, 0.0) + Vector3::repeat(9.0);
+            let moved = map(&shuffled.slots_m, motion);
             let found = optimal_slots(&moved, &formation, Freedom::RigidMotion).expect("finite numbers");
             prop_assert_eq!(found, [3, 0, 4, 2, 1]);
         }
     }
 
     #[test]
-    fn what_cannot_be_assigned_is_not() {
+    fn invalid_assignments_return_none() {
         let formation = Formation::line(3, 1.0);
         assert_eq!(optimal_slots(&Rows::zeros(2), &formation, Freedom::Translation), None);
         let lost = Rows::from_element(3, f64::NAN);

@@ -1,4 +1,4 @@
-//! How well a swarm fits a shape once the best rigid motion is taken out.
+//! Errors of a swarm with respect to a shape, after the best rigid motion or translation.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -6,32 +6,33 @@ use super::Formation;
 use crate::graph::Graph;
 use tautline_core::swarm::{Rows, first_row_not_finite, row};
 
-/// What a formation may be moved by and still be the same.
+/// Motions that leave a formation equivalent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
-    /// Nothing: every slot is a place.
+    /// None: every slot is an absolute position.
     Fixed,
     /// A translation.
     Translation,
-    /// Any rigid motion, reflections among them.
+    /// Any rigid motion, reflections included.
     RigidMotion,
 }
 
-/// How far positions are from the slots that are laid over them.
+/// Distances of positions from the slots of a fitted formation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionError {
-    /// Root mean square \[m\].
+    /// Root mean square distance \[m\].
     pub rms_m: f64,
-    /// Of the vehicle that is farthest from its slot \[m\].
+    /// Largest distance of a vehicle from its slot \[m\].
     pub max_m: f64,
 }
 
 impl PositionError {
-    /// Of nothing that could be laid over anything.
+    /// Error without a fit.
     pub const UNKNOWN: Self = Self { rms_m: f64::NAN, max_m: f64::NAN };
 
-    /// Of positions from slots, which are moved by `place_m` \[m\] and then as they are free to be so that the root mean square
-    /// is least; [`PositionError::UNKNOWN`] where there is none. Allocates nothing.
+    /// Computes the error after the motion within `freedom` of least root mean square error. With [`Freedom::Fixed`]
+    /// the slots are moved by `place_m` \[m\]. Returns [`PositionError::UNKNOWN`] if there is no fit. Allocates
+    /// nothing.
     #[must_use]
     pub fn of(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, freedom: Freedom) -> Self {
         let (count, slots_m) = (positions_m.nrows(), &formation.slots_m);
@@ -47,8 +48,8 @@ impl PositionError {
         Self::of_residuals((0..count).map(|i| row(positions_m, i) - row(slots_m, i) - offset_m))
     }
 
-    /// Summing residuals keeps the digits that |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit. One that is not a number
-    /// makes both so: a largest of comparisons would pass it over.
+    /// Sums squared residuals, because |P|^2 + |H|^2 - 2 tr S would cancel near a perfect fit. A NaN residual makes
+    /// both errors NaN, since `max` would ignore it.
     fn of_residuals(residuals_m: impl ExactSizeIterator<Item = Vector3<f64>>) -> Self {
         let count = residuals_m.len();
         let (sum, most) = residuals_m
@@ -59,36 +60,35 @@ impl PositionError {
     }
 }
 
-/// An isometry of space: x -> rotation x + translation.
+/// Isometry of space: x -> rotation x + translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidMotion {
-    /// Orthogonal 3 x 3 matrix; its determinant is -1 where it reflects.
+    /// Orthogonal 3 x 3 matrix; its determinant is -1 for a reflection.
     pub rotation: Matrix3<f64>,
     /// Translation \[m\].
     pub translation_m: Vector3<f64>,
 }
 
 impl RigidMotion {
-    /// The image of a point \[m\].
+    /// Returns the image of a point \[m\].
     #[must_use]
     pub fn apply(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         self.rotation * point_m + self.translation_m
     }
 
-    /// Whether the motion reflects.
+    /// Whether the motion is a reflection.
     #[must_use]
     pub fn reflects(&self) -> bool {
         self.rotation.determinant() < 0.0
     }
 }
 
-/// The isometry that takes the slots onto the positions with the least sum of squared errors, reflections allowed
-/// (orthogonal Procrustes problem).
+/// Returns the isometry that maps the slots onto the positions with the least sum of squared errors, reflections
+/// allowed (orthogonal Procrustes problem).
 ///
 /// With the centred tables P (positions) and H (slots), the rotation is U V^T of the singular value decomposition
-/// H^T P = V S U^T. Where the shape is flat the motion out of its flat is any that fits.
-/// None for an empty swarm, for different numbers of positions and slots, or where a number is not finite.
-/// Allocates nothing.
+/// H^T P = V S U^T. For a flat shape the rotation out of its plane is arbitrary. Returns `None` for an empty swarm,
+/// different numbers of positions and slots, or values that are not finite. Allocates nothing.
 #[must_use]
 pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<RigidMotion> {
     Fit::new(positions_m, formation).map(|fit| RigidMotion {
@@ -97,15 +97,15 @@ pub fn best_rigid_motion(positions_m: &Rows, formation: &Formation) -> Option<Ri
     })
 }
 
-/// Root mean square distance \[m\] between the positions and the slots after [`best_rigid_motion`], NaN where there is
-/// none. Allocates nothing.
+/// Returns the root mean square distance \[m\] between positions and slots after [`best_rigid_motion`]; NaN without a
+/// fit. Allocates nothing.
 #[must_use]
 pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
     PositionError::of(positions_m, formation, Vector3::zeros(), Freedom::RigidMotion).rms_m
 }
 
-/// The distances \[m\] of the two positions that are farthest from their slots after [`best_rigid_motion`], added; NaN where
-/// there is none. Allocates nothing.
+/// Returns the sum of the two largest distances \[m\] of positions from their slots after [`best_rigid_motion`]; NaN
+/// without a fit. Allocates nothing.
 pub(super) fn two_farthest_m(positions_m: &Rows, formation: &Formation) -> f64 {
     let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
     let distances_m = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm());
@@ -122,7 +122,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// From each slot as it is laid to its position \[m\].
+    /// Returns the vector from each fitted slot to its position \[m\].
     fn residuals_m<'a>(
         &'a self,
         positions_m: &'a Rows,
@@ -155,28 +155,28 @@ impl Fit {
     }
 }
 
-/// Edges of a complete graph up to which each of them is looked at.
+/// Largest number of edges of a complete graph for which each edge is evaluated.
 const MOST_EDGES: usize = 1_000_000;
 
-/// Edges or vehicles that [`largest_edge_error_m`] looks at.
+/// Returns the number of edges or vehicles that [`largest_edge_error_m`] evaluates.
 #[must_use]
 pub fn edges_looked_at(graph: &Graph) -> usize {
     if is_bounded(graph) { graph.count() } else { graph.edge_count() }
 }
 
-/// Whether pairs are too many to be looked at one by one.
+/// Whether [`largest_edge_error_m`] uses the O(N) bound.
 fn is_bounded(graph: &Graph) -> bool {
     graph.is_complete() && graph.edge_count() > MOST_EDGES
 }
 
 /// Largest error of a desired distance over the edges of the graph, `max |l_ij - d_ij|` \[m\]; 0 without edges.
 ///
-/// On a complete graph of more than a million edges (1414 vehicles) a bound on it, in O(N): no distance is off by more than
-/// its two vehicles are from their slots, so the two largest of these distances are added, from the formation as
-/// [`best_rigid_motion`](super::best_rigid_motion) lays it over the swarm. Two vehicles that are off in opposite directions reach it.
+/// On a complete graph of more than a million edges (1414 vehicles) it is an upper bound, in O(N). The error of a
+/// distance is at most the sum of the distances of its two vehicles from their slots. The bound adds the two largest of
+/// these distances after [`best_rigid_motion`](super::best_rigid_motion). Two vehicles displaced in opposite directions
+/// attain it.
 ///
-/// NaN where a position of an edge is NaN, or where positions, formation and graph do not have the same number of
-/// vehicles.
+/// NaN if a position of an edge is NaN, or if positions, formation and graph have different numbers of vehicles.
 #[must_use]
 pub fn largest_edge_error_m(positions_m: &Rows, formation: &Formation, graph: &Graph) -> f64 {
     let count = positions_m.nrows();
@@ -201,10 +201,11 @@ pub fn largest_edge_error_m(positions_m: &Rows, formation: &Formation, graph: &G
     largest
 }
 
-/// Dimension of the smallest flat that holds all rows: 0 a point, 1 a line, 2 a plane, 3 space.
+/// Returns the dimension of the smallest affine subspace that contains all rows: 0 a point, 1 a line, 2 a plane, 3
+/// space.
 ///
-/// Counts the singular values of the centred table above `relative_tolerance` times the largest one. An empty table
-/// and one with a number that is not finite have dimension 0.
+/// Counts the singular values of the centred table above `relative_tolerance` times the largest one. An empty table and
+/// one with a value that is not finite have dimension 0.
 #[must_use]
 pub fn affine_dimension(rows: &Rows, relative_tolerance: f64) -> usize {
     if rows.nrows() == 0 || first_row_not_finite(rows).is_some() {
@@ -221,7 +222,7 @@ pub fn affine_dimension(rows: &Rows, relative_tolerance: f64) -> usize {
     singular.iter().filter(|&&value| value > relative_tolerance * singular[0]).count()
 }
 
-/// Mean of the rows, taken about the first one so that a swarm far from the origin loses no digits.
+/// Returns the mean of the rows, relative to the first row so that a swarm far from the origin loses no digits.
 pub(super) fn centre(rows: &Rows) -> Vector3<f64> {
     let origin = row(rows, 0);
     let count = rows.nrows();

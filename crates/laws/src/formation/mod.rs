@@ -1,7 +1,7 @@
-//! Shapes to be flown: a slot per vehicle, the distances between them, and how far a swarm is from the shape.
+//! Formations: a slot per vehicle, the desired distances, and the errors of a swarm with respect to the shape.
 //!
 //! Laws that control distances reach a formation only up to a rotation, a reflection and a translation, so the errors
-//! here do not see those either.
+//! here may exclude these motions.
 
 mod assignment;
 mod drawn;
@@ -20,24 +20,24 @@ pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes
 pub use fit::{edges_looked_at, largest_edge_error_m};
 pub use shapes::NARROWEST_V_RAD;
 
-/// The target shape: slot `h_i` for vehicle i.
+/// Target shape: slot `h_i` for vehicle i.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formation {
-    /// N x 3 positions of the slots \[m\].
+    /// Positions of the slots, N x 3 \[m\].
     pub slots_m: Rows,
 }
 
 impl Formation {
-    /// Given slots \[m\].
+    /// Formation with the given slots \[m\].
     #[must_use]
     pub fn points(slots_m: Rows) -> Self {
         Self { slots_m }
     }
 
-    /// The same slots in another order: vehicle i gets slot `slots[i]`.
+    /// Returns the same slots in another order: vehicle i gets slot `slots[i]`.
     ///
     /// # Panics
-    /// If there is no such slot.
+    /// If a slot is out of range.
     #[must_use]
     pub fn reordered(&self, slots: &[usize]) -> Self {
         let mut slots_m = Rows::zeros(slots.len());
@@ -45,8 +45,8 @@ impl Formation {
         Self { slots_m }
     }
 
-    /// The source paper's five slots in the plane z = 0: (0, 0), (d, 0), (d/2, sqrt(3) d/2), (0, sqrt(3) d) and
-    /// (d, sqrt(3) d), for d = `side_m`.
+    /// The source paper's five slots in the plane z = 0. For d = `side_m` they are (0, 0), (d, 0), (d/2, sqrt(3) d/2),
+    /// (0, sqrt(3) d) and (d, sqrt(3) d).
     #[must_use]
     pub fn pentagon(side_m: f64) -> Self {
         let height = 3.0_f64.sqrt();
@@ -54,7 +54,7 @@ impl Formation {
         Self::from_fn(unit.len(), |i| Vector3::new(unit[i].0, unit[i].1, 0.0) * side_m)
     }
 
-    /// Evenly spaced on a circle about the origin in the plane z = 0, counterclockwise from (`radius_m`, 0, 0).
+    /// Slots evenly spaced on a circle about the origin in the plane z = 0, counterclockwise from (`radius_m`, 0, 0).
     #[must_use]
     pub fn circle(count: usize, radius_m: f64) -> Self {
         Self::from_fn(count, |i| {
@@ -63,14 +63,14 @@ impl Formation {
         })
     }
 
-    /// Evenly spaced along the x axis, from the origin.
+    /// Slots evenly spaced along the x axis, from the origin.
     #[must_use]
     pub fn line(count: usize, spacing_m: f64) -> Self {
         Self::from_fn(count, |i| Vector3::new(i as f64 * spacing_m, 0.0, 0.0))
     }
 
-    /// A square grid in the plane z = 0, from the origin, rows along x: as near to a square as the number allows, the
-    /// last row perhaps shorter.
+    /// Square grid in the plane z = 0, from the origin, rows along x. It is as near to a square as the number allows;
+    /// the last row may be shorter.
     #[must_use]
     pub fn grid(count: usize, spacing_m: f64) -> Self {
         let root = count.isqrt();
@@ -78,8 +78,8 @@ impl Formation {
         Self::from_fn(count, |i| Vector3::new((i % columns) as f64 * spacing_m, (i / columns) as f64 * spacing_m, 0.0))
     }
 
-    /// Nearly even on a sphere about the origin, by the Fibonacci spiral: equal steps in z, and from slot to slot a
-    /// turn by the golden angle pi (3 - sqrt(5)).
+    /// Nearly even slots on a sphere about the origin, by the Fibonacci spiral: equal steps in z, and a turn by the
+    /// golden angle pi (3 - sqrt(5)) per slot.
     #[must_use]
     pub fn sphere(count: usize, radius_m: f64) -> Self {
         let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -115,7 +115,7 @@ impl Formation {
         separation(&self.slots_m, i, j)
     }
 
-    /// Dimension of the smallest flat that holds all slots, see [`affine_dimension`].
+    /// Dimension of the smallest affine subspace that contains all slots, see [`affine_dimension`].
     #[must_use]
     pub fn affine_dimension(&self, relative_tolerance: f64) -> usize {
         affine_dimension(&self.slots_m, relative_tolerance)
@@ -127,7 +127,7 @@ impl Formation {
         self.slots_m.column(2).iter().all(|&z| z == 0.0)
     }
 
-    /// The two nearest slots and their distance \[m\], see [`closest_pair`].
+    /// Returns the two nearest slots and their distance \[m\], see [`closest_pair`].
     #[must_use]
     pub fn min_distance(&self) -> Option<(Pair, f64)> {
         closest_pair(&self.slots_m)

@@ -1,4 +1,4 @@
-//! More shapes: V, wedge, helix, rings and a grid in space.
+//! Parametric shapes: V, wedge, helix, rings and cube.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,12 +6,12 @@ use nalgebra::Vector3;
 
 use super::Formation;
 
-/// Narrowest angle of a V \[rad\]: between the first slots of narrower arms there is less than the spacing.
+/// Narrowest angle of a V \[rad\]. In a narrower V the first slots of the two arms are closer than the spacing.
 pub const NARROWEST_V_RAD: f64 = PI / 3.0;
 
 impl Formation {
-    /// Two straight arms in the plane z = 0 that meet at the origin in this angle, the tip towards x: the first slot
-    /// is the tip, the others are on the left and the right arm in turn.
+    /// Two straight arms in the plane z = 0 that meet at the origin in this angle, with the tip towards x. The first
+    /// slot is the tip; the others alternate between the left and the right arm.
     ///
     /// No two slots are nearer than `spacing_m`, and neighbours on an arm are that far apart, for angles from
     /// [`NARROWEST_V_RAD`] to pi.
@@ -24,9 +24,9 @@ impl Formation {
         })
     }
 
-    /// A filled triangle in the plane z = 0, its tip at the origin and towards x: rows of 1, 2, 3, ... slots, each
-    /// slot `spacing_m` from its neighbours in its own and the next rows. A last row that is not full is in the
-    /// middle, as far as that leaves the pattern.
+    /// Filled triangle in the plane z = 0 with its tip at the origin and towards x: rows of 1, 2, 3, ... slots.
+    /// Neighbours in a row and in adjacent rows are `spacing_m` apart. An incomplete last row is centred as far as the
+    /// pattern allows.
     #[must_use]
     pub fn wedge(count: usize, spacing_m: f64) -> Self {
         let row_of = |i: usize| ((8 * i + 1).isqrt() - 1) / 2;
@@ -41,8 +41,8 @@ impl Formation {
         })
     }
 
-    /// On a screw about the z axis, upwards from (`radius_m`, 0, 0): from slot to slot a turn by `step_rad`, with
-    /// every full turn a rise by `pitch_m`.
+    /// Helix about the z axis, upwards from (`radius_m`, 0, 0): each slot is turned by `step_rad`, and each full turn
+    /// rises by `pitch_m`.
     #[must_use]
     pub fn helix(count: usize, radius_m: f64, pitch_m: f64, step_rad: f64) -> Self {
         Self::from_fn(count, |i| {
@@ -52,8 +52,8 @@ impl Formation {
         })
     }
 
-    /// The turn \[rad\] from slot to slot that lays neighbours on a helix `spacing_m` apart; `None` where not even
-    /// half a turn does.
+    /// Returns the turn per slot \[rad\] for which neighbours on a helix are `spacing_m` apart; `None` if not even half
+    /// a turn suffices.
     #[must_use]
     pub fn helix_step_rad(radius_m: f64, pitch_m: f64, spacing_m: f64) -> Option<f64> {
         let reaches = |step_rad: f64| chord_m(radius_m, pitch_m, step_rad) >= spacing_m;
@@ -70,8 +70,8 @@ impl Formation {
         }
     }
 
-    /// Distance \[m\] of the nearest two of `count` slots of [`Formation::helix`]: how far two are apart depends on
-    /// their numbers' difference alone. Infinite for fewer than two.
+    /// Returns the smallest distance of two of `count` slots of [`Formation::helix`] \[m\], which depends only on the
+    /// difference of their numbers. Infinite for fewer than two slots.
     #[must_use]
     pub fn helix_nearest_m(count: usize, radius_m: f64, pitch_m: f64, step_rad: f64) -> f64 {
         let mut nearest_m = f64::INFINITY;
@@ -85,9 +85,9 @@ impl Formation {
         nearest_m
     }
 
-    /// Circles about the origin in the plane z = 0, one slot in the middle, then 6, 12, 18, ...: rings lie `spacing_m`
-    /// apart, the six of the first ring too, and slots of the others a little more (at most pi / 3 times that). The
-    /// slots of a last ring that is not full are spread evenly over it.
+    /// Circles about the origin in the plane z = 0: one slot in the centre, then 6, 12, 18, ... slots. Rings are
+    /// `spacing_m` apart. Neighbours are `spacing_m` apart on the first ring and up to pi/3 times that on the others.
+    /// An incomplete last ring is spread evenly.
     #[must_use]
     pub fn rings(count: usize, spacing_m: f64) -> Self {
         let inside = |ring: usize| if ring == 0 { 0 } else { 3 * ring * (ring - 1) + 1 };
@@ -100,8 +100,8 @@ impl Formation {
         })
     }
 
-    /// A cubic grid from the origin, rows along x, layer on layer: as near to a cube as the number allows, the last
-    /// row and layer perhaps not full.
+    /// Cubic grid from the origin, rows along x, layer on layer. It is as near to a cube as the number allows; the last
+    /// row and layer may be incomplete.
     #[must_use]
     pub fn cube(count: usize, spacing_m: f64) -> Self {
         let columns = (1..=count).find(|side| side.saturating_pow(3) >= count).unwrap_or(1);
@@ -113,7 +113,7 @@ impl Formation {
     }
 }
 
-/// Distance \[m\] of two points of a screw between which it turns by this angle.
+/// Returns the distance \[m\] of two points of a helix that differ by this turn.
 fn chord_m(radius_m: f64, pitch_m: f64, turn_rad: f64) -> f64 {
     libm::hypot(2.0 * radius_m * libm::sin(0.5 * turn_rad), pitch_m * turn_rad / TAU)
 }
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_v_that_is_too_narrow_has_slots_nearer_than_the_spacing() {
+    fn a_too_narrow_v_has_slots_nearer_than_the_spacing() {
         assert!(nearest_m(&Formation::v(3, 2.0, 0.9 * NARROWEST_V_RAD)) < 1.9);
     }
 
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wedge_has_rows_of_1_2_3_and_a_last_one_in_the_middle() {
+    fn a_wedge_has_rows_of_1_2_3_and_a_centred_last_row() {
         let rows_of = |count| {
             let wedge = Formation::wedge(count, 1.0).slots_m;
             (0..count).map(|i| (-wedge[(i, 0)] / 0.75_f64.sqrt()).round()).collect::<Vec<_>>()
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn rings_hold_1_6_12_and_the_last_is_even() {
+    fn rings_have_1_6_12_slots_and_an_even_last_ring() {
         let rings = Formation::rings(1 + 6 + 12 + 3, 2.0);
         let radii: Vec<f64> = (0..22).map(|i| row(&rings.slots_m, i).norm().round()).collect();
         assert_eq!(radii, [vec![0.0], vec![2.0; 6], vec![4.0; 12], vec![6.0; 3]].concat());
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_helix_rises_by_its_pitch_and_knows_its_nearest_slots() {
+    fn a_helix_rises_by_its_pitch_and_gives_its_smallest_slot_distance() {
         let (radius_m, pitch_m) = (3.0, 0.5);
         let helix = Formation::helix(13, radius_m, pitch_m, TAU / 12.0);
         assert!((row(&helix.slots_m, 12) - Vector3::new(radius_m, 0.0, pitch_m)).norm() < ROUNDING);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_is_as_wide_as_deep_as_high() {
+    fn a_cube_has_equal_sides() {
         let cube = Formation::cube(1000, 2.0).slots_m;
         assert_eq!(row(&cube, 999), Vector3::repeat(18.0));
         assert_eq!(row(&Formation::cube(9, 1.0).slots_m, 8), Vector3::new(2.0, 0.0, 1.0));

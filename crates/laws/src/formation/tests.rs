@@ -47,7 +47,7 @@ fn motions() -> impl Strategy<Value = RigidMotion> {
 
 proptest! {
     #[test]
-    fn every_rigid_motion_and_reflection_is_taken_out(motion in motions()) {
+    fn errors_ignore_rigid_motions_and_reflections(motion in motions()) {
         for shape in shapes() {
             let positions = moved(&shape.slots_m, &motion);
             let error = procrustes_rms_m(&positions, &shape);
@@ -86,7 +86,7 @@ fn a_reflected_chiral_shape_needs_a_reflection() {
 }
 
 #[test]
-fn the_error_of_a_stretched_shape_is_the_known_one() {
+fn the_error_of_a_stretched_square_is_known() {
     // A square of side 2 stretched by 1.25 along x: each corner is 0.25 off, and no rotation helps.
     let square = Formation::points(rows(&[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]]));
     let mut stretched = square.slots_m.clone();
@@ -106,7 +106,7 @@ fn only_edges_of_the_graph_count() {
 }
 
 #[test]
-fn a_position_that_is_not_a_number_is_never_a_good_fit() {
+fn a_nan_position_never_gives_a_small_error() {
     let shape = Formation::pentagon(3.0);
     for bad in [f64::NAN, f64::INFINITY] {
         for i in 0..5 {
@@ -124,14 +124,14 @@ fn a_position_that_is_not_a_number_is_never_a_good_fit() {
 }
 
 #[test]
-fn all_vehicles_in_one_point_still_have_a_fit() {
+fn vehicles_at_a_single_point_have_a_fit() {
     let shape = Formation::line(2, 2.0);
     assert!((procrustes_rms_m(&Rows::zeros(2), &shape) - 1.0).abs() < FIT_TOLERANCE);
     assert_eq!(procrustes_rms_m(&Rows::zeros(1), &Formation::line(1, 2.0)), 0.0);
 }
 
 #[test]
-fn the_affine_dimension_is_that_of_the_shape() {
+fn the_affine_dimension_of_shapes_is_known() {
     let dimensions = shapes().map(|shape| shape.affine_dimension(DIMENSION_TOLERANCE));
     assert_eq!(dimensions, [2, 2, 1, 2, 3, 3]);
     assert_eq!(affine_dimension(&rows(&[[1.0, 2.0, 3.0]; 4]), DIMENSION_TOLERANCE), 0);
@@ -141,7 +141,7 @@ fn the_affine_dimension_is_that_of_the_shape() {
 }
 
 #[test]
-fn the_affine_dimension_ignores_place_and_size() {
+fn the_affine_dimension_is_invariant_to_translation_and_scale() {
     for scale in [1e-150, 1e-6, 1.0, 1e150] {
         let line = rows(&[[1.0, 2.0, 3.0], [2.0, 4.0, 6.0], [5.0, 10.0, 15.0]]) * scale;
         assert_eq!(affine_dimension(&line, DIMENSION_TOLERANCE), 1);
@@ -153,7 +153,7 @@ fn the_affine_dimension_ignores_place_and_size() {
 }
 
 #[test]
-fn shapes_have_the_distances_they_are_named_for() {
+fn shapes_have_their_distances() {
     let pentagon = Formation::pentagon(3.0);
     for (i, j) in [(0, 1), (0, 2), (1, 2), (2, 3), (2, 4), (3, 4)] {
         assert!((pentagon.desired_distance(i, j) - 3.0).abs() < FIT_TOLERANCE);
@@ -178,7 +178,7 @@ fn shapes_have_the_distances_they_are_named_for() {
 }
 
 #[test]
-fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
+fn the_fit_respects_the_freedom() {
     let formation = Formation::grid(6, 2.0);
     let quarter = |x: f64, y: f64| [7.0 - y, x + 3.0, 0.0];
     let turned: Vec<f64> = (0..6).flat_map(|i| quarter(formation.slots_m[(i, 0)], formation.slots_m[(i, 1)])).collect();
@@ -196,7 +196,7 @@ fn what_is_free_to_be_turned_fits_turned_and_what_is_not_does_not() {
 }
 
 #[test]
-fn the_largest_position_error_is_that_of_the_farthest_vehicle_and_not_of_a_typical_one() {
+fn the_largest_position_error_is_that_of_the_farthest_vehicle() {
     let count = 400;
     let formation = Formation::grid(count, 2.0);
     let mut one_off = formation.slots_m.clone();
@@ -214,7 +214,7 @@ fn the_largest_position_error_is_that_of_the_farthest_vehicle_and_not_of_a_typic
 }
 
 #[test]
-fn of_too_many_pairs_the_error_is_bounded_and_nothing_where_the_shape_is_right() {
+fn large_complete_graphs_use_a_tight_bound_of_the_edge_error() {
     let count = 1500;
     let (formation, graph) = (Formation::grid(count, 2.0), Graph::complete(count));
     assert!(edges_looked_at(&graph) == count && edges_looked_at(&Graph::complete(1414)) == 1414 * 1413 / 2);

@@ -1,57 +1,59 @@
-//! The least eigenvalue of a Laplacian, pinned or not, without a matrix: inverse iteration on a block of vectors, which also
-//! remembers where it came from, as conjugate gradients do. Its systems are solved by conjugate gradients that a spanning tree of
-//! the graph, or its diagonal, brings near the solution.
+//! Least eigenvalue of a Laplacian, pinned or not, without forming a matrix: block inverse iteration.
+//!
+//! Each iteration also searches along the previous change, as conjugate gradients do (LOBPCG). The linear systems are
+//! solved by conjugate gradients, preconditioned with a spanning tree of the graph or with its diagonal.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::tree::SpanningTree;
 use super::{Graph, Pinning};
 
-/// Vectors that are iterated together: the slower ones, which are close to each other, do not hold up the first.
+/// Number of vectors iterated together, so that eigenvalues close to the least one do not slow convergence.
 const BLOCK: usize = 6;
-/// Vectors among which the next ones are: those at hand, their images under the inverse of M, and what the last iteration added.
+/// Dimension of the search space: the present vectors, their images under the inverse of M, and the previous change.
 const SEARCHED: usize = 3 * BLOCK;
-/// Relative fall of the least eigenvalue from one iteration to the next at which it is known: what is left falls in
-/// proportion.
+/// Relative decrease of the least eigenvalue per iteration at which the iteration stops. The remaining error is
+/// proportional to it.
 const SETTLED: f64 = 1e-12;
-/// Residual of a linear system, relative to its right side.
+/// Residual of a linear system, relative to its right-hand side.
 const SOLVED: f64 = 1e-6;
-/// Most visits of edges and vehicles: some fifteen seconds, and more where neighbours have numbers far apart. Wide graphs of tens of
-/// thousands of vehicles may ask for more.
+/// Largest number of visits of edges and vehicles: some fifteen seconds, and more if neighbours are far apart in
+/// memory. Wide graphs of tens of thousands of vehicles may exceed it.
 const MOST_VISITS: u64 = 4_000_000_000;
 
-/// M as a function of vectors, on those that it maps onto themselves: without a mean where nobody is pinned, and zero at a
-/// leader.
+/// M as a linear operator on its invariant subspace: vectors of mean 0 without pinning, and zero at a leader.
 pub(super) struct Operator<'a> {
     graph: &'a Graph,
     pinning: &'a Pinning,
-    near: Near,
+    preconditioner: Preconditioner,
     visits: u64,
 }
 
-/// What is near M and quick to solve.
-enum Near {
+/// Preconditioner: an approximation of M that is quick to solve.
+enum Preconditioner {
     Tree(SpanningTree),
-    /// M's diagonal.
+    /// Diagonal of M.
     Diagonal(Vec<f64>),
 }
 
 impl<'a> Operator<'a> {
-    /// Of a connected graph.
+    /// Builds the operator of a connected graph.
     pub(super) fn new(graph: &'a Graph, pinning: &'a Pinning, degrees: &[usize]) -> Self {
-        let near = SpanningTree::where_it_pays(graph, pinning).map_or_else(
+        let preconditioner = SpanningTree::new_if_worthwhile(graph, pinning).map_or_else(
             || {
                 let adds = |i: usize| if pinning.pins(i) { 1.0 } else { 0.0 };
-                Near::Diagonal(degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect())
+                Preconditioner::Diagonal(
+                    degrees.iter().enumerate().map(|(i, &degree)| degree as f64 + adds(i)).collect(),
+                )
             },
-            Near::Tree,
+            Preconditioner::Tree,
         );
-        Self { graph, pinning, near, visits: 0 }
+        Self { graph, pinning, preconditioner, visits: 0 }
     }
 
-    /// Has worked as much as it may.
+    /// Exhausts the work limit.
     #[cfg(test)]
-    pub(super) fn tire(&mut self) {
+    pub(super) fn exhaust(&mut self) {
         self.visits = MOST_VISITS + 1;
     }
 
@@ -84,7 +86,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// X' M X, as sums over edges and pins: products of differences, whose digits are not lost in those of X.
+    /// Returns X' M X as sums over edges and pins. Products of differences avoid the cancellation of M X.
     fn forms(&mut self, block: &DMatrix<f64>) -> DMatrix<f64> {
         let width = block.ncols();
         self.visits += (width * (self.graph.edge_count() + block.nrows())) as u64;
@@ -105,7 +107,8 @@ impl<'a> Operator<'a> {
         forms
     }
 
-    /// Orthonormal vectors that span the same as these, or more of what M maps onto itself where these do not differ.
+    /// Returns an orthonormal basis of the span of these vectors, completed within the invariant subspace if they are
+    /// dependent.
     fn orthonormal(&self, block: DMatrix<f64>) -> DMatrix<f64> {
         let kept_out = match *self.pinning {
             Pinning::Nobody => Some(vec![1.0; block.nrows()]),
@@ -122,10 +125,10 @@ impl<'a> Operator<'a> {
         beside.qr().q().remove_column(0)
     }
 
-    /// The least eigenvalue, from above; none where it takes too long.
+    /// Returns the least eigenvalue, approximated from above; `None` if the work limit is reached.
     pub(super) fn inverse_iteration(&mut self) -> Option<f64> {
         let count = self.graph.count();
-        // Vectors that no symmetry of a graph is likely to share: the fractions of multiples of irrational numbers.
+        // Start vectors without symmetry: fractional parts of multiples of irrational numbers.
         let mut block = DMatrix::from_fn(count, BLOCK, |i, k| {
             let irrational = ((k + 2) as f64).sqrt() + 0.123_456_789;
             (irrational * (i + 1) as f64).fract() - 0.5
@@ -142,7 +145,7 @@ impl<'a> Operator<'a> {
             if !least.is_finite() {
                 return None;
             }
-            // None is above the one before it but by rounding.
+            // The sequence is monotone up to rounding.
             if before - least <= SETTLED * least {
                 return Some(least);
             }
@@ -153,20 +156,20 @@ impl<'a> Operator<'a> {
                 self.solve(eigenvalues[k], x.as_mut_slice())?;
             }
             let added = &next - &block * block.tr_mul(&next);
-            searched = beside(&[&next, &solved, &added]);
+            searched = concatenated(&[&next, &solved, &added]);
             block = next;
         }
     }
 
-    /// Puts the solution y of M y = x in the place of x: conjugate gradients, led by what is near M, from x over its
-    /// Rayleigh quotient.
+    /// Replaces x by the solution y of M y = x with preconditioned conjugate gradients, starting at x over its Rayleigh
+    /// quotient.
     fn solve(&mut self, quotient: f64, x: &mut [f64]) -> Option<()> {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut y: Vec<f64> = x.iter().map(|x| x / quotient).collect();
         let mut image = vec![0.0; x.len()];
         self.product(&y, &mut image);
         let mut residual: Vec<f64> = x.iter().zip(&image).map(|(x, image)| x - image).collect();
-        let mut z = self.nearly_solved(&residual);
+        let mut z = self.preconditioned(&residual);
         let mut direction = z.clone();
         let (mut size, enough) = (dot(&residual, &z), (SOLVED * SOLVED) * dot(x, x));
         for _ in 0..10 * x.len() {
@@ -180,7 +183,7 @@ impl<'a> Operator<'a> {
             let step = size / dot(&direction, &image);
             y.iter_mut().zip(&direction).for_each(|(y, d)| *y += step * d);
             residual.iter_mut().zip(&image).for_each(|(r, image)| *r -= step * image);
-            z = self.nearly_solved(&residual);
+            z = self.preconditioned(&residual);
             let next = dot(&residual, &z);
             direction.iter_mut().zip(&z).for_each(|(d, z)| *d = z + next / size * *d);
             size = next;
@@ -190,22 +193,24 @@ impl<'a> Operator<'a> {
         Some(())
     }
 
-    fn nearly_solved(&mut self, residual: &[f64]) -> Vec<f64> {
+    fn preconditioned(&mut self, residual: &[f64]) -> Vec<f64> {
         let mut near = residual.to_vec();
-        match &self.near {
-            Near::Tree(tree) => {
+        match &self.preconditioner {
+            Preconditioner::Tree(tree) => {
                 self.visits += 2 * residual.len() as u64;
                 tree.solve(&mut near);
             }
-            Near::Diagonal(diagonal) => near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal),
+            Preconditioner::Diagonal(diagonal) => {
+                near.iter_mut().zip(diagonal).for_each(|(x, diagonal)| *x /= diagonal);
+            }
         }
         self.project(&mut near);
         near
     }
 }
 
-/// Matrices of as many rows, side by side.
-fn beside(blocks: &[&DMatrix<f64>]) -> DMatrix<f64> {
+/// Concatenates the columns of matrices with equal numbers of rows.
+fn concatenated(blocks: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.column_iter()).collect();
     DMatrix::from_columns(&columns)
 }
@@ -214,13 +219,13 @@ fn beside(blocks: &[&DMatrix<f64>]) -> DMatrix<f64> {
 mod tests {
     use super::*;
 
-    /// Eigenvalues that lie close to each other: legs of a spider, and every third vehicle of a path pinned.
+    /// Eigenvalues close to each other: the legs of a spider, and a path with every third vehicle pinned.
     #[test]
-    fn crowded_eigenvalues_are_solved_and_not_bounded() {
+    fn clustered_eigenvalues_are_solved_accurately() {
         let solved = |graph: &Graph, pinning: &Pinning| {
             Operator::new(graph, pinning, &graph.degrees()).inverse_iteration().expect("solved")
         };
-        // Seven of the eight longest legs' motions leave the middle where it is.
+        // Seven of the eight slowest modes of the longest legs leave the centre at rest.
         let (count, mut edges) = (1 + 8 * 100 + 8 * 101, Vec::new());
         let mut next = 1;
         for length in [100, 101].repeat(8) {
@@ -243,20 +248,20 @@ mod tests {
     }
 
     #[test]
-    fn long_thin_graphs_of_thousands_are_solved_and_not_bounded() {
+    fn long_thin_graphs_are_solved_accurately() {
         let count = 10_000;
         let path = Graph::path(count);
         let degrees = vec![2; count];
         let found = Operator::new(&path, &Pinning::Nobody, &degrees).inverse_iteration().expect("solved");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / count as f64);
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
-        // A path that is pinned at one end is half of one of twice its length.
+        // A path pinned at one end is half of a path of twice its length.
         let pinned = Pinning::Leader(0);
         let found = Operator::new(&path, &pinned, &degrees).inverse_iteration().expect("solved");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / (2.0 * count as f64 - 1.0));
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
-        // A ring that one vehicle of is pinned: the even half of a ring is a path that its end pins by half as much; sine and
-        // cosine of half an angle fit at tan = 1 / (2 tan).
+        // The even modes of a ring with one pinned vehicle are those of a path pinned at its end with half the
+        // stiffness.
         let ring = Graph::ring(count);
         let pinned = Pinning::Listed(vec![17]);
         let found = Operator::new(&ring, &pinned, &degrees).inverse_iteration().expect("solved");
@@ -264,8 +269,14 @@ mod tests {
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
     }
 
-    /// `x_k = cos(q (N/2 - k))` around the pinned vehicle 0 has (2 - 2 cos q) everywhere but there, where it has
-    /// 2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2): with q small solved by bisection.
+    /// Exact least eigenvalue of a ring of N vehicles with vehicle 0 pinned.
+    ///
+    /// `x_k = cos(q (N/2 - k))` has the eigenvalue 2 - 2 cos q at every other vehicle. At vehicle 0 this requires the
+    /// following equation, solved for the smallest q by bisection:
+    ///
+    /// ```text
+    /// 2 (cos(q N/2) - cos(q (N/2 - 1))) + cos(q N/2) = (2 - 2 cos q) cos(q N/2)
+    /// ```
     fn ring_pinned_at_one(count: usize) -> f64 {
         let half = 0.5 * count as f64;
         let off = |q: f64| {

@@ -1,7 +1,7 @@
-//! Who senses whom: undirected simple graphs over the vehicles of a swarm.
+//! Communication graphs: undirected simple graphs over the vehicles of a swarm, and the spectra of their Laplacians.
 //!
-//! The laws sum over the neighbours j in `N_i` of vehicle i; what they promise depends on the graph's Laplacian `L_G`
-//! and on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
+//! The laws sum over the neighbours j in `N_i` of vehicle i. Their guarantees depend on the graph's Laplacian `L_G` and
+//! on its algebraic connectivity, the second smallest eigenvalue of `L_G`.
 
 mod inverse_iteration;
 mod pinning;
@@ -20,32 +20,32 @@ pub use pinning::Pinning;
 
 /// An undirected graph without self-loops on the vehicles 0..N.
 ///
-/// The complete graph takes no memory for its edges. Any other graph keeps, for each vehicle, its neighbours of higher
-/// index in ascending order, so that every edge is listed once, in row order.
+/// The complete graph takes no memory for its edges. Any other graph stores for each vehicle its neighbours of higher
+/// index in ascending order, so every edge is listed once, in row order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Graph {
     count: usize,
     edges: Edges,
-    known: Arc<Known>,
+    cache: Arc<EigenvalueCache>,
 }
 
-/// Eigenvalues that have been asked for, of a graph or of a copy of it; no part of what a graph is.
+/// Cache of eigenvalues, shared by copies of a graph and ignored by comparisons.
 #[derive(Debug, Default)]
-struct Known {
+struct EigenvalueCache {
     algebraic: OnceLock<f64>,
-    /// Of the pinning that was asked for first.
+    /// Value of the first pinning that was queried.
     pinned: OnceLock<(Pinning, f64)>,
-    /// Set where a bound from below stands in for one of them.
+    /// Set if a lower bound replaces one of the values.
     bounded: OnceLock<()>,
 }
 
-impl PartialEq for Known {
+impl PartialEq for EigenvalueCache {
     fn eq(&self, _other: &Self) -> bool {
         true
     }
 }
 
-impl Eq for Known {}
+impl Eq for EigenvalueCache {}
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Edges {
@@ -57,7 +57,7 @@ enum Edges {
     },
 }
 
-/// The neighbours of a vehicle that have a higher index than its own, in ascending order.
+/// Neighbours of a vehicle with a higher index than its own, in ascending order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LaterNeighbours<'a> {
     /// Every later vehicle: the graph is complete.
@@ -81,13 +81,13 @@ impl Iterator for LaterNeighbours<'_> {
     }
 }
 
-/// Why a list of edges is not a simple graph. Edges and vehicles are counted from 1 in the messages.
+/// Reason why a list of edges is not a simple graph. Messages count edges and vehicles from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GraphError {
     /// An edge joins a vehicle to itself.
     #[error("edge {} joins vehicle {} to itself", edge + 1, vehicle + 1)]
     SelfLoop {
-        /// Place in the list, from 0.
+        /// Index in the list, from 0.
         edge: usize,
         /// The vehicle, from 0.
         vehicle: usize,
@@ -95,7 +95,7 @@ pub enum GraphError {
     /// An edge names a vehicle that the swarm does not have.
     #[error("edge {} names vehicle {}, but the swarm has {count}", edge + 1, *vehicle as u128 + 1)]
     OutOfRange {
-        /// Place in the list, from 0.
+        /// Index in the list, from 0.
         edge: usize,
         /// The vehicle, from 0.
         vehicle: usize,
@@ -105,7 +105,7 @@ pub enum GraphError {
     /// An edge is listed twice, in either direction.
     #[error("edge {} joins vehicles {pair} a second time", edge + 1)]
     Duplicate {
-        /// Place in the list of the repetition, from 0.
+        /// Index of the repetition in the list, from 0.
         edge: usize,
         /// The two vehicles.
         pair: Pair,
@@ -113,29 +113,29 @@ pub enum GraphError {
 }
 
 impl Graph {
-    /// Every vehicle senses every other.
+    /// Returns the complete graph: every pair of vehicles is joined.
     #[must_use]
     pub fn complete(count: usize) -> Self {
-        Self { count, edges: Edges::All, known: Arc::default() }
+        Self { count, edges: Edges::All, cache: Arc::default() }
     }
 
-    /// The first vehicle senses all others and is sensed by them; they do not sense each other.
+    /// Returns the star about vehicle 0: it is joined to all others, and they are not joined to each other.
     #[must_use]
     pub fn star(count: usize) -> Self {
         Self::star_about(count, 0)
     }
 
-    /// The vehicle `hub` senses all others and is sensed by them; they do not sense each other.
+    /// Returns the star about the vehicle `hub`.
     ///
     /// # Panics
-    /// If there are vehicles, and the hub is none of them.
+    /// If `count` > 0 and the hub is out of range.
     #[must_use]
     pub fn star_about(count: usize, hub: usize) -> Self {
         assert!(count == 0 || hub < count, "the hub is one of the vehicles");
         Self::from_sorted(count, (0..hub).map(|i| (i, hub)).chain((hub + 1..count).map(|j| (hub, j))))
     }
 
-    /// Each vehicle senses the one before and the one after it, and the last senses the first.
+    /// Returns the ring: each vehicle is joined to the one before and the one after it, and the last to the first.
     #[must_use]
     pub fn ring(count: usize) -> Self {
         if count < 4 {
@@ -145,16 +145,16 @@ impl Graph {
         Self::from_sorted(count, std::iter::once((0, 1)).chain(closing).chain((2..count).map(|j| (j - 1, j))))
     }
 
-    /// Each vehicle senses the one before and the one after it.
+    /// Returns the path: each vehicle is joined to the one before and the one after it.
     #[must_use]
     pub fn path(count: usize) -> Self {
         Self::from_sorted(count, (1..count).map(|j| (j - 1, j)))
     }
 
-    /// The graph on `count` vehicles with the given edges (vehicles from 0, either end first, in any order).
+    /// Returns the graph on `count` vehicles with the given edges (vehicles from 0, either end first, in any order).
     ///
     /// # Errors
-    /// [`GraphError`] for a self-loop, a vehicle out of range or an edge listed twice: the first of them in the list.
+    /// [`GraphError`] for the first self-loop, vehicle out of range or repeated edge in the list.
     pub fn from_edges(count: usize, edges: &[(usize, usize)]) -> Result<Self, GraphError> {
         for (edge, &(a, b)) in edges.iter().enumerate() {
             if let Some(vehicle) = [a, b].into_iter().find(|&vehicle| vehicle >= count) {
@@ -173,7 +173,7 @@ impl Graph {
         Ok(Self::from_sorted(count, sorted.into_iter().map(|(i, j, _)| (i, j))))
     }
 
-    /// Builds from distinct edges i < j in row order.
+    /// Builds the graph from distinct edges i < j in row order.
     fn from_sorted(count: usize, edges: impl Iterator<Item = (usize, usize)>) -> Self {
         let mut offsets = vec![0; count + 1];
         let neighbours: Vec<_> = edges
@@ -188,7 +188,7 @@ impl Graph {
         for i in 0..count {
             offsets[i + 1] += offsets[i];
         }
-        Self { count, edges: Edges::Listed { offsets, neighbours }, known: Arc::default() }
+        Self { count, edges: Edges::Listed { offsets, neighbours }, cache: Arc::default() }
     }
 
     /// Number of vehicles N.
@@ -206,13 +206,13 @@ impl Graph {
         }
     }
 
-    /// Whether every pair of vehicles is joined, however the graph was made.
+    /// Whether every pair of vehicles is joined, also if the graph was built from a list.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         matches!(self.edges, Edges::All)
     }
 
-    /// The neighbours of vehicle `i` that come after it; none for a vehicle out of range.
+    /// Returns the neighbours of vehicle `i` with higher indices; none for a vehicle out of range.
     #[must_use]
     pub fn later_neighbours(&self, i: usize) -> LaterNeighbours<'_> {
         match &self.edges {
@@ -224,7 +224,7 @@ impl Graph {
         }
     }
 
-    /// Whether two vehicles are joined; none is joined to itself.
+    /// Whether two vehicles are joined; false for i = j.
     #[must_use]
     pub fn has_edge(&self, i: usize, j: usize) -> bool {
         match self.later_neighbours(i.min(j)) {
@@ -233,12 +233,12 @@ impl Graph {
         }
     }
 
-    /// Every edge once, as (i, j) with i < j, in row order.
+    /// Returns every edge once, as (i, j) with i < j, in row order.
     pub fn edges(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         (0..self.count).flat_map(|i| self.later_neighbours(i).map(move |j| (i, j)))
     }
 
-    /// Whether a path joins every pair of vehicles. A graph of one vehicle or none is connected.
+    /// Whether a path joins every pair of vehicles. A graph with at most one vehicle is connected.
     #[must_use]
     pub fn is_connected(&self) -> bool {
         self.components() <= 1
@@ -251,13 +251,13 @@ impl Graph {
         roots.iter().enumerate().filter(|&(i, &root)| i == root).count()
     }
 
-    /// The vehicles that no path joins to the first one.
+    /// Returns the vehicles that no path joins to vehicle 0.
     #[must_use]
     pub fn unreachable(&self) -> Vec<usize> {
         self.component_roots().iter().enumerate().filter(|&(_, &root)| root != 0).map(|(i, _)| i).collect()
     }
 
-    /// For each vehicle the lowest vehicle of its component, by union-find with path halving.
+    /// Returns for each vehicle the lowest vehicle of its component, by union-find with path halving.
     fn component_roots(&self) -> Vec<usize> {
         fn root(parents: &mut [usize], mut i: usize) -> usize {
             while parents[i] != i {
@@ -280,14 +280,14 @@ impl Graph {
         parents
     }
 
-    /// The Laplacian `L_G`, N x N: degrees on the diagonal, -1 for each edge. Takes 8 N^2 bytes.
+    /// Returns the Laplacian `L_G`, N x N: degrees on the diagonal, -1 for each edge. Takes 8 N^2 bytes.
     #[must_use]
     pub fn laplacian(&self) -> DMatrix<f64> {
         self.weighted_laplacian(|_, _| 1.0)
     }
 
-    /// The Laplacian `L_w`, N x N, for a weight per edge; `weight(i, j)` is asked once for each edge i < j, in row
-    /// order. A weight may be negative. Takes 8 N^2 bytes.
+    /// Returns the weighted Laplacian `L_w`, N x N. `weight(i, j)` is called once for each edge i < j, in row order;
+    /// weights may be negative. Takes 8 N^2 bytes.
     #[must_use]
     pub fn weighted_laplacian(&self, mut weight: impl FnMut(usize, usize) -> f64) -> DMatrix<f64> {
         let mut laplacian = DMatrix::zeros(self.count, self.count);
@@ -302,7 +302,7 @@ impl Graph {
     }
 }
 
-/// N (N - 1) / 2, saturating.
+/// Returns N (N - 1) / 2, saturating.
 fn pair_count(count: usize) -> usize {
     let pairs = count as u128 * count.saturating_sub(1) as u128 / 2;
     usize::try_from(pairs).unwrap_or(usize::MAX)

@@ -1,26 +1,26 @@
-//! Who knows where a swarm shall go.
+//! Pinning: which vehicles know the reference.
 
-/// Who knows a reference: the pinned vehicles of pinning control. With the Laplacian L of the links, what they and those who
-/// hear of it feel is the pinned Laplacian M:
+/// Vehicles that know the reference, as in pinning control. With the Laplacian L of the links, the pinned Laplacian M
+/// is
 ///
-/// - nobody: M = L, and its least eigenvalue that counts is the second, lambda2;
-/// - all, or some: M = L + B, where B has a 1 on the diagonal for each who knows;
-/// - a leader: L without the leader's row and column, grounded there.
+/// - M = L without a reference; the relevant eigenvalue is the second smallest, lambda2;
+/// - M = L + B if all or some vehicles know it, where B is diagonal with a 1 for each of these vehicles;
+/// - M = L without the leader's row and column (grounded Laplacian) if a leader flies it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Pinning {
-    /// Nobody: the swarm goes where its mean goes.
+    /// No vehicle: the mean of the swarm moves freely.
     #[default]
     Nobody,
     /// Every vehicle.
     All,
     /// These vehicles, from 0, in ascending order.
     Listed(Vec<usize>),
-    /// One vehicle, from 0, that flies the reference and listens to nobody; those who hear it follow.
+    /// One vehicle, from 0, that flies the reference independent of all others. Its neighbours follow it.
     Leader(usize),
 }
 
 impl Pinning {
-    /// Whether a vehicle is drawn to the reference itself. A leader is on it.
+    /// Whether a vehicle is pulled to the reference by M. False for a leader.
     #[must_use]
     pub fn pins(&self, vehicle: usize) -> bool {
         match self {
@@ -30,7 +30,7 @@ impl Pinning {
         }
     }
 
-    /// The vehicle that listens to nobody.
+    /// Returns the leader, if there is one.
     #[must_use]
     pub fn leader(&self) -> Option<usize> {
         if let &Self::Leader(leader) = self { Some(leader) } else { None }

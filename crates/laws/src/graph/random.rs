@@ -1,19 +1,20 @@
-//! Graphs that are drawn at random, and connected whatever is drawn.
+//! Random connected graphs.
 
 use super::{Graph, pair_count};
 
 impl Graph {
-    /// A connected graph with so many edges: a tree in which each vehicle is joined to one before it, and pairs that are drawn
-    /// until there are enough, each as likely as any other. At least the tree's N - 1 edges, at most every pair.
+    /// Returns a random connected graph with `edge_count` edges, clamped to N - 1 and the number of pairs. The edges
+    /// are a tree that joins each vehicle to a random earlier one, and uniformly drawn pairs.
     ///
-    /// `below(n)` draws a whole number below n. Where most pairs are edges, those that are none are drawn.
+    /// `below(n)` draws an integer below n. If more than half of the pairs are edges, the missing pairs are drawn
+    /// instead.
     #[must_use]
     pub fn random(count: usize, edge_count: usize, mut below: impl FnMut(usize) -> usize) -> Self {
         let pairs = pair_count(count);
         if edge_count >= pairs {
             return Self::complete(count);
         }
-        // Of each later vehicle the one before it that it is joined to.
+        // tree[j - 1] is the earlier vehicle that vehicle j is joined to.
         let tree: Vec<usize> = (1..count).map(&mut below).collect();
         let is_of_tree = |(i, j): (usize, usize)| tree[j - 1] == i;
         let (beside, absent) = (edge_count.saturating_sub(tree.len()), pairs - edge_count.max(tree.len()));
@@ -31,12 +32,12 @@ impl Graph {
     }
 }
 
-/// A pair as one number, in row order.
+/// Encodes a pair as one number; the order is row order.
 fn code(count: usize, (i, j): (usize, usize)) -> usize {
     i * count + j
 }
 
-/// So many different pairs, in row order, none of them left out.
+/// Draws `pairs` distinct pairs in row order, without those that `is_left_out` excludes.
 fn draw(
     count: usize,
     pairs: usize,
@@ -44,7 +45,7 @@ fn draw(
     is_left_out: impl Fn((usize, usize)) -> bool,
 ) -> Vec<usize> {
     let mut drawn = Vec::with_capacity(pairs);
-    // At most about half of the pairs are ever drawn, so each round leaves half as many to draw, or fewer.
+    // At most about half of the pairs are ever drawn, so each round halves the number of missing pairs or better.
     while drawn.len() < pairs {
         let missing = pairs - drawn.len();
         let some = (0..missing).map(|_| (below(count), below(count))).map(|(a, b)| (a.min(b), a.max(b)));
@@ -59,7 +60,7 @@ fn draw(
 mod tests {
     use super::*;
 
-    /// Numbers without a pattern that a graph could show.
+    /// Pseudorandom numbers from a linear congruential generator.
     fn numbers(seed: u64) -> impl FnMut(usize) -> usize {
         let mut state = seed;
         move |end| {
@@ -69,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_random_graph_is_connected_and_has_the_edges_that_are_asked_for() {
+    fn a_random_graph_is_connected_and_has_the_given_number_of_edges() {
         for count in [1, 2, 3, 7, 40] {
             let all = pair_count(count);
             for edges in
@@ -89,15 +90,16 @@ mod tests {
     }
 
     #[test]
-    fn extra_edges_join_any_two_alike() {
-        // How often each of the pairs of 6 vehicles is joined in 2,000 graphs of 8 edges, which are drawn, and of 12, of which
-        // those that are missing are drawn.
+    fn extra_edges_are_uniformly_distributed() {
+        // Count how often each pair of 6 vehicles is joined in 2,000 graphs. With 8 edges the edges are drawn, with 12
+        // the missing pairs.
         for edges in [8, 12] {
             let (mut below, mut joined) = (numbers(3), [0; 36]);
             for _ in 0..2000 {
                 Graph::random(6, edges, &mut below).edges().for_each(|(i, j)| joined[6 * i + j] += 1);
             }
-            // 0-1 is always in the tree; each other pair is in it with the chance 1/later, and drawn otherwise.
+            // 0-1 is always in the tree. Any other pair is in the tree with probability 1/later, and otherwise drawn
+            // uniformly.
             assert_eq!(joined[1], 2000);
             for later in 2..6 {
                 let of_later = (0..later).map(|i| joined[6 * i + later]);
@@ -109,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_graph_that_lacks_few_pairs_is_drawn_by_them() {
+    fn a_nearly_complete_graph_is_drawn_by_its_missing_pairs() {
         let drawn = std::cell::Cell::new(0);
         let mut numbers = numbers(5);
         let counted = |end: usize| {

@@ -1,5 +1,5 @@
-//! The ends of the spectrum of a Laplacian, pinned or not: in closed form where the graph has a name, without a matrix
-//! where it is large.
+//! Extreme eigenvalues of a Laplacian, pinned or not: closed forms of named graphs, a dense solver for small graphs and
+//! inverse iteration for large ones.
 
 use std::f64::consts::PI;
 
@@ -8,45 +8,45 @@ use nalgebra::DMatrix;
 use super::inverse_iteration::Operator;
 use super::{Graph, Pinning};
 
-/// Up to here all eigenvalues are computed, in O(N^3).
+/// Largest number of vehicles for which all eigenvalues are computed, in O(N^3).
 const DENSE_UP_TO: usize = 400;
-/// Relative difference of eigenvalues that are the same one.
+/// Relative difference below which two eigenvalues count as equal.
 const SAME: f64 = 1e-9;
 
 impl Graph {
-    /// The algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`: positive exactly where the graph is
-    /// connected, and 0 for fewer than two vehicles. Computed once.
+    /// Returns the algebraic connectivity lambda2, the second smallest eigenvalue of `L_G`. It is positive exactly if
+    /// the graph is connected, and 0 for fewer than two vehicles. The value is cached.
     ///
-    /// In closed form for complete graphs, stars, rings and paths (N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N)), however the
-    /// graph was made, and exactly 0 for a disconnected one. Otherwise all eigenvalues are computed for up to 400 vehicles;
-    /// beyond, inverse iteration on a block of vectors, with conjugate gradients in the place of a matrix, led by a spanning
-    /// tree where the graph is long and thin, or hardly more than a tree. That ends at most a few parts in 1e9 above lambda2. Where it
-    /// would take more than some fifteen seconds (a minute of hundreds of thousands of vehicles), the bound from below `4/(N (N - 1))` stands in for lambda2, which
-    /// [`Graph::connectivity_is_bound`] tells.
+    /// Closed forms exist for complete graphs, stars, rings and paths: N, 1, 2 - 2 cos(2 pi/N), 2 - 2 cos(pi/N). A
+    /// disconnected graph has exactly 0. Otherwise a dense solver computes all eigenvalues for up to 400 vehicles.
+    /// Beyond, block inverse iteration converges to at most a few parts in 1e9 above lambda2.
+    ///
+    /// If that takes more than some fifteen seconds (a minute for hundreds of thousands of vehicles), the lower bound
+    /// `4/(N (N - 1))` replaces lambda2, and [`Graph::connectivity_is_bound`] returns true.
     #[must_use]
     pub fn algebraic_connectivity(&self) -> f64 {
         self.pinned_connectivity(&Pinning::Nobody)
     }
 
-    /// The least eigenvalue of the pinned Laplacian M (see [`Pinning`]): positive exactly where the graph is connected and
-    /// somebody is pinned, with the algebraic connectivity in its place where nobody is. Computed once for each pinning that
-    /// is asked for first.
+    /// Returns the least eigenvalue of the pinned Laplacian M (see [`Pinning`]). It is positive exactly if the graph is
+    /// connected and some vehicle is pinned. Without pinning it is the algebraic connectivity. The value of the first
+    /// pinning queried is cached.
     ///
-    /// In closed form where all are pinned (1), on the complete graph, and for a star led from its middle (1); otherwise as
-    /// [`Graph::algebraic_connectivity`], with `1/N^2` as the bound from below.
+    /// Closed forms: 1 if all vehicles are pinned, 1 for a star led from its hub, and any pinning of the complete
+    /// graph. Otherwise as [`Graph::algebraic_connectivity`], with the lower bound `1/N^2`.
     #[must_use]
     pub fn pinned_connectivity(&self, pinning: &Pinning) -> f64 {
         if *pinning == Pinning::Nobody {
-            return *self.known.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
+            return *self.cache.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
         }
-        let (first, least) = self.known.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
+        let (first, least) = self.cache.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
         if first == pinning { *least } else { self.least_eigenvalue(pinning) }
     }
 
-    /// Whether a bound from below stood in for a connectivity that was asked for up to now, of this graph or of a copy of it.
+    /// Whether a lower bound replaced a connectivity that was queried before, on this graph or on a copy.
     #[must_use]
     pub fn connectivity_is_bound(&self) -> bool {
-        self.known.bounded.get().is_some()
+        self.cache.bounded.get().is_some()
     }
 
     fn least_eigenvalue(&self, pinning: &Pinning) -> f64 {
@@ -66,21 +66,21 @@ impl Graph {
         self.solved_or_bounded(pinning, &mut Operator::new(self, pinning, &degrees))
     }
 
-    /// Marks the connectivity as a bound: tests of what reports a bound need no graph that takes half a minute.
+    /// Marks the connectivity as a bound, so that tests of reports need no graph that takes half a minute.
     #[doc(hidden)]
     pub fn pretend_a_bound(&self) {
-        self.known.bounded.get_or_init(|| ());
+        self.cache.bounded.get_or_init(|| ());
     }
 
     fn solved_or_bounded(&self, pinning: &Pinning, operator: &mut Operator<'_>) -> f64 {
         operator.inverse_iteration().unwrap_or_else(|| {
-            self.known.bounded.get_or_init(|| ());
+            self.cache.bounded.get_or_init(|| ());
             let count = self.count() as f64;
             if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
         })
     }
 
-    /// Of a connected graph.
+    /// Returns the closed form for a connected graph, if there is one.
     fn in_closed_form(&self, pinning: &Pinning, degrees: &[usize]) -> Option<f64> {
         let count = self.count() as f64;
         let most = degrees.iter().copied().max().unwrap_or_default();
@@ -99,7 +99,7 @@ impl Graph {
                 let (half, pinned) = (0.5 * (count + 1.0), listed.len() as f64);
                 Some(pinned / (half + (half * half - pinned).sqrt()))
             }
-            // A leader alone has nobody to lead.
+            // A leader without followers.
             Pinning::Leader(_) if self.count() == 1 => Some(1.0),
             Pinning::Leader(_) if self.is_complete() => Some(1.0),
             &Pinning::Leader(leader) if is_star && degrees[leader] == most => Some(1.0),
@@ -107,7 +107,7 @@ impl Graph {
         }
     }
 
-    /// M as a matrix, N x N; without the leader's row and column, N - 1 x N - 1, where there is one. Takes 8 N^2 bytes.
+    /// Returns M, N x N; with a leader N - 1 x N - 1, without its row and column. Takes 8 N^2 bytes.
     #[must_use]
     pub fn pinned_laplacian(&self, pinning: &Pinning) -> DMatrix<f64> {
         let mut matrix = self.laplacian();
@@ -118,9 +118,9 @@ impl Graph {
         matrix
     }
 
-    /// The eigenvalues of M that count: all different ones but the 0 of common motion where nobody is pinned, in ascending
-    /// order. For more than 400 vehicles on a graph that is not complete, the least of them and a bound on the largest, between
-    /// which the others are. None of a graph that is not connected.
+    /// Returns the distinct relevant eigenvalues of M in ascending order; without pinning the 0 of common motion is
+    /// left out. For more than 400 vehicles on an incomplete graph, returns the least one and an upper bound on the
+    /// largest. Empty for a disconnected graph.
     #[must_use]
     pub fn pinned_spectrum(&self, pinning: &Pinning) -> Vec<f64> {
         let least = self.pinned_connectivity(pinning);
@@ -140,7 +140,7 @@ impl Graph {
         eigenvalues
     }
 
-    /// The largest eigenvalue of the Laplacian, connected or not; a bound on it for more than 400 vehicles.
+    /// Returns the largest eigenvalue of the Laplacian, connected or not; an upper bound for more than 400 vehicles.
     #[must_use]
     pub fn largest_eigenvalue(&self) -> f64 {
         if self.is_complete() || self.count() > DENSE_UP_TO {
@@ -149,7 +149,7 @@ impl Graph {
         self.laplacian().symmetric_eigenvalues().iter().copied().fold(0.0, f64::max)
     }
 
-    /// The diagonal of M: for each vehicle whom it hears, and one more where it is pinned; without a leader's.
+    /// Returns the diagonal of M: the degree of each vehicle, plus one if it is pinned; without the entry of a leader.
     #[must_use]
     pub fn pinned_diagonal(&self, pinning: &Pinning) -> Vec<f64> {
         let of = |(i, &degree): (usize, &usize)| degree as f64 + if pinning.pins(i) { 1.0 } else { 0.0 };
@@ -157,10 +157,10 @@ impl Graph {
         degrees.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)).map(of).collect()
     }
 
-    /// A bound on the largest eigenvalue of M: for nobody pinned N where the graph is complete, otherwise the largest sum of
-    /// the degrees of two vehicles that are joined (Anderson and Morley 1985), which is exact for stars and for rings of even
-    /// N; one more where somebody is pinned. Where there is a leader, that without it and one more for who hears it, if this
-    /// is less: 1 for a star that is led from its middle.
+    /// Returns an upper bound on the largest eigenvalue of M. Without pinning it is N for the complete graph. Otherwise
+    /// it is the largest sum of the degrees of two joined vehicles (Anderson and Morley 1985), exact for stars and for
+    /// rings of even N. Pinned vehicles add one. With a leader, the bound of the graph without it plus one is used if
+    /// it is smaller: 1 for a star led from its hub.
     #[must_use]
     pub fn largest_eigenvalue_bound(&self, pinning: &Pinning) -> f64 {
         let pinned = if matches!(pinning, Pinning::All | Pinning::Listed(_)) { 1.0 } else { 0.0 };
@@ -203,7 +203,7 @@ mod tests {
         eigenvalues
     }
 
-    /// A tree on `count` vehicles with some edges more.
+    /// Returns a random tree on `count` vehicles with `extra` more edges.
     fn random(count: usize, extra: usize) -> Graph {
         let mut state = count as u64;
         let mut below = |bound: usize| {
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_forms_are_the_eigenvalues_of_the_matrix() {
+    fn closed_forms_match_the_eigenvalues_of_the_matrix() {
         for count in 2..12 {
             for graph in [Graph::complete(count), Graph::star(count), Graph::ring(count), Graph::path(count)] {
                 let eigenvalues = dense(&graph);
@@ -231,7 +231,7 @@ mod tests {
                 assert!(bound >= largest * (1.0 - 1e-12), "{count}: {bound}, {largest}");
             }
         }
-        // A star by any other centre is one.
+        // A star about another hub is a star.
         let hub = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
         assert_eq!((hub.algebraic_connectivity(), hub.largest_eigenvalue_bound(&Pinning::Nobody)), (1.0, 5.0));
         let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_graph_without_a_name_has_the_eigenvalue_of_its_matrix() {
+    fn connectivity_of_a_large_general_graph_matches_the_dense_solver() {
         for (count, extra) in [(450, 0), (450, 60), (450, 900)] {
             let graph = random(count, extra);
             let eigenvalues = dense(&graph);
@@ -250,7 +250,7 @@ mod tests {
         }
     }
 
-    /// Nobody's second eigenvalue is left to the other tests.
+    /// Pinnings other than none, which other tests cover.
     fn pinnings(count: usize) -> Vec<Pinning> {
         vec![
             Pinning::All,
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn pinned_graphs_have_the_least_eigenvalue_of_their_matrix() {
+    fn pinned_connectivity_matches_the_dense_solver() {
         for count in 2..12 {
             for graph in [Graph::complete(count), Graph::star(count), Graph::ring(count), Graph::path(count)] {
                 for pinning in pinnings(count) {
@@ -285,28 +285,28 @@ mod tests {
         assert_eq!(apart.pinned_connectivity(&Pinning::All), 0.0);
         let star = Graph::star(9);
         let bounds = [Pinning::Leader(0), Pinning::Leader(3), Pinning::All].map(|p| star.largest_eigenvalue_bound(&p));
-        assert_eq!(bounds, [1.0, 9.0, 10.0], "whoever hears a leader in the middle hears nobody else");
+        assert_eq!(bounds, [1.0, 9.0, 10.0], "followers of a leader at the hub have no other neighbour");
     }
 
     #[test]
-    fn a_bound_stands_in_where_the_work_is_too_much_and_the_graph_says_so() {
+    fn a_lower_bound_replaces_the_connectivity_at_the_work_limit() {
         let graph = random(420, 0);
         let exact = graph.algebraic_connectivity();
         assert!(!graph.connectivity_is_bound());
-        let mut tired = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
-        tired.tire();
+        let mut exhausted = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
+        exhausted.exhaust();
         let copy = graph.clone();
-        let bound = copy.solved_or_bounded(&Pinning::Nobody, &mut tired);
+        let bound = copy.solved_or_bounded(&Pinning::Nobody, &mut exhausted);
         assert!(0.0 < bound && bound <= exact && graph.connectivity_is_bound(), "{bound} {exact}");
         let (leader, exact) = (Pinning::Leader(7), least(&graph, &Pinning::Leader(7)));
-        let mut tired = Operator::new(&graph, &leader, &graph.degrees());
-        tired.tire();
-        let bound = graph.solved_or_bounded(&leader, &mut tired);
+        let mut exhausted = Operator::new(&graph, &leader, &graph.degrees());
+        exhausted.exhaust();
+        let bound = graph.solved_or_bounded(&leader, &mut exhausted);
         assert!(0.0 < bound && bound <= exact, "{bound} {exact}");
     }
 
     #[test]
-    fn large_pinned_graphs_without_a_name_have_the_eigenvalue_of_their_matrix() {
+    fn connectivity_of_large_pinned_graphs_matches_the_dense_solver() {
         let graph = random(420, 60);
         for pinning in [Pinning::Listed(vec![3, 200, 400]), Pinning::Leader(7)] {
             let (found, expected) = (graph.pinned_connectivity(&pinning), least(&graph, &pinning));

@@ -30,7 +30,7 @@ fn the_complete_graph_has_the_same_connectivity_from_its_eigenvalues() {
 }
 
 #[test]
-fn a_disconnected_graph_is_found_out() -> Result<(), GraphError> {
+fn components_of_a_disconnected_graph_are_found() -> Result<(), GraphError> {
     let graph = Graph::from_edges(6, &[(4, 0), (1, 0), (3, 2)])?;
     assert_eq!((graph.components(), graph.is_connected(), graph.unreachable()), (3, false, vec![2, 3, 5]));
     assert_eq!(graph.algebraic_connectivity(), 0.0);
@@ -41,7 +41,7 @@ fn a_disconnected_graph_is_found_out() -> Result<(), GraphError> {
 }
 
 #[test]
-fn edges_come_once_and_in_row_order() -> Result<(), GraphError> {
+fn edges_are_listed_once_in_row_order() -> Result<(), GraphError> {
     let edges = |graph: &Graph| graph.edges().collect::<Vec<_>>();
     assert_eq!(edges(&Graph::complete(4)), [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]);
     assert_eq!(edges(&Graph::star(4)), [(0, 1), (0, 2), (0, 3)]);
@@ -57,7 +57,7 @@ fn edges_come_once_and_in_row_order() -> Result<(), GraphError> {
 }
 
 #[test]
-fn a_list_of_all_pairs_is_the_complete_graph() -> Result<(), GraphError> {
+fn listing_all_pairs_gives_the_complete_graph() -> Result<(), GraphError> {
     assert_eq!(Graph::from_edges(3, &[(0, 1), (2, 0), (2, 1)])?, Graph::complete(3));
     assert_eq!(Graph::ring(3), Graph::complete(3));
     assert_eq!(Graph::path(2), Graph::complete(2));
@@ -78,7 +78,7 @@ fn tiny_graphs_are_connected_and_have_no_edges() {
 }
 
 #[test]
-fn neighbours_of_a_vehicle_out_of_range_are_none() {
+fn a_vehicle_out_of_range_has_no_neighbours() {
     for graph in [Graph::complete(4), Graph::star(4)] {
         for i in [4, 5, usize::MAX] {
             assert_eq!(graph.later_neighbours(i).count(), 0);
@@ -87,7 +87,7 @@ fn neighbours_of_a_vehicle_out_of_range_are_none() {
 }
 
 #[test]
-fn wrong_edge_lists_are_refused_with_numbers_from_one() {
+fn invalid_edge_lists_are_refused_with_numbers_from_one() {
     let message = |edges: &[(usize, usize)]| Graph::from_edges(3, edges).map_err(|e| e.to_string());
     assert_eq!(message(&[(0, 1), (2, 2)]), Err("edge 2 joins vehicle 3 to itself".into()));
     assert_eq!(message(&[(0, 3)]), Err("edge 1 names vehicle 4, but the swarm has 3".into()));

@@ -1,40 +1,43 @@
-//! A spanning tree of a graph as a system of equations, solved from the leaves to the root and back.
+//! Spanning tree of a graph as a preconditioner: a linear system that is solved from the leaves to the root and back.
 
 use super::{Graph, Pinning};
 
-/// M of a spanning tree with the graph's pins, factored: its solutions take O(N), and lie near those of the graph's own M where that
-/// has few edges more.
+/// Factored M of a spanning tree with the graph's pins. A solution takes O(N), and is close to that of the graph's own
+/// M if the graph has few additional edges.
 pub(super) struct SpanningTree {
-    /// Vehicles, each after the one that it hangs from: the root first.
+    /// Vehicles in breadth-first order; the root is first, and each vehicle comes after its parent.
     order: Vec<usize>,
-    /// Whom each hangs from; the root from itself.
+    /// Parent of each vehicle; the root is its own parent.
     parent: Vec<usize>,
-    /// What is left of a vehicle's diagonal once all that hangs from it has been eliminated; infinite for a root that stays at 0,
-    /// as a leader does, or somebody where nobody is pinned.
+    /// Diagonal of each vehicle after the elimination of its subtree. Infinite for a root whose value stays 0: a
+    /// leader, or an arbitrary vehicle without pinning.
     pivot: Vec<f64>,
 }
 
-/// Conjugate gradients that a tree leads need about as many iterations, each of some three times the work, as the cube root of the
-/// lengths along the tree of all edges that it lacks, which are at most twice the reach; those that the diagonal leads, about
-/// the reach. The cube of 3, times 2.
-const PAYS: usize = 54;
+/// Factor of the choice of preconditioner: the tree is used if `54 lacks <= reach^2`.
+///
+/// With the tree, conjugate gradients need about `(2 lacks reach)^(1/3)` iterations of three times the work. Here
+/// `2 lacks reach` bounds the sum of tree distances across the `lacks` edges beyond the tree. With the diagonal they
+/// need about `reach` iterations. The tree is faster if `3 (2 lacks reach)^(1/3) <= reach`.
+const THRESHOLD: usize = 54;
 
 impl SpanningTree {
-    /// Where it leads conjugate gradients faster than the diagonal does: on long thin graphs and those that lack few edges to be trees.
-    pub(super) fn where_it_pays(graph: &Graph, pinning: &Pinning) -> Option<Self> {
+    /// Returns the tree if it is the faster preconditioner: on long thin graphs and on graphs with few edges beyond a
+    /// tree.
+    pub(super) fn new_if_worthwhile(graph: &Graph, pinning: &Pinning) -> Option<Self> {
         let lacks = (graph.edge_count() + 1).saturating_sub(graph.count());
         let neighbours = Neighbours::of(graph);
         let reach = neighbours.reach(pinning);
-        (PAYS.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
+        (THRESHOLD.saturating_mul(lacks) <= reach.saturating_mul(reach)).then(|| Self::new(&neighbours, pinning))
     }
 
-    /// Of a connected graph of at least one vehicle, breadth first from a leader or from the first.
+    /// Builds the tree of a connected graph with at least one vehicle, breadth first from a leader or from vehicle 0.
     fn new(neighbours: &Neighbours, pinning: &Pinning) -> Self {
         let root = pinning.leader().unwrap_or(0);
         let (order, parent) = neighbours.breadth_first(vec![root]);
         let count = parent.len();
-        // Pins below a vehicle, as if they were its own: an edge of stiffness 1 in series with s is one of s/(1 + s). No
-        // difference is taken, and so no digit lost.
+        // Stiffness of the pins below a vehicle, seen from it: an edge of stiffness 1 in series with s has s/(1 + s).
+        // No differences are taken, so no digits are lost.
         let mut pins: Vec<f64> = (0..count).map(|i| if pinning.pins(i) { 1.0 } else { 0.0 }).collect();
         for &i in order.iter().skip(1).rev() {
             let pin = pins[i];
@@ -47,7 +50,7 @@ impl SpanningTree {
         Self { order, parent, pivot: pins }
     }
 
-    /// Puts the solution in the place of the right side.
+    /// Replaces the right-hand side by the solution.
     pub(super) fn solve(&self, x: &mut [f64]) {
         let Some((&root, others)) = self.order.split_first() else { return };
         for &i in others.iter().rev() {
@@ -90,9 +93,9 @@ impl Neighbours {
         &self.all[self.offsets[i]..self.offsets[i + 1]]
     }
 
-    /// Vehicles in the order in which they are reached from some of them, and whom each is reached from: these from themselves. Of
-    /// those that are as far, who has most to reach goes first, which keeps short what the edges left out span: a comb on a
-    /// ladder, and not its two rails.
+    /// Returns the vehicles in breadth-first order from `from`, and the parent of each; the vehicles of `from` are
+    /// their own parents. Within a layer the vehicle with the most unreached neighbours goes first. This keeps the tree
+    /// distances across the other edges short: a ladder gives a comb instead of its two rails.
     fn breadth_first(&self, from: Vec<usize>) -> (Vec<usize>, Vec<usize>) {
         let mut parent = vec![usize::MAX; self.offsets.len() - 1];
         for &i in &from {
@@ -117,7 +120,7 @@ impl Neighbours {
         (order, parent)
     }
 
-    /// Edges between the vehicle that is farthest from those that are pinned, or from the leader or the first, and them.
+    /// Returns the largest number of edges between a vehicle and the nearest pinned one, or the leader, or vehicle 0.
     fn reach(&self, pinning: &Pinning) -> usize {
         let mut from: Vec<usize> = (0..self.offsets.len() - 1).filter(|&i| pinning.pins(i)).collect();
         if from.is_empty() {
@@ -134,7 +137,7 @@ mod tests {
     use super::super::inverse_iteration::Operator;
     use super::*;
 
-    /// Two rails and the rungs between them.
+    /// Returns a ladder: two rails with rungs between them.
     fn ladder(rungs: usize) -> Graph {
         let rails = (2..2 * rungs).map(|i| (i - 2, i));
         let edges: Vec<_> = rails.chain((0..rungs).map(|k| (2 * k, 2 * k + 1))).collect();
@@ -142,23 +145,23 @@ mod tests {
     }
 
     #[test]
-    fn trees_lead_on_long_thin_graphs_alone() {
-        let pays = |graph: &Graph, pinning: &Pinning| SpanningTree::where_it_pays(graph, pinning).is_some();
+    fn the_tree_is_chosen_on_long_thin_graphs() {
+        let is_chosen = |graph: &Graph, pinning: &Pinning| SpanningTree::new_if_worthwhile(graph, pinning).is_some();
         let half = |graph: &Graph| Pinning::Listed((0..graph.count()).step_by(2).collect());
         let (path, ladder) = (Graph::path(1000), ladder(1000));
-        assert!(pays(&path, &Pinning::Nobody) && pays(&path, &half(&path)), "it is the graph itself");
-        assert!(pays(&Graph::star(1000), &Pinning::Leader(3)));
-        assert!(pays(&ladder, &Pinning::Nobody) && pays(&ladder, &Pinning::Leader(7)));
-        assert!(!pays(&ladder, &half(&ladder)), "nobody is far from who is pinned");
+        assert!(is_chosen(&path, &Pinning::Nobody) && is_chosen(&path, &half(&path)), "the tree is the graph itself");
+        assert!(is_chosen(&Graph::star(1000), &Pinning::Leader(3)));
+        assert!(is_chosen(&ladder, &Pinning::Nobody) && is_chosen(&ladder, &Pinning::Leader(7)));
+        assert!(!is_chosen(&ladder, &half(&ladder)), "every vehicle is near a pinned one");
         let side = 40;
         let right = (0..side * side).filter(|i| i % side + 1 < side).map(|i| (i, i + 1));
         let grid: Vec<_> = right.chain((side..side * side).map(|i| (i - side, i))).collect();
         let grid = Graph::from_edges(side * side, &grid).expect("a grid");
-        assert!(!pays(&grid, &Pinning::Nobody));
+        assert!(!is_chosen(&grid, &Pinning::Nobody));
     }
 
     #[test]
-    fn edges_that_the_tree_of_a_ladder_lacks_span_little_however_it_is_numbered() {
+    fn the_tree_of_a_ladder_has_short_distances_for_any_numbering() {
         let rungs = 60;
         let (interleaved, rail_by_rail) = (ladder(rungs), |i: usize| i / 2 + rungs * (i % 2));
         let renumbered: Vec<_> = interleaved.edges().map(|(i, j)| (rail_by_rail(i), rail_by_rail(j))).collect();
@@ -178,8 +181,8 @@ mod tests {
     }
 
     #[test]
-    fn a_ladder_of_thousands_is_solved() {
-        // The slowest motion of a ladder is that of a rail.
+    fn the_connectivity_of_a_large_ladder_is_exact() {
+        // The slowest mode of a ladder is that of one rail.
         let rungs = 3000;
         let graph = ladder(rungs);
         let found = Operator::new(&graph, &Pinning::Nobody, &graph.degrees()).inverse_iteration().expect("solved");
@@ -188,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_solution_on_a_tree_is_that_of_its_matrix() {
+    fn the_solution_on_a_tree_solves_its_matrix() {
         let edges = [(0, 1), (1, 2), (1, 3), (3, 4), (3, 5), (5, 6), (0, 7)];
         let graph = Graph::from_edges(8, &edges).expect("a tree");
         let right: Vec<f64> = (0..8).map(|i| (3.0 * f64::from(i)).sin()).collect();

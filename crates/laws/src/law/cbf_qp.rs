@@ -1,5 +1,5 @@
-//! Control barrier functions: the acceleration nearest to that of a controller that minds nobody, among those with which any
-//! two vehicles can still brake.
+//! Control barrier functions: the acceleration nearest to that of a nominal controller that keeps every pair able to
+//! brake.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ use crate::observation::Observation;
 use crate::space::NearLists;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
-/// Clearance that a pair counts as having at least, as a part of delta: the barrier's slope is infinite where there is none.
+/// Smallest clearance used for a pair, as a fraction of delta: the slope of the barrier is infinite at clearance 0.
 const LEAST_CLEARANCE: f64 = 1e-6;
 
 /// Keys of `[law]` with `kind = "cbf-qp"`.
@@ -26,16 +26,16 @@ pub struct CbfQpKeys {
     /// Gain of the nominal controller on the way to the slot in 1/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
-    /// Its gain on velocity in 1/s.
+    /// Gain of the nominal controller on velocity in 1/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c_per_s: f64,
-    /// Highest speed that it asks for in m/s.
+    /// Largest speed of the nominal controller in m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: f64,
-    /// Highest acceleration that is commanded in m/s^2.
+    /// Largest commanded acceleration in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
-    /// How fast the barrier may be approached, in s/m^2: h' >= -gamma h^3.
+    /// Rate coefficient gamma of the barrier in s/m^2: h' >= -gamma h^3.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub gamma_s_per_m2: f64,
 }
@@ -46,37 +46,38 @@ impl Default for CbfQpKeys {
     }
 }
 
-/// Safety barrier certificates (Wang, Ames, Egerstedt: Safety barrier certificates for collisions-free multirobot systems, 2017)
-/// around a proportional-derivative controller to the slot, decentralised, all vehicles having the same limit:
+/// Safety barrier certificates (Wang, Ames, Egerstedt: Safety barrier certificates for collisions-free multirobot
+/// systems, 2017) around a proportional-derivative controller to the slot. Decentralised, with the same limit for all
+/// vehicles:
 ///
 /// ```text
 /// U_i = r'' - c (v_i - V_i) - a22 v_i,   V_i = r' + min((k/c) |d_i|, v_max) d_i/|d_i|,   d_i = h_i + r - p_i
-/// u_i = in |u| <= a_max and all half-spaces of i, the acceleration nearest to U_i
+/// u_i = acceleration nearest to U_i with |u| <= a_max in all half-spaces of i
 /// ```
 ///
-/// With A = 2 `a_max`, what two vehicles brake with together, the unit vector n from vehicle j to vehicle i, their distance l and
-/// their relative velocity w = `v_i - v_j`, a pair is safe while
+/// Let A = 2 `a_max` be the joint braking of two vehicles, n the unit vector from vehicle j to vehicle i, l their
+/// separation and w = `v_i - v_j` their relative velocity. A pair is safe while
 ///
 /// ```text
 /// h = sqrt(2 A (l - delta)) + n . w >= 0
 /// ```
 ///
-/// and stays so while h' >= -gamma h^3, that is, while
+/// and stays safe while h' >= -gamma h^3, that is, while
 ///
 /// ```text
 /// -n . (u_i - u_j) <= B,   B = gamma h^3 + (|w|^2 - (n . w)^2)/l + A n . w / sqrt(2 A (l - delta)) + a22 n . w
 /// ```
 ///
-/// of which each of the two sees to half: `n . u_i >= -B/2`. Of two that are nearer than delta the root of h is taken of
-/// delta - l and is negative, which parts them. Where not all half-spaces have a point in common, the acceleration
-/// that violates least is commanded.
+/// Each vehicle of the pair ensures half of it: `n . u_i >= -B/2`. For a separation below delta the root in h is that
+/// of delta - l with a negative sign, which parts the pair. If the half-spaces have no common point, the acceleration
+/// with the least largest violation is commanded.
 ///
 /// # Guarantee
-/// None for a swarm. A pair alone that starts with h >= 0 keeps delta, in continuous time with a22 = 0. Between several others
-/// a vehicle may have no acceleration that all of them ask for.
+/// None for a swarm. A single pair that starts with h >= 0 keeps delta, in continuous time with a22 = 0. A vehicle with
+/// several neighbours may have no acceleration in all of its half-spaces.
 ///
 /// # Cost
-/// O(near pairs) a step without allocation.
+/// O(near pairs) per step without allocation.
 #[derive(Clone, Debug)]
 pub struct CbfQpLaw {
     keys: CbfQpKeys,
@@ -90,11 +91,11 @@ pub struct CbfQpLaw {
 }
 
 impl CbfQpLaw {
-    /// The law of so many vehicles; links play no part.
+    /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
-    /// finite, or where there is a reference that some do not know.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: CbfQpKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
@@ -117,17 +118,17 @@ impl CbfQpLaw {
         })
     }
 
-    /// What vehicle i would do if it were alone.
+    /// Returns the acceleration of the nominal controller for vehicle i \[m/s^2\].
     fn nominal_m_s2(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
         let CbfQpKeys { k_per_s2, c_per_s, max_speed_m_s, .. } = self.keys;
         let reference = &at.target.reference;
         let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
         let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        self.reference_use.fed_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
+        self.reference_use.feed_forward_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
     }
 
-    /// What vehicle j leaves of vehicle i's accelerations; everything where it is out of range.
+    /// Returns the half-space of accelerations of vehicle i that vehicle j allows; `None` out of range.
     fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
         let seen = at.seen(i, j);
         let apart_m = row(&at.own.positions_m, i) - seen.position_m;
@@ -143,7 +144,7 @@ impl CbfQpLaw {
         Ok(Some(HalfSpace { normal, offset: -0.5 * bound }))
     }
 
-    /// B of a pair.
+    /// Returns B of a pair \[m/s^2\].
     fn bound_m_s2(&self, normal: Vector3<f64>, distance_m: f64, relative_m_s: Vector3<f64>) -> f64 {
         let both_m_s2 = 2.0 * self.keys.max_accel_m_s2;
         let clearance_m = distance_m - self.delta_m;
@@ -158,8 +159,11 @@ impl CbfQpLaw {
     }
 }
 
-/// Beyond this no pair below the highest speed is asked for anything: with s = sqrt(2 A (l - delta)) at least their relative
-/// speed V, B is at least `gamma (s - V)^3 - A - a22 V`, and no two ask for more than A.
+/// Returns the distance beyond which the half-spaces of a pair below the highest speed contain every allowed
+/// acceleration \[m\].
+///
+/// With s = sqrt(2 A (l - delta)) at least the relative speed V, B is at least `gamma (s - V)^3 - A - a22 V`. The
+/// closing acceleration `-n . (u_i - u_j)` is at most A.
 fn range_m(keys: &CbfQpKeys, delta_m: f64, a22_per_s: f64) -> f64 {
     let (both_m_s2, closing_m_s) = (2.0 * keys.max_accel_m_s2, 2.0 * keys.max_speed_m_s);
     let spare_m_s2 = 2.0 * both_m_s2 + a22_per_s.max(0.0) * closing_m_s;
@@ -200,8 +204,9 @@ impl Law for CbfQpLaw {
         }
     }
 
-    /// A vehicle alone follows x'' = -c x' - k x. Nothing is known where others are within the range: of several half-spaces a
-    /// corner may run as fast as two of their planes close. Vehicles are held to places, and a22 is made up for.
+    /// A vehicle without neighbours follows x'' = -c x' - k x. With neighbours in range no bound is known: a corner of
+    /// several half-spaces may move as fast as two of their planes close. The law controls absolute positions, and a22
+    /// is compensated.
     fn rates(&self, at: &RateQuery) -> Rates {
         let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt());
         let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);

@@ -1,143 +1,142 @@
-//! What a law promises about separation before the first step.
+//! Certificates: the separation that a law guarantees before the first step, or the reasons why it guarantees none.
 
 use super::error::LawError;
 
-/// The separation that a law guarantees from a given start, or why it guarantees none.
+/// Separation that a law guarantees from a given start, or the reasons why the certificate is void.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Certificate {
-    /// No pair ever comes closer than this \[m\], under the assumptions of the law's proof.
+    /// Lower bound of the separation of every pair \[m\], under the assumptions of the law's proof.
     pub certified_m: Option<f64>,
-    /// What is certified holds up to then \[s\], where it does not hold for ever: a wind blows on.
+    /// End of validity \[s\] of the certified bounds; `None` if they hold for all time. Persistent wind limits it.
     pub certified_until_s: Option<f64>,
-    /// No vehicle ever comes nearer to an obstacle than its clearance and this \[m\], where the law keeps clear of obstacles
-    /// and there are some.
+    /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\]: distance from the surface less the
+    /// obstacle's clearance. `None` without obstacles, or if the law does not avoid them.
     pub certified_room_m: Option<f64>,
-    /// Energy E(0) of the start \[m^2/s^2\], where the law has one, whether or not it certifies anything.
+    /// Energy E(0) of the start \[m^2/s^2\], if the law has an energy; also given when the certificate is void.
     pub energy_initial: Option<f64>,
-    /// No pair joined by a link comes closer than this \[m\] for as long as the energy does not exceed that of the start. On a
-    /// graph that is not complete it is no certificate: other pairs may come closer.
+    /// Lower bound of the separation of linked pairs \[m\] while the energy does not exceed E(0). On an incomplete
+    /// graph this is no certificate, because unlinked pairs may come closer.
     pub linked_m: Option<f64>,
-    /// Every reason why nothing is certified.
+    /// Every reason why the certificate is void.
     pub void: Vec<Void>,
-    /// The same for each of several formations that are gone through, in their order: `certified_m` is the least of them.
+    /// Bounds per leg, in order, for a mission of several formations; `certified_m` is the least of them.
     pub legs: Vec<LegBound>,
 }
 
-/// What holds from the beginning of a leg to the beginning of the next, and for ever after the last.
+/// Bounds from the beginning of a leg to the beginning of the next leg, or for all time after the last leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegBound {
-    /// The energy does not exceed this \[m^2/s^2\].
+    /// Upper bound of the energy \[m^2/s^2\].
     pub energy: f64,
-    /// No pair comes closer than this \[m\].
+    /// Lower bound of the separation of every pair \[m\].
     pub certified_m: Option<f64>,
-    /// No vehicle comes nearer to an obstacle than its clearance and this \[m\].
+    /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\].
     pub certified_room_m: Option<f64>,
 }
 
-/// Why a certificate is void.
+/// Reason why a certificate is void.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Void {
     /// The law does not push vehicles apart.
     #[error("The law has no barrier: it does not keep vehicles apart.")]
     NoBarrier,
-    /// Some pair is not joined by an edge.
+    /// Some pair has no edge in the graph.
     #[error("The graph is not complete: pairs without an edge are not kept apart.")]
     GraphNotComplete,
-    /// Each vehicle is fed more than it is braked: the energy may grow.
-    #[error("The vehicles are fed more than the law brakes them: the energy may grow.")]
+    /// The velocity gain a22 of the vehicles exceeds the damping of the law, so the energy may grow.
+    #[error("The velocity gain a22 of the vehicles exceeds the damping of the law: the energy may grow.")]
     VelocityUndamped,
-    /// What a vehicle may command is limited, and what keeps two apart may be more.
-    #[error("The law limits what it commands: what keeps vehicles apart may be more than that.")]
+    /// The law limits its command, and the acceleration that keeps vehicles apart may be larger.
+    #[error("The law limits its command: the acceleration that keeps vehicles apart may exceed the limit.")]
     CommandLimited,
-    /// The target changes while the swarm flies.
-    #[error("The target changes: what holds for the first leg need not for the next.")]
+    /// The target changes during the run.
+    #[error("The target changes during the run: the law's proof does not cover the change.")]
     TargetChanges,
-    /// What the vehicles know is not the true present state, or what they command does not arrive as given.
-    #[error("The vehicles do not know the true present state.")]
+    /// The law receives inexact states, or its commands arrive changed.
+    #[error("The states that the law receives, or the commands that arrive, are not exact.")]
     InexactLink,
-    /// What vehicles know, their own state included, is some time old.
+    /// Sensed states, the vehicle's own included, are late.
     #[error(
-        "The vehicles know what is old: the swarm has moved on since it was measured (sensing.latency_s, sensing.rate_hz)."
+        "The sensed states are late: vehicles have moved since the measurement \
+         (sensing.latency_s, sensing.near_latency_s, sensing.rate_hz)."
     )]
     KnownLate,
-    /// What vehicles measure is off the truth.
-    #[error(
-        "The vehicles measure what is off the truth (sensing.position_noise_m, position_bias_m, velocity_noise_m_s)."
-    )]
+    /// Sensed states have errors.
+    #[error("The sensed states have errors (sensing.position_noise_m, position_bias_m, velocity_noise_m_s).")]
     KnownWrongly,
-    /// What vehicles hear of each other is some time old.
+    /// Received states of other vehicles are late.
     #[error(
-        "The vehicles hear of each other what is old when it arrives, and held until more comes (network.latency_s, network.rate_hz)."
+        "The received states are late: each message has a latency and is used until the next one arrives \
+         (network.latency_s, network.rate_hz)."
     )]
     HeardLate,
-    /// Some of what vehicles send is not heard.
+    /// Some messages are lost.
     #[error(
-        "The network loses messages, and what was heard before stands for them (network.loss, network.failure, failure)."
+        "The network loses messages: vehicles use the last state that arrived (network.loss, network.failure, failure)."
     )]
     MessagesLost,
-    /// No vehicle is accelerated by more than a limit.
+    /// The acceleration of each vehicle is limited.
     #[error(
-        "The vehicles are not accelerated by more than a limit, and what keeps two apart may be more (actuation.max_accel_m_s2)."
+        "The acceleration is limited: the one that keeps vehicles apart may exceed the limit \
+         (actuation.max_accel_m_s2)."
     )]
     AccelerationLimited,
-    /// Vehicles are accelerated as they were commanded some time before.
+    /// Accelerations follow the commands with a lag.
     #[error("The acceleration follows the command with a lag (actuation.lag_s).")]
     AccelerationLate,
-    /// A vehicle does not do what the law commands.
-    #[error("The flight goes on with a vehicle that fails and does not do what the law commands (failure).")]
+    /// A vehicle fails and no longer carries out the law's commands.
+    #[error("The run continues with a failed vehicle that does not carry out the law's commands (failure).")]
     VehicleFails,
-    /// Accelerations came from outside in the place of the law's.
-    #[error("The vehicles were commanded from outside.")]
+    /// The caller supplied commands in place of the law's.
+    #[error("The commands came from the caller in place of the law.")]
     CommandsFromOutside,
-    /// Each command is held for a period of its own.
-    #[error("The vehicles hold each command while the swarm moves on (time.control_hz).")]
+    /// Commands are held constant over control periods.
+    #[error("The commands are held constant over each control period (time.control_hz).")]
     CommandsHeld,
-    /// A wind blows, and the law's proof is of vehicles that nothing pushes.
-    #[error("The law's proof is of vehicles that nothing else pushes: the wind does.")]
+    /// The scenario has wind, and the law's proof excludes wind.
+    #[error("The wind acts on the vehicles: the law's proof covers still air only.")]
     Windblown,
-    /// The wind is turbulent, and turbulence has no bound.
-    #[error("The wind is turbulent (wind.dryden): what it adds to the energy has no bound.")]
+    /// The wind is turbulent, and its contribution to the energy has no bound.
+    #[error("The wind is turbulent (wind.dryden): its contribution to the energy has no bound.")]
     WindUnbounded,
-    /// The wind pushes the leader off the reference that its followers are told.
-    #[error("The wind pushes the leader off the reference: its followers are told another motion.")]
+    /// The wind pushes the leader off the reference, and the law's proof assumes that the leader flies it exactly.
+    #[error("The wind pushes the leader off the reference: the law's proof assumes a leader exactly on it.")]
     LeaderBlown,
-    /// Vehicles are bodies that tilt and whose rotors lag: no command is carried out at once.
-    #[error("The vehicles are no points: a command is not carried out at once and as it is given (vehicle.model).")]
+    /// Vehicles have dynamics of their own, so they carry out commands with delay and error.
+    #[error("The vehicles are not points: they carry out a command with delay and error (vehicle.model).")]
     NotAPoint,
-    /// The vehicles are not told how the reference that they follow moves.
-    #[error("The vehicles are not told how their reference moves (reference.feed_forward).")]
+    /// The motion of the reference is not fed forward to the vehicles.
+    #[error("The motion of the reference is not fed forward to the vehicles (reference.feed_forward).")]
     ReferenceNotFed,
-    /// There are obstacles, and the law does not keep clear of them.
-    #[error("The law does not keep clear of obstacles: what hits one moves in another way than it says.")]
+    /// The scenario has obstacles, and the law does not avoid them.
+    #[error("The law does not keep clear of obstacles: its proof does not cover vehicles that hit one.")]
     ObstaclesUnknown,
-    /// The swarm is carried past obstacles that stand.
-    #[error("The reference moves and obstacles stand: what the swarm is carried by may press it against them.")]
+    /// The reference moves the swarm among fixed obstacles.
+    #[error("The reference moves among fixed obstacles: it may press the swarm against them.")]
     CarriedPastObstacles,
-    /// The law asked for shorter steps than the flight was allowed to take.
-    #[error(
-        "The law asked for shorter steps than could be flown: what was flown is not the motion that its proof is of."
-    )]
+    /// The law needs shorter time steps than the run was allowed to take.
+    #[error("The law needs shorter time steps than the run could take: the motion flown is outside the law's proof.")]
     StepsTooLong,
-    /// What would be certified is so near delta that the plant's numbers do not tell the two apart.
-    #[error(
-        "The distance that the law certifies is nearer to delta than positions are told apart: there is too much energy."
-    )]
+    /// The certified separation exceeds delta by less than the resolution of positions.
+    #[error("The certified separation exceeds delta by less than the position resolution: the energy is too high.")]
     Unresolved,
-    /// The law has no answer for the start, such as a pair at or inside its safety distance.
-    #[error("The law has no answer for the start: {0}.")]
+    /// The law is undefined at the start, for example with a pair at or inside its safety distance.
+    #[error("The law is undefined at the start: {0}.")]
     StartRefused(LawError),
 }
 
 impl Certificate {
-    /// A certificate that promises nothing, for one reason.
+    /// Returns a void certificate with one reason.
     #[must_use]
     pub fn void(reason: Void) -> Self {
         Self { void: vec![reason], ..Self::default() }
     }
 
-    /// What holds of a flight for which this was promised first and another promise was made on a leg, from 0, after its
-    /// slots were spread: the least of both, which is nothing where either is nothing. The later promise is of the spread
-    /// slots, of those of the leg, and of the legs after it.
+    /// Combines this certificate with a `later` one that was computed on leg `leg` (from 0) after its slots were
+    /// spread.
+    ///
+    /// Keeps the smaller of each bound, and no bound if either certificate has none. The legs of `later` are the spread
+    /// slots, the slots of leg `leg`, and the legs after it.
     pub fn renew(&mut self, later: &Self, leg: usize) {
         if self.certified_m.is_none() {
             return;
@@ -159,7 +158,7 @@ impl Certificate {
         }
     }
 
-    /// The same, promising nothing for one more reason where `breaks` says so.
+    /// Adds a reason, and removes all bounds, if `breaks` is true.
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
         if breaks && !self.void.contains(&reason) {
@@ -172,7 +171,7 @@ impl Certificate {
 }
 
 impl Void {
-    /// A stable name for files, such as `graph-not-complete`.
+    /// Stable code for files, such as `graph-not-complete`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {
@@ -212,7 +211,7 @@ mod tests {
     use tautline_core::swarm::Pair;
 
     #[test]
-    fn a_renewed_promise_is_never_more_than_the_one_before() {
+    fn renewing_a_certificate_never_raises_its_bound() {
         let promised = |certified_m: Option<f64>| Certificate {
             certified_m,
             energy_initial: Some(1.0),
@@ -233,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn every_reason_has_its_own_code_and_a_sentence() {
+    fn every_void_reason_has_a_unique_code_and_a_sentence() {
         let collision = LawError::Collision { pair: Pair::new(0, 1), separation_m: 1.5, delta_m: 2.0 };
         let reasons = [
             Void::NoBarrier,
@@ -299,7 +298,7 @@ mod tests {
         }
         assert_eq!(
             reasons[24].to_string(),
-            "The law has no answer for the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
+            "The law is undefined at the start: vehicles 1-2 are 1.5 m apart, not more than the safety distance 2 m."
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The one-sided tension between vehicles and the surfaces of obstacles at rest.
+//! One-sided tension between vehicles and the surfaces of fixed obstacles.
 
 use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
@@ -8,24 +8,24 @@ use crate::space::Obstacle;
 use crate::target::Leg;
 use tautline_core::swarm::{Rows, row, set_row};
 
-/// The edge tension on the room that a vehicle has from an obstacle: its distance from the surface less the clearance. It
-/// pushes while that is less than a range, and without bound as it vanishes.
+/// Edge tension on the clearance margin of a vehicle at an obstacle: its distance from the surface less the clearance.
+/// It pushes where the margin is below a range, and becomes infinite as the margin vanishes.
 ///
-/// Along the direction in which the room of a convex obstacle grows the Hessian of V is V'', across it it is V' times a
-/// curvature that is not negative, with V' < 0: so it is at most V''.
+/// Along the gradient of the margin at a convex obstacle the Hessian of V is V''. Across it the Hessian is V' times a
+/// curvature >= 0, and V' < 0. Hence the Hessian is at most V''.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClearanceTension {
-    /// Of a barrier at no room at all.
+    /// Tension with its barrier at margin 0.
     tension: EdgeTension,
 }
 
 impl ClearanceTension {
-    /// The tension of scale `alpha` \[m^2/s^2\] that is felt where there is less room than `range_m`.
+    /// Builds the tension of scale `alpha` \[m^2/s^2\] that acts where the margin is below `range_m`.
     pub(super) fn new(alpha: f64, range_m: f64) -> Result<Self, TensionError> {
         EdgeTension::new(alpha, 0.0, range_m).map(|tension| Self { tension })
     }
 
-    /// Adds to the row of each vehicle what the obstacles do to it, and sums the tensions \[m^2/s^2\].
+    /// Adds the push of the obstacles to the row of each vehicle, and returns the sum of the tensions \[m^2/s^2\].
     pub(super) fn add_pushes(&self, at: &Observation<'_>, sums: &mut Rows) -> Result<f64, LawError> {
         self.walk(at.obstacles, &at.own.positions_m, |vehicle, push| {
             let sum = row(sums, vehicle) + push;
@@ -64,18 +64,19 @@ impl ClearanceTension {
         Ok(potential)
     }
 
-    /// V'' of a vehicle that has so little room \[1/s^2\].
+    /// Returns V'' at a margin \[1/s^2\]; 0 out of range.
     pub(super) fn rate_squared(&self, room_m: f64) -> f64 {
         if room_m < self.tension.rest_m() { self.tension.second_derivative(room_m) } else { 0.0 }
     }
 
-    /// The least room that a vehicle can be left by so much energy \[m\].
+    /// Returns the smallest margin that an energy \[m^2/s^2\] allows \[m\].
     pub(super) fn least_room_m(&self, energy: f64) -> f64 {
         self.tension.push_side_root(energy)
     }
 }
 
-/// The least room that a slot of any leg has from an obstacle \[m\], where slots are places that stay.
+/// Returns the smallest margin of any slot of any leg \[m\] for a reference at rest; infinite if slots have no fixed
+/// place.
 pub(super) fn slot_room_m(context: &LawContext<'_>) -> Result<f64, ParameterError> {
     let Some(guidance) = context.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
         return Ok(f64::INFINITY);

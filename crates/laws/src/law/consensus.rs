@@ -1,4 +1,4 @@
-//! Sums over a graph and over all vehicles that several laws are made of.
+//! Sums over a graph and over all vehicles, shared by several laws, and checks of their inputs.
 
 use nalgebra::Vector3;
 
@@ -8,13 +8,13 @@ use crate::graph::Graph;
 use crate::observation::{Neighbour, Observation, Others};
 use tautline_core::swarm::{Rows, Swarm, columns, columns_mut, first_row_not_finite, row, set_row};
 
-/// Whether a state is of `count` vehicles and finite.
+/// Checks that a state is of `count` vehicles and finite.
 pub(super) fn check_state(count: usize, swarm: &Swarm) -> Result<(), LawError> {
     check_rows(count, swarm)?;
     swarm.first_not_finite().map_or(Ok(()), |vehicle| Err(LawError::NotFinite { vehicle }))
 }
 
-/// Whether a state is of `count` vehicles.
+/// Checks that a state is of `count` vehicles.
 pub(super) fn check_rows(count: usize, swarm: &Swarm) -> Result<(), LawError> {
     check_count(count, swarm.positions_m.nrows())?;
     check_count(count, swarm.velocities_m_s.nrows())
@@ -24,14 +24,14 @@ pub(super) fn check_count(expected: usize, found: usize) -> Result<(), LawError>
     if expected == found { Ok(()) } else { Err(LawError::WrongCount { expected, found }) }
 }
 
-/// Whether the accelerations computed from a finite state are finite.
+/// Checks that the accelerations computed from a finite state are finite.
 pub(super) fn check_range(command: &Rows) -> Result<(), LawError> {
     first_row_not_finite(command).map_or(Ok(()), |_| Err(LawError::OutOfRange))
 }
 
-/// Adds `gain L_G X` to `sums`, where X has a row for each vehicle, whose number along each axis `x` gives: row i gains `gain`
-/// times the sum of `x_i - x_j` over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)` and takes
-/// O(N) for all rows.
+/// Adds `gain L_G X` to `sums`, N x 3. `x[axis](i)` is the entry of X for vehicle i. Row i gains `gain` times the sum
+/// of `x_i - x_j` over the neighbours j of i. On the complete graph that sum is `N (x_i - mean x)`, and all rows take
+/// O(N).
 #[inline]
 pub(super) fn add_laplacian_product(graph: &Graph, x: &[impl Fn(usize) -> f64; 3], gain: f64, sums: &mut Rows) {
     let (count, sums) = (graph.count(), columns_mut(sums));
@@ -61,12 +61,12 @@ pub(super) fn add_laplacian_product(graph: &Graph, x: &[impl Fn(usize) -> f64; 3
     }
 }
 
-/// The numbers of a table along each axis, as [`add_laplacian_product`] takes them.
+/// Returns the columns of a table as functions of the vehicle, for [`add_laplacian_product`].
 pub(super) fn of_table(rows: &Rows) -> [impl Fn(usize) -> f64; 3] {
     columns(rows).map(|x| move |i: usize| x[i])
 }
 
-/// Where vehicles are from their slots along each axis \[m\], as [`add_laplacian_product`] takes it.
+/// Returns the position errors `p_i - h_i` along each axis \[m\], for [`add_laplacian_product`].
 pub(super) fn of_errors_m(positions_m: &Rows, slots_m: &Rows) -> [impl Fn(usize) -> f64; 3] {
     let ([x, y, z], [slot_x, slot_y, slot_z]) = (columns(positions_m), columns(slots_m));
     [(x, slot_x), (y, slot_y), (z, slot_z)].map(|(at, slot)| move |i: usize| at[i] - slot[i])
@@ -83,8 +83,8 @@ pub(super) fn sum_of_squares_about_mean(count: usize, x: impl Fn(usize) -> Vecto
     (0..count).map(|i| (x(i) - mean).norm_squared()).sum()
 }
 
-/// The margin of a law that damps relative velocities by g/N times the graph's Laplacian: g lambda2/N - a22. For g < 0
-/// the largest possible eigenvalue N takes the place of lambda2.
+/// Returns the margin of a law that damps relative velocities by g/N times the graph's Laplacian: g lambda2/N - a22.
+/// For g < 0 the largest possible eigenvalue N replaces lambda2.
 pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64, a22_per_s: f64) -> VelocityMargin {
     let count = count.max(1) as f64;
     let worst = if gain_per_s < 0.0 { count } else { connectivity };
@@ -95,13 +95,13 @@ pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64,
     }
 }
 
-/// Whether an observation is of `count` vehicles and finite, and the table of accelerations of as many.
+/// Checks that an observation is of `count` vehicles and finite, and that the table of accelerations has `count` rows.
 pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_state(count, at.own)?;
     check_tables(count, at, command)
 }
 
-/// Whether an observation is of `count` vehicles, finite unless all share one state, and the table of accelerations of as many.
+/// Checks the sizes as [`check_observation`] does, but does not check a shared state for finite numbers.
 pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_rows(count, at.own)?;
     if let Others::Held(held) = at.others {
@@ -114,8 +114,8 @@ pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -
     check_count(count, command.nrows())
 }
 
-/// Adds to row i of `sums` what vehicle i makes of each of its neighbours j, from its own state and from what it heard
-/// of j: `term(i, own, j, heard)`.
+/// Adds `term(i, own, j, heard)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and
+/// `heard` the state of j that i received.
 pub(super) fn add_heard(
     at: &Observation<'_>,
     sums: &mut Rows,
@@ -135,9 +135,9 @@ pub(super) fn add_heard(
     Ok(())
 }
 
-/// Adds to the row of each vehicle what it makes of every other that is near, from where it sees itself apart \[m\]:
-/// `push(i, j, apart_m)` gives that and the potential of the pair, or nothing, and the opposite push for the opposite way. The sum
-/// of the potentials over the near pairs is the result, where all share one state.
+/// Adds the push of every near vehicle to the row of each vehicle. `push(i, j, apart_m)` returns the push on i and the
+/// potential of the pair for the position of i relative to j \[m\], or `None` out of range. It must be odd in
+/// `apart_m`. Returns the sum of the potentials over the near pairs if all vehicles share one state.
 pub(super) fn add_pushes(
     at: &Observation<'_>,
     sums: &mut Rows,
@@ -145,7 +145,7 @@ pub(super) fn add_pushes(
 ) -> Result<Option<f64>, LawError> {
     if let Some(swarm) = at.shared() {
         let mut potential = 0.0;
-        // Two who see each other where they are push each other alike.
+        // With shared states the two pushes of a pair are opposite and computed once.
         for &(i, j) in at.near {
             let apart_m = row(&swarm.positions_m, i) - row(&swarm.positions_m, j);
             if let Some((pushed, of_pair)) = push(i, j, apart_m)? {

@@ -1,5 +1,5 @@
-//! The displacement law: consensus on the slots over any connected graph, and a one-sided edge tension between all who are
-//! near.
+//! The displacement law: consensus on slots over any connected graph, plus a one-sided edge tension between near
+//! vehicles.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
 use super::interface::{Capabilities, Controls, Law, RateQuery, Rates, VelocityMargin};
 use super::modes::{Linear, Mode, stiffest_contact_mode};
-use super::pinned::{Gains, PinnedConsensus, error_m, fed_forward};
+use super::pinned::{Gains, PinnedConsensus, error_m, feed_forward_acceleration};
 use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
@@ -26,13 +26,13 @@ use tautline_core::swarm::{Pair, Rows, row, set_row};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DisplacementKeys {
-    /// Gain on positions over links in 1/s^2, before it is divided by the graph's algebraic connectivity.
+    /// Gain on positions over links in 1/s^2, before the division by the graph's algebraic connectivity.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
-    /// Rate at which relative velocities are damped at least in 1/s, whatever a22 is.
+    /// Lower bound of the damping rate of relative velocities in 1/s, independent of a22.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub zeta_per_s: f64,
-    /// Scale of the tension between vehicles that are nearer than slots are, in m^2/s^2.
+    /// Scale of the tension between vehicles whose separation is below the smallest slot distance, in m^2/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub alpha: f64,
 }
@@ -43,24 +43,30 @@ impl Default for DisplacementKeys {
     }
 }
 
-/// The displacement law on a connected undirected graph of N vehicles that share a compass: with `e_i = p_i - h_i`,
+/// The displacement law on a connected undirected graph of N vehicles with a common compass. With `e_i = p_i - h_i`,
 ///
 /// ```text
 /// u_i = -sigma sum_{j in N_i} [ k (e_i - e_j) + c (v_i - v_j) ] - sum_{j : l_ij < R} grad_i V_R(l_ij)
 /// sigma = 1/lambda2(L),   c = max(0, zeta + a22),   R = smallest distance of two slots on any leg
 /// ```
 ///
-/// where `V_R` is the [`EdgeTension`] with rest length R, used only while it pushes: its slope is continuous at R. The first
-/// sum goes over links, the second over near pairs, linked or not. The sum of all `u_i` is zero.
+/// where `V_R` is the [`EdgeTension`] with rest length R, used only where it pushes; its slope is continuous at R. The
+/// first sum is over links, the second over near pairs, linked or not. The sum of all `u_i` is zero.
 ///
 /// On the complete graph sigma = 1/N, and the first sum is `N [k (e_i - mean e) + c (v_i - mean v)]`.
 ///
 /// # Reference
-/// Where some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M takes the place of L
-/// ([`crate::graph::Pinning`]), sigma is the inverse of its least eigenvalue, `k (e_i - r) + c (v_i - r')` is added to the sum
-/// of those who know, and `r'' - a22 r'` is fed forward to all. A leader flies `r'' - a22 r' - k (e - r) - c (v - r')`,
-/// which no other vehicle changes. Energy and certificate are those below with v - r' for v~ and M for L; a leader's own
-/// place and velocity are the reference then.
+/// If some vehicles know a [reference](crate::target::Guidance) r(t), the pinned Laplacian M replaces L
+/// ([`crate::graph::Pinning`]), and sigma is the inverse of its least eigenvalue. `k (e_i - r) + c (v_i - r')` is added
+/// to the sum of each vehicle that knows r, and `r'' - a22 r'` is fed forward to all vehicles. A leader follows the
+/// reference independent of other vehicles:
+///
+/// ```text
+/// u = r'' - a22 r' - k (e - r) - c (v - r')
+/// ```
+///
+/// Energy and certificate are as below with v~ = v - r' and M for L. With a leader, its position and velocity replace
+/// the reference.
 ///
 /// # Energy
 /// ```text
@@ -68,69 +74,74 @@ impl Default for DisplacementKeys {
 /// dE/dt = a22 sum |v~_i|^2 - sigma c sum over links of |v_i - v_j|^2 <= -zeta sum |v~_i|^2
 /// ```
 ///
-/// because the sum over links of `|v_i - v_j|^2` is at least lambda2 times the sum of `|v~_i|^2`.
+/// because the sum over links of `|v_i - v_j|^2` is at least lambda2 times the sum of `|v~_i|^2`, v~ = v - mean v.
 ///
 /// # Certificate
-/// `V_R(l_ij(t)) <= E(0)` for *every* pair, for ever, on *every* connected graph. It assumes exact knowledge of links and near
-/// pairs, a common compass, no delay, no saturation and continuous time.
+/// `V_R(l_ij(t)) <= E(0)` for *every* pair and all time, on *every* connected graph. Assumptions: exact states over
+/// links and of near pairs, a common compass, no delay, no saturation, continuous time.
 ///
-/// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
-/// `c - a22` for zeta, and at most that of |w~|/sqrt 2 to sqrt E: what is certified then is certified to the end of the flight.
-/// w~ counts as v~ does: what all feel alike is nothing to a swarm without a reference.
+/// External accelerations w, such as wind, add at most the time integral of the sum of `|w~_i|^2`/(4 zeta) to E, with
+/// zeta = `c - a22`. They add at most the integral of |w~|/sqrt 2 to sqrt E. The certificate then holds to the end of
+/// the run. w~ is relative to the same frame as v~: without a reference, an acceleration common to all vehicles adds
+/// nothing.
 ///
-/// Where slots change by D, at once or along straight lines, `sqrt E` grows by at most `q(D) = sqrt(sigma k/2 tr(D' M D))`:
-/// what holds through all legs is known before the first step.
+/// A change D of the slots, at once or along straight lines, raises `sqrt E` by at most
+/// `q(D) = sqrt(sigma k/2 tr(D' M D))`. The bound through all legs is therefore known before the first step.
 ///
 /// # Ellipsoids
-/// Where what must stay empty around a vehicle is an ellipsoid, `l_ij` is the scaled length of its [`Metric`], in which R and delta
-/// are lengths too, and a near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes, and what is certified is
-/// certified of scaled lengths.
+/// If the keep-out region of a vehicle is an ellipsoid, `l_ij` is the scaled length of the [`Metric`], and so are R and
+/// delta. A near pair is pushed by `-V_R'(l) S^2 (p_i - p_j)/l`. Nothing else changes; the certificate bounds scaled
+/// lengths.
 ///
 /// # Obstacles
-/// The same one-sided tension acts between vehicles and obstacles at rest, on the distance from the surface less the
-/// clearance, over a range of R - delta, or of the least room that a slot has where slots are places. E holds all of these
-/// and absolute velocities then. So what is certified, of pairs and of the room from obstacles, is certified of a reference at
-/// rest, or without a reference for a22 <= 0. A leader keeps clear by itself.
+/// The same one-sided tension acts between vehicles and fixed obstacles, on the distance from the surface less the
+/// clearance. Its range is R - delta, or the smallest margin of a slot if slots have fixed places and that is smaller.
+/// E then contains these tensions and absolute velocities. The certificate for pairs and obstacles therefore needs a
+/// reference at rest, or no reference and a22 <= 0. A leader does not interact with others and keeps clear by its
+/// reference.
 ///
 /// # Cost
-/// O(links + near pairs) a step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
+/// O(links + near pairs) per step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
 #[derive(Clone, Debug)]
 pub struct DisplacementLaw {
     pulls: PinnedConsensus,
     keys: DisplacementKeys,
     delta_m: f64,
-    /// What vehicles are kept apart in.
+    /// Metric of separations.
     metric: Metric,
     a22_per_s: f64,
-    /// Whether `r'' - a22 r'` is fed forward to those who follow.
-    is_fed: bool,
-    /// Why nothing is certified from any start.
+    /// Whether `r'' - a22 r'` is fed forward to the followers.
+    has_feed_forward: bool,
+    /// Reasons that void the certificate from any start.
     voids: Vec<Void>,
-    /// What the wind may add to the energy, where it blows.
+    /// Bound on the energy under wind, if there is wind.
     energy_bound: Option<EnergyBound>,
-    /// Least eigenvalue of the pinned Laplacian, and a bound on its largest.
+    /// Least eigenvalue of the pinned Laplacian, and an upper bound on its largest.
     connectivity: f64,
     largest: f64,
     /// `V_R`.
     tension: EdgeTension,
-    /// R is at most this, for legs to come \[m\].
+    /// Upper bound of R from later legs \[m\].
     rest_at_most_m: f64,
-    /// Between vehicles and obstacles, where there are any.
+    /// Tension between vehicles and obstacles, if there are obstacles.
     clearance: Option<ClearanceTension>,
-    /// Whether there are two vehicles at all.
+    /// Whether there are at least two vehicles.
     has_pairs: bool,
-    /// That of the target that R is taken from.
+    /// Revision of the target that set R.
     revision: u64,
-    /// Sum of `V_R` over the near pairs.
+    /// Sum of `V_R` over the near pairs and of the tensions at obstacles.
     cache: PotentialCache,
 }
 
 impl DisplacementLaw {
-    /// The law on these links, with the smallest distance of two slots on any leg as the range of its tension.
+    /// Builds the law on the links of the context. The smallest slot distance of any leg is the range of its tension.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, the graph is not connected,
-    /// nobody knows the reference, a slot or a gain is not finite, or two slots are not more than delta apart.
+    /// [`ParameterError`] in one of these cases:
+    ///
+    /// - graph and formation have different numbers of vehicles, or the graph is not connected;
+    /// - no vehicle knows the reference;
+    /// - a slot or a gain is not finite, or two slots are at most delta apart.
     pub fn new(context: &LawContext<'_>, keys: DisplacementKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, later, guidance, obstacles, delta_m, a22_per_s, metric, .. } = context;
         let gains = [("k", keys.k_per_s2), ("zeta", keys.zeta_per_s), ("a22", a22_per_s)];
@@ -143,7 +154,7 @@ impl DisplacementLaw {
         let pulls = PinnedConsensus::new(links, context.pinning());
         let connectivity = pulls.connectivity();
         if connectivity <= 0.0 {
-            return Err(ParameterError::NobodyKnowsTheReference);
+            return Err(ParameterError::ReferenceUnknown);
         }
         let (mut tension, mut rest_at_most_m) = (tension_between(formation, &keys, (delta_m, metric))?, f64::INFINITY);
         for leg in later {
@@ -169,7 +180,7 @@ impl DisplacementLaw {
             delta_m,
             metric,
             a22_per_s,
-            is_fed: guidance.is_none_or(|guidance| guidance.feed_forward),
+            has_feed_forward: guidance.is_none_or(|guidance| guidance.feed_forward),
             energy_bound,
             voids: voids(context),
             connectivity,
@@ -181,22 +192,22 @@ impl DisplacementLaw {
         })
     }
 
-    /// sigma.
+    /// Returns the scale sigma.
     fn scale(&self) -> f64 {
         1.0 / self.connectivity
     }
 
-    /// c \[1/s\].
+    /// Returns the damping gain c \[1/s\].
     fn damping_per_s(&self) -> f64 {
         (self.keys.zeta_per_s + self.a22_per_s).max(0.0)
     }
 
-    /// Whether somebody knows a reference.
+    /// Whether some vehicle knows a reference.
     fn is_guided(&self) -> bool {
         self.pulls.pinning != Pinning::Nobody
     }
 
-    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and `V_R`; nothing out of range.
+    /// Returns the push of vehicle `j` on vehicle `i` at relative position `apart_m`, and `V_R`; `None` out of range.
     fn push(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
         let scaled_m = self.metric.scaled(apart_m);
         let separation_m = scaled_m.norm();
@@ -211,7 +222,7 @@ impl DisplacementLaw {
         Ok(Some((pushed, self.tension.value(separation_m))))
     }
 
-    /// Sum of the tensions of a state that the law was not asked about \[m^2/s^2\].
+    /// Returns the sum of all tensions of a state that is not in the cache \[m^2/s^2\].
     fn potential(&self, positions_m: &Rows, obstacles: &[Obstacle]) -> Result<f64, LawError> {
         let of_obstacles = match &self.clearance {
             Some(clearance) => clearance.potential(obstacles, positions_m)?,
@@ -256,8 +267,8 @@ impl DisplacementLaw {
             self.cache.keep(&at.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
-            if self.is_fed {
-                let fed = fed_forward(&at.target.reference, self.a22_per_s);
+            if self.has_feed_forward {
+                let fed = feed_forward_acceleration(&at.target.reference, self.a22_per_s);
                 (0..command.nrows()).for_each(|i| {
                     let sum = row(command, i) + fed;
                     set_row(command, i, sum);
@@ -268,14 +279,14 @@ impl DisplacementLaw {
         check_range(command)
     }
 
-    /// R for these slots \[m\].
+    /// Returns the nearest pair of slots, and R for these slots \[m\].
     fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
         let (pair, distance_m) = nearest_slots(formation, self.delta_m, self.metric);
         (pair, distance_m.min(self.rest_at_most_m))
     }
 }
 
-/// The two slots that are nearest to each other, and how near \[m\]; a vehicle alone keeps any distance.
+/// Returns the nearest pair of slots and its distance \[m\]; an arbitrary distance above delta for a single vehicle.
 fn nearest_slots(formation: &Formation, delta_m: f64, metric: Metric) -> (Pair, f64) {
     let slots = Formation::points(metric.scaled_rows(&formation.slots_m));
     slots.min_distance().unwrap_or((Pair::new(0, 1), 2.0 * delta_m + 1.0))
@@ -291,9 +302,10 @@ fn tension_between(
 }
 
 impl DisplacementLaw {
-    /// With mu, the largest eigenvalue of the graph's Laplacian: a near pair adds 2 `V_R''` at `nearest_m` to omega^2 and the
-    /// links sigma k mu. Damping is followed while sigma c mu dt is at most 0.5, which `max_rate_dt` = 0.3 keeps. In a crowd
-    /// several near pairs may add up to 3.6 times as much to omega^2, which the step still follows.
+    /// With mu the largest eigenvalue of the graph's Laplacian, a near pair adds 2 `V_R''` at `nearest_m` to omega^2
+    /// and the links add sigma k mu. The integrator follows damping while sigma c mu dt <= 0.5; `max_rate_dt` = 0.3
+    /// keeps this. In a crowd several near pairs may add up to 3.6 times this amount to omega^2, and the step still
+    /// follows.
     fn fastest_per_s(&self, nearest_m: f64) -> f64 {
         const DAMPED: f64 = 0.3 / 0.5;
         let contact = if nearest_m < self.tension.rest_m() {
@@ -306,8 +318,8 @@ impl DisplacementLaw {
         omega.max(DAMPED * links * self.damping_per_s())
     }
 
-    /// A mode of the graph with the eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1
-    /// or, towards k/c, for m without bound.
+    /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1 or
+    /// in the limit of large m, where it tends to k/c.
     fn settling(&self) -> Settling {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let half = 0.5 * (c - self.a22_per_s);
@@ -325,14 +337,14 @@ impl Law for DisplacementLaw {
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let count = self.pulls.graph.count();
         check_tables(count, at, command)?;
-        // No shared state that is not finite has a finite command: who is to blame is looked for where there is none.
+        // A shared state that is not finite never gives a finite command, so the state is checked only after an error.
         self.try_command(at, command).map_err(|fault| check_state(count, at.own).err().unwrap_or(fault))
     }
 
     fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
         if target.revision != self.revision {
             check_count(self.pulls.graph.count(), target.formation.count())?;
-            // Slots that are spread are farther apart than the leg's own.
+            // Spread slots are farther apart than the leg's own, so R stays.
             if target.spread <= 1.0 {
                 let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_for(target.formation));
                 self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
@@ -348,7 +360,7 @@ impl Law for DisplacementLaw {
         self.try_energy(at).ok()
     }
 
-    /// In contact on the complete graph without a reference.
+    /// The contact mode is given for the complete graph without a reference.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let lead = Mode { stiffness_per_s2: k, damping_per_s: c };
@@ -360,13 +372,13 @@ impl Law for DisplacementLaw {
     }
 
     fn capabilities(&self) -> Capabilities {
-        let sees: &[&str] = if self.clearance.is_some() {
-            &["all share a compass", "each sees who is nearer than slots are, and obstacles as near"]
+        let needs: &[&str] = if self.clearance.is_some() {
+            &["a common compass", "each vehicle senses vehicles and obstacles nearer than the slot distance"]
         } else {
-            &["all share a compass", "each sees who is nearer than slots are"]
+            &["a common compass", "each vehicle senses vehicles nearer than the slot distance"]
         };
         Capabilities {
-            needs: sees,
+            needs,
             controls: if self.is_guided() { Controls::Places } else { Controls::Displacements },
             barrier_m: Some(self.delta_m),
             sensing_range_m: Some(self.metric.longest_m(self.tension.rest_m())),
@@ -401,7 +413,7 @@ impl Law for DisplacementLaw {
 }
 
 impl DisplacementLaw {
-    /// Returns the certificate from a state on, through these formations.
+    /// Returns the certificate from a state through these formations.
     fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         let energy = match self.try_energy(start) {
             Ok(energy) => energy,
@@ -426,7 +438,7 @@ impl DisplacementLaw {
         self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
     }
 
-    /// What holds from a state of this energy on, and from each time that the slots become those of the next formation.
+    /// Returns the bounds from a state of this energy, and from each change to the next formation.
     fn bounds(&self, energy: f64, now: &Formation, ahead: &[&Formation]) -> Vec<LegBound> {
         let bound = |energy: f64| LegBound {
             energy,
@@ -442,7 +454,7 @@ impl DisplacementLaw {
         bounds
     }
 
-    /// By how much sqrt E may grow where slots become those of the next formation \[m/s\].
+    /// Returns the largest growth of sqrt E at each change of slots \[m/s\].
     fn steps<'a>(&'a self, now: &'a Formation, ahead: &'a [&Formation]) -> impl Iterator<Item = f64> + 'a {
         std::iter::once(now)
             .chain(ahead.iter().copied())
@@ -450,8 +462,8 @@ impl DisplacementLaw {
             .map(|(before, next)| self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
     }
 
-    /// The most that an energy becomes under the wind before the slots change: whatever it adds later it adds to more, and that
-    /// is less. The promise ends where it could no longer be told from delta.
+    /// Returns the largest energy under wind before the first change of slots. This bounds later wind too: it adds less
+    /// to sqrt E at larger E. The certificate ends where its separation is within the position resolution of delta.
     fn bounded(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
         let Some(energy_bound) = &self.energy_bound else { return BoundedEnergy { energy, until_s: None } };
         let borne = self.tension.value(self.delta_m + energy_bound.resolution_m()).sqrt();
@@ -460,8 +472,12 @@ impl DisplacementLaw {
     }
 }
 
-/// Why nothing is certified from any start: followers are not told how their reference moves, a swarm is carried past obstacles
-/// that stand, its absolute velocity, which counts among them, is fed, or what the wind does has no bound.
+/// Returns the reasons that void the certificate from any start:
+///
+/// - the motion of the reference is not fed forward,
+/// - the reference moves among fixed obstacles,
+/// - a22 > 0 among obstacles, where absolute velocities count,
+/// - the wind's contribution has no bound, or the wind moves a leader.
 fn voids(context: &LawContext<'_>) -> Vec<Void> {
     let &LawContext { guidance, obstacles, a22_per_s, exposure, .. } = context;
     let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
@@ -482,18 +498,18 @@ fn voids(context: &LawContext<'_>) -> Vec<Void> {
     reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
 }
 
-/// Whether a vehicle on the reference stays on it by itself.
+/// Whether a vehicle stays on the reference without feed-forward.
 fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
     motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
 }
 
-/// What the law's velocities are counted from: the mean where nobody knows a reference and nothing stands in the way.
+/// Returns the frame of the law's velocities: the mean if there is no reference and no obstacle, else the ground.
 fn frame(context: &LawContext<'_>) -> Frame {
     if context.guidance.is_none() && context.obstacles.is_empty() { Frame::Mean } else { Frame::Ground }
 }
 
-/// What the wind may add to the energy, of which relative velocities lose `margin_per_s` \[1/s\]. Among obstacles, without a
-/// reference, absolute ones count, which nothing brakes but the air.
+/// Returns the bound on the energy under wind, where relative velocities are damped at `margin_per_s` \[1/s\]. Among
+/// obstacles without a reference absolute velocities count, and only drag (a22 < 0) damps them.
 fn energy_bound(context: &LawContext<'_>, margin_per_s: f64) -> Option<EnergyBound> {
     let exposure = context.exposure?;
     let damping_per_s = match (context.guidance, frame(context)) {

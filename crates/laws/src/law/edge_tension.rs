@@ -1,5 +1,4 @@
-//! The edge-tension law (8): vehicles joined by an edge are pulled to their desired distance and never let closer than
-//! delta.
+//! The edge-tension law (8): edges pull vehicles to their desired distance, with a barrier at delta.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -33,7 +32,7 @@ pub struct EdgeTensionKeys {
     pub alpha: f64,
 }
 
-/// Rate at which the law damps relative velocities on the complete graph, whatever a22 is \[1/s\].
+/// Damping rate of relative velocities on the complete graph, independent of a22 \[1/s\].
 const DAMPING_PER_S: f64 = 1.0;
 
 fn one() -> f64 {
@@ -52,20 +51,20 @@ impl Default for EdgeTensionKeys {
 /// u_i = -(1/N) sum_{j in N_i} [ (1 + a22)(v_i - v_j) + w_ij (p_i - p_j) ],    w_ij = V'_ij(l_ij)/l_ij
 /// ```
 ///
-/// The desired distance of an edge is that of the formation's slots. The sum of all `u_i` is zero: the law cannot move
-/// the centre of mass.
+/// The desired distance of an edge is the distance of its two slots. The sum of all `u_i` is zero, so the law cannot
+/// move the centre of mass.
 ///
 /// # Energy
 /// ```text
 /// E = 1/2 sum |v_i - mean v|^2 + (1/N) sum over edges of V_ij(l_ij)
-/// dE/dt = -sum |v_i - mean v|^2                                        complete graph, whatever a22 is
+/// dE/dt = -sum |v_i - mean v|^2                                        complete graph, for every a22
 /// dE/dt <= -[(1 + a22) lambda2/N - a22] sum |v_i - mean v|^2           graph of algebraic connectivity lambda2
 /// ```
 ///
 /// [`Law::certificate`] rests on the second line.
 ///
 /// # Cost
-/// O(edges) time a step without allocation, and 8 bytes of memory an edge (24 where the graph is not complete).
+/// O(edges) time per step without allocation; 8 bytes of memory per edge (24 on an incomplete graph).
 #[derive(Clone, Debug)]
 pub struct EdgeTensionLaw {
     graph: Graph,
@@ -74,23 +73,23 @@ pub struct EdgeTensionLaw {
     delta_m: f64,
     a22_per_s: f64,
     kernel: Kernel,
-    /// The tension of the edge with the smallest desired distance.
+    /// Tension of the edge with the smallest desired distance.
     tightest: Option<EdgeTension>,
-    /// That of the target whose distances are desired.
+    /// Revision of the target that set the desired distances.
     revision: u64,
-    /// What the wind may add to the energy, where it blows, and whether that has no bound.
+    /// Bound on the energy under wind, if there is wind; `is_unbounded` if the wind has no such bound.
     energy_bound: Option<EnergyBound>,
     is_unbounded: bool,
-    /// (1/alpha) sum of V over the edges.
+    /// (1/alpha) times the sum of V over the edges.
     cache: PotentialCache,
 }
 
 impl EdgeTensionLaw {
-    /// The law for the links and the distances of the formation.
+    /// Builds the law for the links and slot distances of the context.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where an edge has no
-    /// tension (see [`EdgeTension::new`]), where a22 is not finite, or where the edges do not fit in memory.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, an edge has no tension (see
+    /// [`EdgeTension::new`]), a22 is not finite, or the edges do not fit in memory.
     #[expect(clippy::needless_pass_by_value, reason = "every law takes its keys by value")]
     pub fn new(context: &LawContext<'_>, keys: EdgeTensionKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, exposure, .. } = context;
@@ -114,7 +113,7 @@ impl EdgeTensionLaw {
         Ok(law)
     }
 
-    /// Takes the tension of each edge from the formation; the first edge that has none is the error.
+    /// Sets the tension of each edge from the formation. Returns the first edge without a tension as the error.
     fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
         let Self { alpha, delta_m, .. } = *self;
         self.tightest = None;
@@ -130,7 +129,7 @@ impl EdgeTensionLaw {
         Ok(())
     }
 
-    /// Adds `w_ij (p_i - p_j) / alpha` over what each vehicle heard of its neighbours.
+    /// Adds `w_ij (p_i - p_j) / alpha` for the received states of all neighbours.
     fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let Self { alpha, delta_m, .. } = *self;
         add_heard(at, command, |i, own, j, heard| {
@@ -145,10 +144,10 @@ impl EdgeTensionLaw {
         })
     }
 
-    /// The same control from the weighted Laplacian, equation (9): `U = -(1/N) [L_w(P) P + (1 + a22) L_G V]` with
-    /// `w_ij = V'_ij(l_ij)/l_ij`, N x 3 \[m/s^2\].
+    /// Returns the same control from the weighted Laplacian, equation (9), N x 3 \[m/s^2\]:
+    /// `U = -(1/N) [L_w(P) P + (1 + a22) L_G V]` with `w_ij = V'_ij(l_ij)/l_ij`.
     ///
-    /// Equal to [`Law::command`] to rounding, and there to check it: it takes O(N^2) memory and O(N^3) time.
+    /// Equals [`Law::command`] to rounding and serves to check it. Takes O(N^2) memory and O(N^3) time.
     ///
     /// # Errors
     /// As [`Law::command`].
@@ -169,7 +168,8 @@ impl EdgeTensionLaw {
         check_range(&control).map(|()| control)
     }
 
-    /// The kernel found a distance that is not in (delta, infinity): names the first edge that is too short.
+    /// Returns the error of a state in which the kernel found a distance outside (delta, infinity): the first edge that
+    /// is too short.
     fn fault(&self, swarm: &Swarm) -> LawError {
         let delta_m = self.delta_m;
         self.graph
@@ -216,7 +216,7 @@ impl Law for EdgeTensionLaw {
         check_range(command)
     }
 
-    /// Takes the tension of each edge from the new slots: O(edges), and nothing where they have not changed.
+    /// Sets the tension of each edge from the new slots in O(edges); does nothing if the slots are unchanged.
     fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
         if target.revision == self.revision {
             return Ok(());
@@ -233,7 +233,7 @@ impl Law for EdgeTensionLaw {
         }
         self.formation.slots_m.copy_from(&target.formation.slots_m);
         self.revision = target.revision;
-        // Every edge has a tension, as was just seen.
+        // The loop above has verified that every edge has a tension.
         let _ = self.set_rest_lengths();
         Ok(())
     }
@@ -242,10 +242,11 @@ impl Law for EdgeTensionLaw {
         self.try_energy(at.own).ok()
     }
 
-    /// On the complete graph relative velocities are all damped by 1 + a22, and the stiffnesses are the eigenvalues of 1/N times
-    /// the sum over edges of V'' in their directions: V' is 0 at the desired distance. 0 for rotations.
+    /// Complete graph only. All relative velocities are damped at 1 + a22. The stiffnesses are the eigenvalues of 1/N
+    /// times the sum over edges of V'' along the edge, because V' = 0 at the desired distance. They are 0 for
+    /// rotations.
     fn linear(&self, formation: &Formation) -> Option<Linear> {
-        /// Most vehicles for whom they are computed, in O(N^3).
+        /// Largest number of vehicles for the O(N^3) eigenvalue computation.
         const MOST: usize = 130;
         let (count, &Self { alpha, delta_m, a22_per_s, .. }) = (self.graph.count(), self);
         if !self.graph.is_complete() || !(2..=MOST).contains(&count) {
@@ -262,21 +263,21 @@ impl Law for EdgeTensionLaw {
                 part += block * sign;
             }
         }
-        // Rounding of eigenvalues that are 0.
+        // Rounding may make zero eigenvalues slightly negative.
         let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
         let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
         Some(Linear { free: stiffnesses.iter().map(mode).collect(), stiffest_contact_mode: None, heard: None })
     }
 
-    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair, for ever. In s = (l - delta)/K all tensions are
-    /// the same function, so the pair that may come closest is the one with the smallest K, and one root
-    /// ([`EdgeTension::push_side_root`]) answers for all pairs.
+    /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair and all time. As functions of s = (l - delta)/K
+    /// all tensions are the same, so the pair with the smallest K has the smallest bound. One root
+    /// ([`EdgeTension::push_side_root`]) therefore bounds all pairs.
     ///
-    /// Accelerations w from outside, as a wind makes them, add at most the integral of the sum of
-    /// `|w_i - mean w|^2`/4 to E: what all feel alike changes nothing.
+    /// External accelerations w, such as wind, add at most the time integral of the sum of `|w_i - mean w|^2`/4 to E.
+    /// An acceleration that is common to all vehicles adds nothing.
     ///
-    /// The promise is that of the proof: exact state, no delay, no saturation, no other disturbance, continuous time.
-    /// Without pairs there is nothing to promise, and nothing void either.
+    /// Assumptions: exact state, no delay, no saturation, no disturbance other than wind, continuous time. Without
+    /// pairs there is no bound, and the certificate is not void.
     fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         let energy = self.try_energy(start.own);
         let mut void = Vec::new();
@@ -292,7 +293,7 @@ impl Law for EdgeTensionLaw {
         let energy_initial = energy.ok();
         let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());
         let count = start.own.count() as f64;
-        // On the complete graph every pair is linked.
+        // Only an incomplete graph needs the separate bound for linked pairs.
         let links_alone = energy_initial.zip(self.tightest).filter(|_| !self.graph.is_complete());
         let bounded = promised.map(|(energy, tightest)| match &self.energy_bound {
             None => BoundedEnergy { energy, until_s: None },
@@ -318,20 +319,23 @@ impl Law for EdgeTensionLaw {
             controls: Controls::Distances,
             barrier_m: Some(self.delta_m),
             certifies_under_wind: true,
-            assumptions: "The certified distance holds for the complete graph, exact states of all vehicles, no delay, no limit on \
-                          the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows by \
-                          no more than that wind can add, so no pair's tension exceeds N times all of it.",
+            assumptions: "The certified separation holds for the complete graph, exact states of all vehicles, no \
+                          delay, no limit on the control and continuous time. The wind of the scenario is the only \
+                          disturbance: it adds a bounded energy, so no pair's tension exceeds N times the sum.",
             ..Capabilities::default()
         }
     }
 
-    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in the
-    /// relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest V''
-    /// that any pair can meet: V'' falls with l, so on the pushing side V''max is that at `nearest_m` of the pair with
-    /// the smallest K (all tensions are one function of s), and on the pulling side V'/l stays below
-    /// alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d). Hence the Hessian of the whole is at most (V''max/N) `L_G`, whose
-    /// largest eigenvalue is at most V''max: omega^2 <= V''max. On the complete graph relative velocities decay at the
-    /// rate 1/s, so the fastest rate is max(omega, 1/s).
+    /// The law's forces are -(1/N) times the gradient of the sum of `V_ij` over the pairs. The Hessian of one `V_ij` in
+    /// the relative position is V'' along the line of the pair and V'/l across it. Both are at most V''max, the largest
+    /// V'' of any pair within the query:
+    ///
+    /// - On the pushing side V'' falls with l, and all tensions are one function of s. V''max is therefore V'' at
+    ///   `nearest_m` for the pair with the smallest K.
+    /// - On the pulling side V'/l stays below alpha/(K l) < 2 sqrt(2) alpha/K^2 = V''(d).
+    ///
+    /// Hence the whole Hessian is at most (V''max/N) `L_G`, whose largest eigenvalue is at most V''max, so omega^2 <=
+    /// V''max. On the complete graph relative velocities decay at 1/s. The fastest rate is max(omega, 1/s).
     fn rates(&self, at: &RateQuery) -> Rates {
         let fastest = |(of, nearest_m): (EdgeTension, f64)| of.second_derivative(nearest_m).sqrt().max(1.0);
         let gain_per_s = 1.0 + self.a22_per_s;

@@ -1,4 +1,4 @@
-//! Energies of laws: a cache of their potential part, and a bound under wind.
+//! Energies of laws: a cache of their potential part, and an upper bound under wind.
 
 use nalgebra::Vector3;
 
@@ -6,30 +6,30 @@ use super::interface::WindExposure;
 use crate::wind::Gust;
 use tautline_core::swarm::Rows;
 
-/// Parts of a slope of a gust, over each of which its strength is taken for its largest.
+/// Number of parts of a rising or falling gust. In each part the bound uses the largest strength.
 const PARTS: u32 = 1024;
 
-/// What the disturbance of an energy is counted from.
+/// Frame in which velocities and disturbances are measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Frame {
-    /// The mean of all: what pushes all alike pushes nobody.
+    /// Mean of all vehicles: a disturbance common to all vehicles vanishes.
     Mean,
     /// The ground.
     Ground,
 }
 
-/// An upper bound on an energy `E >= 1/2 sum |v~_i|^2` whose law keeps `dE/dt <= -zeta sum |v~_i|^2` where nothing disturbs, under
-/// accelerations w. With |w|^2 the sum of `|w_i|^2` both
+/// Upper bound on an energy E under external accelerations w. The energy satisfies `E >= 1/2 sum |v~_i|^2`, and its law
+/// keeps `dE/dt <= -zeta sum |v~_i|^2` without disturbance. With |w|^2 = sum of `|w_i|^2`, both
 ///
 /// ```text
-/// dE/dt <= -zeta |v~|^2 + |v~| |w| <= |w|^2/(4 zeta)          reached by w = 2 zeta v~, as near as E's own decay is
+/// dE/dt <= -zeta |v~|^2 + |v~| |w| <= |w|^2/(4 zeta)          equality for w = 2 zeta v~
 /// d sqrt E/dt <= |w|/sqrt 2                                   since |v~| <= sqrt(2 E)
 /// ```
 ///
-/// hold, the first the better one for long winds and the second for short gusts. Over each span of time the less is taken.
+/// hold. The first is better for long winds, the second for short gusts. Each span of time uses the smaller one.
 #[derive(Clone, Debug)]
 pub(super) struct EnergyBound {
-    /// zeta \[1/s\]; where it is not positive, only the second bound is there.
+    /// zeta \[1/s\]; if it is not positive, only the second bound applies.
     damping_per_s: f64,
     spans: Vec<Span>,
     resolution_m: f64,
@@ -39,21 +39,21 @@ pub(super) struct EnergyBound {
 struct Span {
     from_s: f64,
     to_s: f64,
-    /// The largest |w| in it \[m/s^2\].
+    /// Upper bound of |w| in the span \[m/s^2\].
     most_m_s2: f64,
 }
 
-/// What is left of a promise.
+/// Bound on an energy and the time up to which it holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BoundedEnergy {
-    /// The energy does not exceed this \[m^2/s^2\].
+    /// Upper bound of the energy \[m^2/s^2\].
     pub(super) energy: f64,
-    /// Up to then \[s\]; for ever where there is no such time.
+    /// End of validity \[s\]; `None` if the bound holds for all time.
     pub(super) until_s: Option<f64>,
 }
 
 impl EnergyBound {
-    /// Of a wind without turbulence that is felt, over the flight.
+    /// Builds the bound for a wind without turbulence from time 0 to the end of the run.
     pub(super) fn new(exposure: &WindExposure<'_>, count: usize, frame: Frame, damping_per_s: f64) -> Self {
         let groups = groups(exposure, count);
         let corners_s = corners_s(exposure);
@@ -75,12 +75,12 @@ impl EnergyBound {
         Self { damping_per_s, spans, resolution_m: exposure.resolution_m }
     }
 
-    /// Distances above delta that are not told from it \[m\].
+    /// Returns the resolution of separations above delta \[m\].
     pub(super) fn resolution_m(&self) -> f64 {
         self.resolution_m
     }
 
-    /// The bound on an energy from a time on \[s\], until it passes `most` or the flight ends.
+    /// Returns the bound on an energy from a time on \[s\]. The bound ends when it passes `most`, or with the run.
     pub(super) fn of(&self, energy: f64, from_s: f64, most: f64) -> BoundedEnergy {
         if energy >= most {
             return BoundedEnergy { energy, until_s: Some(from_s) };
@@ -105,7 +105,7 @@ impl EnergyBound {
     }
 }
 
-/// Which gusts meet how many vehicles.
+/// Groups the vehicles by the set of gusts that meet them; returns each set with its number of vehicles.
 fn groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
     let mut groups: Vec<(Vec<bool>, usize)> = Vec::new();
     for vehicle in 0..count {
@@ -118,7 +118,8 @@ fn groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> 
     groups
 }
 
-/// The beginning, the end, and what gusts do in between, in order \[s\].
+/// Returns the sorted times at which a gust begins, reaches full strength, falls or ends, with the ends of the run
+/// \[s\].
 fn corners_s(exposure: &WindExposure<'_>) -> Vec<f64> {
     let of_gusts = exposure.wind.gusts.iter().flat_map(Gust::corners_s);
     let inside = of_gusts.filter(|&corner_s| corner_s > 0.0 && corner_s < exposure.until_s);
@@ -128,8 +129,8 @@ fn corners_s(exposure: &WindExposure<'_>) -> Vec<f64> {
     corners_s
 }
 
-/// No larger |w| in a span in which each gust grows or falls all along: that of the middle of its shares, and as much as half
-/// of their changes come to.
+/// Returns an upper bound of |w| in a span in which each gust rises or falls monotonically: |w| at the mean strengths
+/// plus half of the changes of all gusts.
 fn most_m_s2(
     exposure: &WindExposure<'_>,
     groups: &[(Vec<bool>, usize)],
@@ -158,8 +159,8 @@ fn most_m_s2(
     exposure.drag_per_s * (middle + changes.sum::<f64>())
 }
 
-/// The potential part of an energy at the positions that a law was asked about last: found while it made its command, and
-/// wanted again for the energy of the same instant.
+/// Potential part of an energy at the last positions. The command computes it, and the energy of the same instant
+/// reuses it.
 #[derive(Clone, Debug)]
 pub(super) struct PotentialCache {
     positions_m: Rows,
@@ -167,12 +168,12 @@ pub(super) struct PotentialCache {
 }
 
 impl PotentialCache {
-    /// Nothing is known yet about so many vehicles.
+    /// Returns an empty cache for `count` vehicles.
     pub(super) fn new(count: usize) -> Self {
         Self { positions_m: Rows::zeros(count), potential: None }
     }
 
-    /// Keeps the potential of these positions, as many as [`PotentialCache::new`] was told.
+    /// Stores the potential of these positions, which must have the `count` rows of [`PotentialCache::new`].
     pub(super) fn keep(&mut self, positions_m: &Rows, potential: f64) {
         self.positions_m.as_mut_slice().copy_from_slice(positions_m.as_slice());
         self.potential = Some(potential);
@@ -182,7 +183,7 @@ impl PotentialCache {
         self.potential = None;
     }
 
-    /// The potential of these very positions, where it is known.
+    /// Returns the potential if these are exactly the stored positions.
     pub(super) fn of(&self, positions_m: &Rows) -> Option<f64> {
         self.potential.filter(|_| self.positions_m.as_slice() == positions_m.as_slice())
     }

@@ -1,4 +1,4 @@
-//! Why a law has no answer, or does not exist.
+//! Errors of laws: undefined commands and invalid parameters.
 
 use crate::formation::Formation;
 use crate::graph::Graph;
@@ -7,16 +7,16 @@ use tautline_core::swarm::{Pair, Swarm, first_row_not_finite, row};
 
 use super::tension::TensionError;
 
-/// Distances that differ by no more than this part of them are the same.
+/// Relative difference below which two distances are equal.
 const ROUNDING: f64 = 1e-9;
 
-/// Why a law has no answer for a state.
+/// Reason why a law is undefined for a state.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LawError {
-    /// A law that is not one of ours failed, for a reason that whoever brought it knows.
+    /// A custom law failed; its caller knows the reason.
     #[error("it failed")]
     Failed,
-    /// A pair is at or inside the distance where its tension is infinite: a collision, not a number to clamp.
+    /// A pair is at or inside the distance where its tension is infinite. This is a collision; values are not clamped.
     #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
     Collision {
         /// The first such pair in index order.
@@ -37,30 +37,30 @@ pub enum LawError {
         vehicle: usize,
         /// The first such obstacle, from 0.
         obstacle: usize,
-        /// Distance from its surface \[m\].
+        /// Distance of the vehicle from the obstacle's surface \[m\].
         distance_m: f64,
-        /// What must be kept \[m\].
+        /// Clearance of the obstacle \[m\].
         clearance_m: f64,
     },
-    /// A pair is at or inside the distance where its tension is infinite by what the vehicles know, and not where they are.
+    /// A pair is at or inside the barrier distance by a sensed or received state, though not in truth.
     #[error(
-        "by what they measured or heard of each other, vehicles {pair} are {known_m} m apart, not more than the safety distance \
-         {delta_m} m; their true distance is {true_m} m"
+        "vehicles {pair} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
+         their true separation is {true_m} m"
     )]
     KnownCollision {
         /// The first such pair in index order.
         pair: Pair,
-        /// Its separation by what a vehicle of the pair knows \[m\].
+        /// Its separation by the states that a vehicle of the pair knows \[m\].
         known_m: f64,
         /// Its true separation \[m\].
         true_m: f64,
         /// The safety distance delta \[m\].
         delta_m: f64,
     },
-    /// A vehicle is at or inside the clearance of an obstacle by what it knows, and not where it is.
+    /// A vehicle is at or inside the clearance of an obstacle by its sensed position, though not in truth.
     #[error(
-        "by what it measured, vehicle {} is {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; its true \
-         distance is {true_m} m",
+        "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; \
+         its true distance is {true_m} m",
         vehicle + 1,
         obstacle + 1
     )]
@@ -69,11 +69,11 @@ pub enum LawError {
         vehicle: usize,
         /// The first such obstacle, from 0.
         obstacle: usize,
-        /// Distance from its surface by what the vehicle knows \[m\].
+        /// Distance from its surface by the sensed position \[m\].
         known_m: f64,
         /// True distance from its surface \[m\].
         true_m: f64,
-        /// What must be kept \[m\].
+        /// Clearance of the obstacle \[m\].
         clearance_m: f64,
     },
     /// A position or velocity is not a finite number.
@@ -85,23 +85,23 @@ pub enum LawError {
     /// The state is finite, but distances, velocities or accelerations computed from it are not.
     #[error("the state of the swarm is too large for double precision")]
     OutOfRange,
-    /// Two slots of a leg are too near for the pair's tension to exist.
+    /// The slots of a pair are so close that its tension does not exist.
     #[error("the slots of vehicles {pair} are {distance_m} m apart, not more than the safety distance {delta_m} m")]
     Target {
         /// The first such pair in index order.
         pair: Pair,
-        /// The distance of its slots \[m\].
+        /// Distance of its slots \[m\].
         distance_m: f64,
         /// The safety distance delta \[m\].
         delta_m: f64,
     },
-    /// What vehicles know of each other is of another swarm.
-    #[error("the law is for {count} vehicles and was given what others know of each other")]
+    /// The received and sensed states are of a swarm of another size.
+    #[error("the law is for {count} vehicles; the received and sensed states are of another count")]
     Pictures {
         /// Number of vehicles of the law.
         count: usize,
     },
-    /// The state or the table of accelerations is of another swarm.
+    /// The state or the table of accelerations is of a swarm of another size.
     #[error("the law is for {expected} vehicles and was given {found}")]
     WrongCount {
         /// Number of vehicles of the law.
@@ -112,7 +112,7 @@ pub enum LawError {
 }
 
 impl LawError {
-    /// Whether a pair, or a vehicle and an obstacle, came to the barrier of the law, in truth or by what vehicles know.
+    /// Whether a pair or a vehicle at an obstacle reached the barrier of the law, in truth or by sensed states.
     #[must_use]
     pub fn is_at_a_barrier(self) -> bool {
         matches!(
@@ -121,8 +121,8 @@ impl LawError {
         )
     }
 
-    /// The same reason with the true distance beside the one that vehicles know, where the two differ. Separations are lengths of
-    /// `metric`.
+    /// Adds the true distance to an error that is based on sensed or received states, if the two distances differ.
+    /// `metric` measures separations.
     #[must_use]
     pub fn against_truth(self, truth: &Swarm, metric: Metric, obstacles: &[Obstacle]) -> Self {
         let place = |vehicle: usize| row(&truth.positions_m, vehicle);
@@ -146,7 +146,7 @@ impl LawError {
     }
 }
 
-/// Why a law cannot be made from its parameters.
+/// Reason why a law cannot be built from its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ParameterError {
     /// An edge has no tension.
@@ -154,10 +154,10 @@ pub enum ParameterError {
     Tension {
         /// The first such edge in index order.
         pair: Pair,
-        /// What is wrong.
+        /// Reason why the tension does not exist.
         source: TensionError,
     },
-    /// A slot leaves a vehicle no room from an obstacle.
+    /// A slot is at or inside the clearance of an obstacle.
     #[error(
         "the slot of vehicle {} is {distance_m} m from obstacle {}, not more than the clearance {clearance_m} m",
         vehicle + 1,
@@ -170,10 +170,10 @@ pub enum ParameterError {
         obstacle: usize,
         /// Distance of the slot from its surface \[m\].
         distance_m: f64,
-        /// What must be kept \[m\].
+        /// Clearance of the obstacle \[m\].
         clearance_m: f64,
     },
-    /// Graph and formation are of different swarms.
+    /// Graph and formation differ in their numbers of vehicles.
     #[error("the graph has {graph} vehicles and the formation has {formation}")]
     Counts {
         /// Number of vehicles of the graph.
@@ -181,24 +181,24 @@ pub enum ParameterError {
         /// Number of slots of the formation.
         formation: usize,
     },
-    /// No path of links joins a vehicle to the first one.
+    /// The graph is not connected.
     #[error("the graph is not connected: no path joins vehicle {} to vehicle 1", vehicle + 1)]
     Disconnected {
-        /// The first such vehicle, from 0.
+        /// First vehicle without a path of links to vehicle 1, from 0.
         vehicle: usize,
     },
-    /// There is a reference, and no vehicle knows it.
+    /// The scenario has a reference, and no vehicle knows it.
     #[error("no vehicle knows the reference")]
-    NobodyKnowsTheReference,
-    /// The law has no links over which those who do not know the reference could learn of it.
+    ReferenceUnknown,
+    /// Some vehicles do not know the reference, and the law has no links over which they could follow it.
     #[error("the law has no links over which vehicles that do not know the reference could follow it")]
     ReferenceNotHeard,
     /// A gain is not a finite number.
     #[error("{name} is {value}; it must be a finite number")]
     NotFinite {
-        /// The gain, as in the equations.
+        /// Symbol of the gain in the equations.
         name: &'static str,
-        /// As given.
+        /// Value of the gain.
         value: f64,
     },
     /// A slot of the formation is not a finite number.

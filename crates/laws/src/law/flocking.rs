@@ -1,4 +1,4 @@
-//! Flocking: vehicles keep one distance from whoever is near, match velocities and follow a point.
+//! Flocking: near vehicles keep a common distance, match velocities and follow a point.
 
 use std::f64::consts::PI;
 
@@ -32,14 +32,14 @@ pub struct FlockingKeys {
     /// Gain c1 on distances to near vehicles in 1/s^2; velocities are matched with 2 sqrt(c1).
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c1_alpha_per_s2: f64,
-    /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a flock that
-    /// goes nowhere.
+    /// Gain c1 on the way to the centre of the slots in 1/s^2; its velocity is matched with 2 sqrt(c1). Zero for a
+    /// flock without an objective.
     #[schemars(extend("minimum" = 0))]
     pub c1_gamma_per_s2: f64,
-    /// Highest acceleration that is commanded in m/s^2.
+    /// Largest commanded acceleration in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
-    /// Distance d that near vehicles keep in m; the smallest distance of two slots unless given.
+    /// Distance d of near vehicles in m; by default the smallest slot distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub spacing_m: Option<f64>,
@@ -51,24 +51,27 @@ impl Default for FlockingKeys {
     }
 }
 
-/// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms and theory,
-/// 2006, algorithm 2), whose objective pulls with at most `c1_gamma` times a metre, as its algorithm 3 does:
+/// Flocking in free space with a group objective (Olfati-Saber: Flocking for multi-agent dynamic systems: algorithms
+/// and theory, 2006, algorithm 2). The pull of the objective is limited to `c1_gamma` times a metre, as in its
+/// algorithm 3:
 ///
 /// ```text
-/// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i) - c1g s(p_i - p_r) - c2g (v_i - v_r) + r'' - a22 v_i,   |u_i| <= a_max
+/// u_i = c1a sum_j phi_a(|q_ij|_s) n_ij + c2a sum_j a_ij (v_j - v_i)
+///       - c1g s(p_i - p_r) - c2g (v_i - v_r) + r'' - a22 v_i,   |u_i| <= a_max
 /// |z|_s = (sqrt(1 + eps |z|^2) - 1)/eps,   n_ij = q_ij/sqrt(1 + eps |q_ij|^2),   q_ij = p_j - p_i,   s(z) = z/sqrt(1 + |z|^2)
 /// phi_a(z) = rho(z/|r|_s) a s(z - |d|_s),   a_ij = rho(|q_ij|_s/|r|_s),   c2 = 2 sqrt(c1)
 /// ```
 ///
-/// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the centre of the
-/// slots, where the reference has carried it, and `v_r` is r'; the source does not feed r''. The formation is an alpha-lattice, in which all who are nearer than r are d apart: whoever gets wherever in it is not
-/// asked for, and given slots are not reached but by chance.
+/// with eps = 0.1, a = b = 5, h = 0.2 and r = 1.2 d. rho is 1 up to h and falls as a cosine to 0 at 1. `p_r` is the
+/// centre of the slots moved by the reference, and `v_r` is r'. The source does not feed r'' forward. The formation is
+/// an alpha-lattice: all pairs nearer than r are d apart. The law does not assign places, so it reaches given slots
+/// only by chance.
 ///
 /// # Guarantee
-/// None: the force between two vehicles is bounded, and so it stops only so much speed.
+/// None: the force between two vehicles is bounded, so a large enough speed overcomes it.
 ///
 /// # Cost
-/// O(near pairs) a step without allocation.
+/// O(near pairs) per step without allocation.
 #[derive(Clone, Debug)]
 pub struct FlockingLaw {
     keys: FlockingKeys,
@@ -77,16 +80,16 @@ pub struct FlockingLaw {
     a22_per_s: f64,
     /// d \[m\].
     spacing_m: f64,
-    /// That of the target that d is taken from.
+    /// Revision of the target that set d.
     revision: u64,
 }
 
 impl FlockingLaw {
-    /// The law of so many vehicles; links play no part.
+    /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
-    /// finite, or where there is a reference that some do not know.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: FlockingKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, a22_per_s, .. } = context;
         let gains = [
@@ -101,12 +104,12 @@ impl FlockingLaw {
         Ok(Self { keys, reference_use, count: links.count(), a22_per_s, spacing_m, revision: 0 })
     }
 
-    /// r \[m\].
+    /// Returns the range r \[m\].
     fn range_m(&self) -> f64 {
         REACH * self.spacing_m
     }
 
-    /// What vehicle i makes of one whom it sees at q with a relative velocity.
+    /// Returns the acceleration of a vehicle due to a neighbour at relative position q with a relative velocity.
     fn pull_m_s2(&self, towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> Vector3<f64> {
         let c1 = self.keys.c1_alpha_per_s2;
         let stretched = (1.0 + EPSILON * towards_m.norm_squared()).sqrt();
@@ -116,7 +119,7 @@ impl FlockingLaw {
         towards_m * (c1 * action / stretched) + relative_m_s * (2.0 * c1.sqrt() * nearness)
     }
 
-    /// What vehicle i makes of the point that the flock follows, and of its own motion.
+    /// Returns the acceleration of vehicle i towards the objective, with a22 compensated.
     fn objective_m_s2(&self, at: &Observation<'_>, centre_m: Vector3<f64>, i: usize) -> Vector3<f64> {
         let c1 = self.keys.c1_gamma_per_s2;
         let reference = &at.target.reference;
@@ -124,26 +127,26 @@ impl FlockingLaw {
         let own_m_s = row(&at.own.velocities_m_s, i);
         let off_m_s = own_m_s - reference.velocity_m_s;
         let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
-        self.reference_use.fed_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
+        self.reference_use.feed_forward_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
     }
 }
 
-/// d \[m\]; a vehicle alone keeps any distance.
+/// Returns d \[m\]; 1 m for a single vehicle.
 fn spacing_m(keys: &FlockingKeys, formation: &Formation) -> f64 {
     keys.spacing_m.or_else(|| formation.min_distance().map(|(_, distance_m)| distance_m)).unwrap_or(1.0)
 }
 
-/// `|z|_s` of a vector of this length.
+/// Returns `|z|_s` of a vector of this length.
 fn sigma_norm(length: f64) -> f64 {
     ((1.0 + EPSILON * length * length).sqrt() - 1.0) / EPSILON
 }
 
-/// s.
+/// Returns s(z).
 fn saturated(z: f64) -> f64 {
     z / (1.0 + z * z).sqrt()
 }
 
-/// rho.
+/// Returns rho(z).
 fn bump(z: f64) -> f64 {
     if z < BUMP {
         1.0
@@ -202,10 +205,10 @@ impl Law for FlockingLaw {
         }
     }
 
-    /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to the damping,
-    /// a vehicle has at most as many near ones as balls of that diameter fit around it, and the eigenvalues of a sum over pairs
-    /// are at most twice the sum at a vehicle. While velocities differ, what they are matched with changes with distance too.
-    /// The objective brakes the mean velocity, and a22 is made up for.
+    /// A near pair adds at most `c1a a ((1 + pi/(2 (1 - h) |r|_s)) r^2/(1 + eps r^2) + 1)` to the stiffness and c2a to
+    /// the damping. The number of near vehicles is at most the number of balls of diameter `nearest_m` that fit around
+    /// a vehicle. The eigenvalues of a sum over pairs are at most twice the sum at a vehicle. While velocities differ,
+    /// velocity matching also varies with distance. The objective damps the mean velocity, and a22 is compensated.
     fn rates(&self, at: &RateQuery) -> Rates {
         let (alpha, gamma) = (self.keys.c1_alpha_per_s2, self.keys.c1_gamma_per_s2);
         let fastest_per_s = |nearest_m: f64| {

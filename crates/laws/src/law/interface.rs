@@ -1,4 +1,4 @@
-//! What a law is, and what it is built from.
+//! The [`Law`] trait, its capabilities and rates, and the context from which laws are built.
 
 use dyn_clone::DynClone;
 use nalgebra::Vector3;
@@ -14,58 +14,60 @@ use crate::target::{Guidance, Leg, Reference, Settling, Target};
 use crate::wind::WindSpec;
 use tautline_core::swarm::Rows;
 
-/// A control law: a function from what the vehicles know to an acceleration for each.
+/// Control law: maps the states that the vehicles know to one acceleration per vehicle.
 ///
-/// A law of your own implements [`Law::name`] and [`Law::command`] and is flown like the built-in ones. The other methods have
-/// defaults: [`Law::capabilities`] states what the law senses and controls, [`Law::certificate`] and [`Law::energy`] what it
-/// proves, [`Law::rates`] and [`Law::linear`] how fast its closed loop is. Its memory, if it has any, is saved with a
-/// simulation, so it must be [`Clone`].
+/// A custom law implements [`Law::name`] and [`Law::command`] and runs like the built-in ones. The other methods have
+/// defaults. [`Law::capabilities`] states what the law senses and controls. [`Law::certificate`] and [`Law::energy`]
+/// give what is proved about it, [`Law::rates`] and [`Law::linear`] the rates of its closed loop. The internal state of
+/// a law is saved with a simulation, so it must be [`Clone`].
 pub trait Law: DynClone + Send {
     /// Short name for reports, such as `edge-tension`.
     fn name(&self) -> &str;
 
-    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on what vehicle i knows.
+    /// Writes the commanded accelerations u \[m/s^2\], N x 3, into `command`. Row i depends only on the states
+    /// that vehicle i knows.
     ///
     /// Called once a step; implementations keep their scratch memory so that nothing is allocated here.
     ///
     /// # Errors
-    /// [`LawError`] where the law is not defined, such as a pair at or inside the keep-out distance of a barrier.
+    /// [`LawError`] where the law is not defined, such as a pair at or inside the safety distance of a barrier.
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
 
-    /// Takes over a target whose slots have changed, before the next command.
+    /// Adopts a target whose slots have changed, before the next command.
     ///
     /// # Errors
-    /// [`LawError`] where the law is not defined for that target; it then goes on for the one before.
+    /// [`LawError`] where the law is not defined for that target; the law then keeps the previous one.
     fn follow(&mut self, _target: &Target<'_>) -> Result<(), LawError> {
         Ok(())
     }
 
-    /// Restarts the random numbers of the law.
+    /// Seeds the random numbers of the law anew.
     fn reseed(&mut self, _seed: u64) {}
 
-    /// What the law senses, limits, controls and assumes. May change with the target.
+    /// Returns the needs, limits, controlled quantities and assumptions of the law. May change with the target.
     fn capabilities(&self) -> Capabilities {
         Capabilities::default()
     }
 
-    /// The law's Lyapunov function E \[m^2/s^2\] where it has one.
+    /// Returns the law's Lyapunov function E \[m^2/s^2\], if it has one.
     fn energy(&self, _at: &Observation<'_>) -> Option<f64> {
         None
     }
 
-    /// Separation that the law guarantees from a start on. A law with [`Capabilities::certifies_target_changes`] accounts for
-    /// a target that then goes through the formations `ahead`, each taken up at once or along the straight lines between
-    /// slots, at any time. Any other law may ignore them: [`certificate_through`] voids its certificate.
+    /// Returns the separation that the law guarantees from a start. A law with
+    /// [`Capabilities::certifies_target_changes`] accounts for a target that goes through the formations `ahead` at any
+    /// times. Each change is immediate or moves slots along straight lines. Other laws may ignore `ahead`:
+    /// [`certificate_through`] voids their certificate.
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         Certificate::void(Void::NoBarrier)
     }
 
-    /// Bounds on the rates of the closed loop.
+    /// Returns bounds on the rates of the closed loop.
     fn rates(&self, at: &RateQuery) -> Rates {
         Rates::unknown(at)
     }
 
-    /// Linear motion about the slots of a formation, where it is known.
+    /// Returns the linearized motion about the slots of a formation, if it is known.
     fn linear(&self, _formation: &Formation) -> Option<Linear> {
         None
     }
@@ -73,47 +75,51 @@ pub trait Law: DynClone + Send {
 
 dyn_clone::clone_trait_object!(Law);
 
-/// The certificate of a law from a start on through the formations `ahead`, void where the law does not account for them.
+/// Returns the certificate of a law from a start through the formations `ahead`; void if the law does not certify
+/// target changes.
 #[must_use]
 pub fn certificate_through(law: &dyn Law, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
     let is_ignored = !ahead.is_empty() && !law.capabilities().certifies_target_changes;
     law.certificate(start, ahead).void_where(is_ignored, Void::TargetChanges)
 }
 
-/// What a law senses, limits, controls and assumes.
+/// Needs, limits, controlled quantities and assumptions of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a property of its own")]
+#[expect(clippy::struct_excessive_bools, reason = "the properties are independent")]
 pub struct Capabilities {
-    /// What a vehicle needs beside states over the links, in a few words each: a common compass, a sensor.
+    /// Needs of a vehicle besides states received over links, as short phrases: a common compass, a sensor.
     pub needs: &'static [&'static str],
-    /// What the law holds vehicles to.
+    /// Quantities that the law controls.
     pub controls: Controls,
-    /// Distance at which the law's barrier is infinite \[m\]. The loop refuses a step that takes more than half of the
-    /// clearance above it from a linked pair, or from any pair where the law has a sensing range.
+    /// Distance at which the law's barrier is infinite \[m\].
+    ///
+    /// The simulation refuses a step that removes more than half of a pair's clearance above this distance. It checks
+    /// all pairs if the law has a sensing range, and otherwise linked pairs.
     pub barrier_m: Option<f64>,
-    /// Distance from which on vehicles see each other \[m\]; `None` for a law that uses links alone.
+    /// Distance up to which vehicles sense each other \[m\]; `None` for a law that uses links alone.
     pub sensing_range_m: Option<f64>,
-    /// Largest acceleration that the law commands of a vehicle \[m/s^2\].
+    /// Largest acceleration that the law commands \[m/s^2\].
     pub max_command_m_s2: Option<f64>,
-    /// Whether the law measures distances between vehicles in the ellipsoid of its [`LawContext`].
+    /// Whether the law measures separations in the ellipsoid metric of its [`LawContext`].
     pub uses_ellipsoid_metric: bool,
-    /// Whether the certificate of the law accounts for wind. Any other certificate is void in wind.
+    /// Whether the certificate of the law accounts for wind; otherwise wind voids it.
     pub certifies_under_wind: bool,
-    /// Whether the certificate of the law accounts for formations ahead. Any other certificate is void where slots change.
+    /// Whether the certificate of the law accounts for formations ahead; otherwise a change of slots voids it.
     pub certifies_target_changes: bool,
-    /// Whether the law keeps vehicles clear of obstacles. Any other certificate is void among obstacles.
+    /// Whether the law keeps vehicles clear of obstacles; otherwise obstacles void its certificate.
     pub avoids_obstacles: bool,
-    /// Whether the law runs on the calling thread alone. The law of a large swarm runs beside the audit otherwise.
+    /// Whether the law must run on the calling thread. Otherwise the law of a large swarm runs in parallel with the
+    /// audit.
     pub requires_calling_thread: bool,
-    /// How errors of position settle where nothing stands in their way, for a law that can follow slots that are spread for
-    /// a while ([`crate::target::Breathing`]) and certifies anew then.
+    /// Settling of position errors of an undisturbed swarm. Set for a law that can follow slots that are spread for a
+    /// while ([`crate::target::Breathing`]) and certifies again then.
     pub settling: Option<Settling>,
-    /// The assumptions of the certified distance, a sentence.
+    /// Assumptions of the certified separation, as a sentence.
     pub assumptions: &'static str,
 }
 
 impl Default for Capabilities {
-    /// A law on links alone, without a barrier, that controls displacements.
+    /// A law that uses links alone, has no barrier and controls displacements.
     fn default() -> Self {
         Self {
             needs: &[],
@@ -127,29 +133,29 @@ impl Default for Capabilities {
             avoids_obstacles: false,
             requires_calling_thread: false,
             settling: None,
-            assumptions: "The certified distance holds for exact states of all vehicles that a vehicle hears and sees, no delay, no limit \
-                          on the control, no disturbance but the wind of the scenario and continuous time: the law's energy grows \
-                          by no more than that wind can add, and no pair can hold more than all of it.",
+            assumptions: "The certified separation holds for exact received and sensed states, no delay, no limit on \
+                          the control and continuous time. The wind of the scenario is the only disturbance: it adds \
+                          a bounded energy, and the tension of no pair exceeds the sum.",
         }
     }
 }
 
-/// The situation for which rates are bounded.
+/// Situation for which rates are bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RateQuery {
     /// Velocity coefficient of the vehicles \[1/s\].
     pub a22_per_s: f64,
-    /// No pair is nearer than this \[m\]; `None` where no bound is known.
+    /// Lower bound of every separation \[m\]; `None` if no bound is known.
     pub nearest_m: Option<f64>,
-    /// No vehicle has less than this from an obstacle beyond its clearance \[m\]; `None` without obstacles.
+    /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\]; `None` without obstacles.
     pub obstacle_room_m: Option<f64>,
     /// Algebraic connectivity of the graph.
     pub connectivity: f64,
 }
 
 impl RateQuery {
-    /// Vehicles with velocity coefficient a22 \[1/s\] that come no nearer to each other than `nearest_m`, without obstacles, on a
-    /// graph that is not connected.
+    /// Query for vehicles with velocity coefficient a22 \[1/s\] and separations of at least `nearest_m`, without
+    /// obstacles, on a disconnected graph (connectivity 0).
     #[must_use]
     pub fn new(a22_per_s: f64, nearest_m: Option<f64>) -> Self {
         Self { a22_per_s, nearest_m, obstacle_room_m: None, connectivity: 0.0 }
@@ -159,39 +165,39 @@ impl RateQuery {
 /// Bounds on the rates of the closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// Upper bound on the rates \[1/s\] without obstacles. `None` where none is known, or where it depends on a distance that
-    /// is not given.
+    /// Upper bound on the rates \[1/s\] without obstacles. `None` if no bound is known, or if it depends on a distance
+    /// that the query lacks.
     pub fastest_per_s: Option<f64>,
-    /// What obstacles add to the square of the fastest rate \[1/s^2\].
+    /// Contribution of obstacles to the square of the fastest rate \[1/s^2\].
     pub obstacles_per_s2: f64,
-    /// How fast relative velocities are damped at least.
+    /// Lower bound of the damping rate of relative velocities.
     pub velocity_margin: Option<VelocityMargin>,
-    /// Rate at which the mean velocity of the swarm grows by itself \[1/s\]; negative where it decays.
+    /// Growth rate of the swarm's mean velocity \[1/s\]; negative where it decays.
     pub common_mode_per_s: f64,
 }
 
 impl Rates {
-    /// No bound; the mean velocity of the swarm grows with a22.
+    /// Returns rates without bounds; the mean velocity of the swarm grows at rate a22.
     #[must_use]
     pub fn unknown(at: &RateQuery) -> Self {
         Self { fastest_per_s: None, obstacles_per_s2: 0.0, velocity_margin: None, common_mode_per_s: at.a22_per_s }
     }
 }
 
-/// What a law holds vehicles to.
+/// Quantities that a law controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Controls {
-    /// Distances alone: it pushes and pulls along the lines between vehicles, and a formation is reached up to rotation,
+    /// Distances alone: forces act along the lines between vehicles, and a formation is reached up to rotation,
     /// reflection and translation.
     Distances,
-    /// Differences of positions, in the directions of the common frame: a formation is reached up to translation.
+    /// Relative positions in a common frame: a formation is reached up to translation.
     Displacements,
-    /// Places: slots are reached where the reference has carried them.
+    /// Absolute positions: slots are reached where the reference has moved them.
     Places,
 }
 
 impl Controls {
-    /// What a formation may be moved by and count as reached.
+    /// Returns the motions by which a reached formation may differ from its slots.
     #[must_use]
     pub fn freedom(self) -> Freedom {
         match self {
@@ -202,56 +208,55 @@ impl Controls {
     }
 }
 
-/// How fast relative velocities are damped: at least at this rate where it is positive, and perhaps growing where it is
-/// negative.
+/// Lower bound of the damping rate of relative velocities. Where it is negative, relative velocities may grow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityMargin {
-    /// The margin \[1/s\].
+    /// Margin \[1/s\].
     pub per_s: f64,
-    /// The size of the terms that it is the difference of \[1/s\]: a margin of a 1e-12th of that is rounding.
+    /// Magnitude of the terms whose difference the margin is \[1/s\]: a margin below 1e-12 of it is rounding error.
     pub terms_per_s: f64,
-    /// What to do where it is not positive, a sentence.
+    /// Remedy for a margin that is not positive, as a sentence.
     pub remedy: &'static str,
 }
 
-/// What a law is built from beside its own keys.
+/// Input from which a law is built, besides its own keys.
 #[derive(Clone, Copy, Debug)]
 pub struct LawContext<'a> {
-    /// Who talks to whom.
+    /// Communication links.
     pub links: &'a Graph,
-    /// The formation of the first leg.
+    /// Formation of the first leg.
     pub formation: &'a Formation,
-    /// The legs after it.
+    /// Legs after the first.
     pub later: &'a [Leg],
-    /// The motion that formations are carried along with, and which vehicles know it.
+    /// Reference motion of the formations and the vehicles that know it.
     pub guidance: Option<&'a Guidance>,
-    /// What stands in the way.
+    /// Obstacles in the world.
     pub obstacles: &'a [Obstacle],
     /// Safety distance delta \[m\].
     pub delta_m: f64,
     /// Velocity coefficient a22 of the vehicles \[1/s\], drag of the air included.
     pub a22_per_s: f64,
-    /// The lengths that delta is one of, and that vehicles are kept apart in.
+    /// Metric of delta and of all separations.
     pub metric: Metric,
-    /// What pushes them beside their commands, where anything does.
+    /// Wind on the vehicles, if there is any.
     pub exposure: Option<WindExposure<'a>>,
 }
 
-/// A wind, and how it is felt.
+/// Wind and its effect on the vehicles.
 #[derive(Clone, Copy, Debug)]
 pub struct WindExposure<'a> {
-    /// What blows.
+    /// Wind of the scenario.
     pub wind: &'a WindSpec,
-    /// Acceleration of a vehicle over the velocity of the air past it \[1/s\].
+    /// Drag coefficient \[1/s\]: acceleration of a vehicle per velocity of the air relative to it.
     pub drag_per_s: f64,
-    /// End of the flight \[s\].
+    /// End of the run \[s\].
     pub until_s: f64,
-    /// A distance that exceeds delta by no more than this is not told from it \[m\].
+    /// Resolution of positions \[m\]: a separation within this of delta cannot be distinguished from delta.
     pub resolution_m: f64,
 }
 
 impl<'a> LawContext<'a> {
-    /// One formation, wherever it comes to be.
+    /// Context with one formation and no reference, obstacles or wind.
     #[must_use]
     pub fn new(links: &'a Graph, formation: &'a Formation, delta_m: f64, a22_per_s: f64) -> Self {
         Self {
@@ -267,46 +272,46 @@ impl<'a> LawContext<'a> {
         }
     }
 
-    /// Who knows the reference.
+    /// Returns the vehicles that know the reference.
     pub(super) fn pinning(&self) -> Pinning {
         self.guidance.map_or(Pinning::Nobody, |guidance| guidance.known_by.clone())
     }
 }
 
-/// What vehicles know of a reference.
+/// Use of the reference by a law whose vehicles must all know it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReferenceUse {
-    /// Whether there is one.
+    /// Whether the scenario has a reference.
     is_guided: bool,
-    /// Whether they are told how it accelerates.
-    is_fed: bool,
+    /// Whether the vehicles know the acceleration of the reference.
+    has_feed_forward: bool,
 }
 
 impl ReferenceUse {
-    /// Of a scenario.
+    /// Reads the reference of the context.
     ///
     /// # Errors
-    /// [`ParameterError::ReferenceNotHeard`] where some do not know the reference.
+    /// [`ParameterError::ReferenceNotHeard`] if some vehicle does not know the reference.
     pub(super) fn new(context: &LawContext<'_>) -> Result<Self, ParameterError> {
-        let Some(guidance) = context.guidance else { return Ok(Self { is_guided: false, is_fed: false }) };
+        let Some(guidance) = context.guidance else { return Ok(Self { is_guided: false, has_feed_forward: false }) };
         match guidance.known_by {
-            Pinning::All => Ok(Self { is_guided: true, is_fed: guidance.feed_forward }),
+            Pinning::All => Ok(Self { is_guided: true, has_feed_forward: guidance.feed_forward }),
             Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => Err(ParameterError::ReferenceNotHeard),
         }
     }
 
-    /// r'' as far as it is told \[m/s^2\].
-    pub(super) fn fed_m_s2(self, reference: &Reference) -> Vector3<f64> {
-        if self.is_fed { reference.acceleration_m_s2 } else { Vector3::zeros() }
+    /// Returns the feed-forward acceleration r'' of the reference \[m/s^2\], or zero without feed-forward.
+    pub(super) fn feed_forward_m_s2(self, reference: &Reference) -> Vector3<f64> {
+        if self.has_feed_forward { reference.acceleration_m_s2 } else { Vector3::zeros() }
     }
 
-    /// What a law with such a reference controls and needs.
+    /// Returns the controls and needs of a law that uses the reference in this way.
     pub(super) fn capabilities(self) -> Capabilities {
-        const SEES: &str = "each sees who is near and how fast it moves";
+        const SENSING: &str = "each vehicle senses positions and velocities of near vehicles";
         let needs: &[&str] = if self.is_guided {
-            &["all share a compass, know where they are and know the reference", SEES]
+            &["a common compass, own position and the reference", SENSING]
         } else {
-            &["all share a compass and know where they are", SEES]
+            &["a common compass and own position", SENSING]
         };
         let controls = if self.is_guided { Controls::Places } else { Controls::Displacements };
         Capabilities { needs, controls, ..Capabilities::default() }

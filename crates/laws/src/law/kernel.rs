@@ -1,10 +1,10 @@
-//! The edge-tension sums over all edges, in blocks that fill the lanes of vector instructions.
+//! Edge-tension sums over all edges, in blocks that fill the lanes of vector instructions.
 //!
-//! The loops over edges hold nothing but IEEE additions, multiplications, divisions, square roots and selections, which
-//! the compiler turns into whatever vector instructions were found at run time. Nothing is fused or reordered, and sums
-//! are taken in an order fixed by the edges alone, so the bits depend neither on the width of the machine's vectors
-//! nor on the level of optimisation.
-#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
+//! The loops over edges contain only IEEE additions, multiplications, divisions, square roots and selections. The
+//! compiler turns them into the vector instructions detected at run time. No operation is fused or reordered, and the
+//! edges alone fix the order of sums. The bits therefore depend neither on the vector width nor on the optimisation
+//! level.
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for the instructions detected at run time")]
 
 mod block;
 
@@ -14,40 +14,40 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::iter::{IndexedParallelIterator as _, IntoParallelRefMutIterator as _, ParallelIterator as _};
 
-use self::block::{Block, Ends, LANES, NOWHERE_M, add_lanes, total};
+use self::block::{Block, Ends, LANES, PADDING_M, add_lanes, total};
 use super::tension::OutOfDomain;
 use crate::graph::Graph;
 use tautline_core::swarm::{Rows, columns, columns_mut};
 
-/// Up to this many vehicles even the complete graph is taken as a list, because short rows leave lanes empty. The order of sums
-/// differs, so this number is a part of what the bits of a flight rest on.
+/// Up to this number of vehicles the complete graph is stored as a list of edges, because short rows leave lanes empty.
+/// The order of sums differs, so this number affects the last bits of results.
 const LISTED_UP_TO: usize = 16;
-/// From this many vehicles on all threads at hand share the rows of the complete graph, in bands. Sums of bands differ from
-/// those of all rows in their last bits, so this number is a part of what the bits of a flight rest on.
+/// From this number of vehicles all threads share the rows of the complete graph, in bands. Sums in bands differ from
+/// sums in rows in their last bits, so this number affects the last bits of results.
 const BANDED_FROM: usize = 640;
-/// Number of bands, each with about as many edges as any other; so many threads have work.
+/// Number of bands, and the largest number of threads with work. All bands have about the same number of edges.
 const BANDS: usize = 16;
-/// Edges in a block of a row: so many that stages follow each other seldom, and so few that they stay near the processor.
+/// Edges per block of a row: large enough to change stages seldom, small enough for the processor's first-level cache.
 const ROW_BLOCK: usize = 8 * LANES;
-/// Edges in a block of a list: few, because lists are often short and a block is cleared for each.
+/// Edges per block of a list: small, because lists are often short and each block is cleared first.
 const LIST_BLOCK: usize = 2 * LANES;
 
-/// The edges of a graph with the length scale of each.
+/// Edges of a graph with the inverse length scale of each.
 #[derive(Clone, Debug)]
 pub(super) struct Kernel {
     delta_m: f64,
-    /// The number of edges.
+    /// Number of edges.
     edges: usize,
-    /// 1/K of each edge, in row order, and room for whole lanes.
+    /// 1/K of each edge in row order, padded to whole lanes.
     inverse_k_per_m: Vec<f64>,
-    /// The rows of the complete graph; none where edges are listed.
+    /// Rows of the complete graph; `None` if edges are listed.
     bands: Option<Bands>,
     list: Vec<[usize; 2]>,
     arch: pulp::Arch,
 }
 
 impl Kernel {
-    /// The edges of a graph, whose 1/K are still to be given. An error where they do not fit in memory.
+    /// Builds the kernel of a graph with 1/K still unset. Fails if the edges do not fit in memory.
     pub(super) fn new(graph: &Graph, delta_m: f64) -> Result<Self, TryReserveError> {
         let (count, edges) = (graph.count(), graph.edge_count());
         let mut inverse_k_per_m = Vec::new();
@@ -60,7 +60,7 @@ impl Kernel {
             delta_m,
             edges,
             inverse_k_per_m,
-            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, NOWHERE_M)),
+            bands: (!is_listed).then(|| Bands::new(count, bands, LANES, PADDING_M)),
             list: if is_listed { graph.edges().map(|(i, j)| [i, j]).collect() } else { Vec::new() },
             arch: pulp::Arch::new(),
         })
@@ -71,9 +71,9 @@ impl Kernel {
         &mut self.inverse_k_per_m[..self.edges]
     }
 
-    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\], and
-    /// returns (1/alpha) sum of V over all edges, which costs next to nothing here.
-    /// Both tables have a row for each vehicle of the graph.
+    /// Adds `(1/alpha) sum_j w_ij (p_i - p_j)` over the neighbours j of each vehicle i to row i of `sums` \[1/m\].
+    /// Returns (1/alpha) times the sum of V over all edges, which is almost free here. Both tables have one row per
+    /// vehicle.
     pub(super) fn add_pulls(&mut self, positions_m: &Rows, sums: &mut Rows) -> Result<f64, OutOfDomain> {
         let mut bands = self.bands.take();
         let potential = self.add_pulls_in(bands.as_mut(), positions_m, sums);
@@ -81,7 +81,7 @@ impl Kernel {
         potential
     }
 
-    /// (1/alpha) sum of V over all edges.
+    /// Returns (1/alpha) times the sum of V over all edges.
     pub(super) fn potential(&self, positions_m: &Rows) -> Result<f64, OutOfDomain> {
         self.add_pulls_in(self.bands.clone().as_mut(), positions_m, &mut Rows::zeros(positions_m.nrows()))
     }
@@ -97,14 +97,14 @@ impl Kernel {
     }
 }
 
-/// Adds the pulls of the edges from these rows of the complete graph to later ones.
+/// Adds the pulls of the edges from a range of rows of the complete graph to later rows.
 struct AddRows<'a> {
     kernel: &'a Kernel,
     count: usize,
     rows: Range<usize>,
-    /// The positions along each axis, and [`NOWHERE_M`] in the rest of the lanes.
+    /// Positions along each axis; [`PADDING_M`] in the padding lanes.
     axes: [&'a [f64]; 3],
-    /// From the first of the rows on, and room for whole lanes.
+    /// Sums along each axis from the first of the rows on, padded to whole lanes.
     sums: [&'a mut [f64]; 3],
 }
 
@@ -146,7 +146,7 @@ impl WithSimd for AddRows<'_> {
     }
 }
 
-/// Adds the pulls of all edges that are listed.
+/// Adds the pulls of all listed edges.
 struct AddList<'a> {
     kernel: &'a Kernel,
     axes: [&'a [f64]; 3],
@@ -163,8 +163,8 @@ impl WithSimd for AddList<'_> {
         let mut first = 0;
         while first < kernel.list.len() {
             let list = &kernel.list[first..kernel.list.len().min(first + LIST_BLOCK)];
-            // Each edge begins at the origin, where its first vehicle is to its second.
-            let (mut ends_m, mut of_ends) = ([[NOWHERE_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
+            // Each edge begins at the origin and ends at the position of its second vehicle relative to its first.
+            let (mut ends_m, mut of_ends) = ([[PADDING_M; LIST_BLOCK]; 3], [[0.0; LIST_BLOCK]; 3]);
             for axis in 0..3 {
                 for k in 0..list.len() {
                     ends_m[axis][k] = axes[axis][list[k][1]] - axes[axis][list[k][0]];
@@ -191,11 +191,11 @@ impl WithSimd for AddList<'_> {
     }
 }
 
-/// Bands of rows of the complete graph, with room for what each adds to the sums, and the positions that all of them read: 48
-/// bytes a vehicle for one band, some 290 for 16.
+/// Bands of rows of the complete graph, with a buffer for the sums of each band and a shared copy of the positions.
+/// Takes 48 bytes per vehicle for one band, some 290 for 16.
 #[derive(Clone, Debug)]
 pub(super) struct Bands {
-    /// Along each axis \[m\]; behind the last vehicle there is a number of others, all in one place.
+    /// Positions along each axis \[m\], followed by padding entries at one common place.
     axes: [Vec<f64>; 3],
     bands: Vec<Band>,
 }
@@ -203,14 +203,14 @@ pub(super) struct Bands {
 #[derive(Clone, Debug)]
 struct Band {
     rows: Range<usize>,
-    /// What its edges add to the sums of every vehicle from its first row on, along each axis.
+    /// Sums along each axis over the edges of the band, for every vehicle from its first row on.
     sums: [Vec<f64>; 3],
     potential: Result<f64, OutOfDomain>,
 }
 
 impl Bands {
-    /// Of so many vehicles, with `room` for others at `beyond_m` behind the last. The number of bands fixes the order of all sums,
-    /// however many threads there are.
+    /// Builds `bands` bands of `count` vehicles, with `room` padding entries at `beyond_m`. The number of bands fixes
+    /// the order of all sums, independent of the number of threads.
     pub(super) fn new(count: usize, bands: usize, room: usize, beyond_m: f64) -> Self {
         // The rows from r on have about (N - r)^2/2 edges.
         let start = |band: usize| count - (count * count * (bands - band) / bands).isqrt();
@@ -222,10 +222,10 @@ impl Bands {
         Self { axes: [(); 3].map(|()| vec![beyond_m; count + room]), bands: (0..bands).map(band).collect() }
     }
 
-    /// Lets every thread at hand evaluate bands, each once: `evaluate` gets the positions with room behind them, adds what the edges
-    /// of these rows do to sums that begin with the first of the rows, along each axis, with room as well, and returns their
-    /// potential. Adds all of it to `sums` band by band, so that the bits are the same for any number of threads; returns the
-    /// whole potential.
+    /// Evaluates every band once, in parallel if there are threads. `evaluate` receives a range of rows, the padded
+    /// positions and padded sums that begin at the first of these rows. It adds the pulls of these rows to the sums and
+    /// returns their potential. Adds all bands to `sums` in order, so the bits are the same for any number of threads.
+    /// Returns the sum of the potentials.
     pub(super) fn add_to(
         &mut self,
         axes: [&[f64]; 3],

@@ -1,4 +1,4 @@
-//! The Laplacian baseline (3): consensus on the formation, without avoidance.
+//! The Laplacian baseline (3): consensus on the formation, without collision avoidance.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ pub struct LaplacianKeys {
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub f1_per_s2: f64,
-    /// Gain on velocities in 1/s; 1 + `swarm.a22_per_s` unless given.
+    /// Gain on velocities in 1/s; by default 1 + `swarm.a22_per_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub f2_per_s: Option<f64>,
@@ -42,7 +42,7 @@ impl Default for LaplacianKeys {
 }
 
 impl LaplacianKeys {
-    /// Puts in what follows from other keys.
+    /// Sets keys that are not given to their defaults.
     pub(super) fn complete(self, a22_per_s: f64) -> Self {
         Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
     }
@@ -54,8 +54,8 @@ impl LaplacianKeys {
 /// u_i = -(1/N) sum_{j in N_i} [ f1 ((p_i - h_i) - (p_j - h_j)) + f2 (v_i - v_j) ]
 /// ```
 ///
-/// It reaches the slots `h_i` up to a common translation from any start on a connected graph, and does not keep
-/// vehicles apart. The source's gains are f1 = 1 and f2 = 1 + a22.
+/// Reaches the slots `h_i` up to a common translation from any start on a connected graph. Does not keep vehicles
+/// apart. The source's gains are f1 = 1 and f2 = 1 + a22.
 ///
 /// # Energy
 /// On the complete graph, with `e_i = p_i - h_i`,
@@ -64,10 +64,10 @@ impl LaplacianKeys {
 /// E = 1/2 sum |v_i - mean v|^2 + (f1/2) sum |e_i - mean e|^2,    dE/dt = (a22 - f2) sum |v_i - mean v|^2
 /// ```
 ///
-/// For f1 > 0 this is a Lyapunov function wherever f2 >= a22. On other graphs, and for f1 <= 0, none is given.
+/// For f1 > 0 this is a Lyapunov function if f2 >= a22. There is no energy on other graphs or for f1 <= 0.
 ///
 /// # Cost
-/// O(N) a step on the complete graph, O(edges) on others, without allocation.
+/// O(N) per step on the complete graph, O(edges) on others, without allocation.
 #[derive(Clone, Debug)]
 pub struct LaplacianLaw {
     graph: Graph,
@@ -76,11 +76,10 @@ pub struct LaplacianLaw {
 }
 
 impl LaplacianLaw {
-    /// The law on these links.
+    /// Builds the law on the links of the context.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
-    /// is not finite.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, or a slot or a gain is not finite.
     #[expect(clippy::needless_pass_by_value, reason = "every law takes its keys by value")]
     pub fn new(context: &LawContext<'_>, keys: LaplacianKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, a22_per_s, .. } = context;
@@ -135,11 +134,11 @@ impl Law for LaplacianLaw {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities { needs: &["all share a compass"], ..Capabilities::default() }
+        Capabilities { needs: &["a common compass"], ..Capabilities::default() }
     }
 
-    /// The law is linear. Its modes x'' = -(f1 mu/N) x - (f2 mu/N - a22) x' over the eigenvalues 0 <= mu <= N of the
-    /// graph's Laplacian have rates of at most max(sqrt(f1), |f2 - a22|, |a22|).
+    /// The law is linear. With the eigenvalues 0 <= mu <= N of the graph's Laplacian, its modes are
+    /// `x'' = -(f1 mu/N) x - (f2 mu/N - a22) x'`. Their rates are at most `max(sqrt(f1), |f2 - a22|, |a22|)`.
     fn rates(&self, at: &RateQuery) -> Rates {
         let fastest = self.f1_per_s2.sqrt().max((self.f2_per_s - at.a22_per_s).abs()).max(at.a22_per_s.abs());
         Rates {

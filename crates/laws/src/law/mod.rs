@@ -1,8 +1,8 @@
-//! Control laws: what acceleration each vehicle asks for, given what it knows.
+//! Control laws: the acceleration that each vehicle commands, as a function of the states that it knows.
 //!
-//! A law is a file: its keys in a scenario, its bounds, its energy, its certificate and what that assumes. `spec` lists
-//! the laws that scenarios may name. A law of your own implements [`Law`] and is flown like the built-in ones
-//! (see `examples/own_law.rs`).
+//! Each law has one file with its scenario keys, bounds, energy, certificate and assumptions. `spec` lists the laws
+//! that scenarios may name. A custom law implements [`Law`] and runs like the built-in ones (see
+//! `examples/own_law.rs`).
 
 mod cbf_qp;
 mod certificate;

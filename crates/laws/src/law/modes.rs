@@ -1,14 +1,14 @@
-//! Linear motion about the slots, and how late or how seldom it may be controlled.
+//! Linearized motion about the slots, and its stability margins under delay and sampling.
 //!
-//! Where a law's vehicles are near their slots, their errors are sums of modes, each of which moves by itself. With all that a
-//! vehicle knows, its own state too, late by tau, a mode of stiffness K and damping C obeys
+//! Near the slots the errors are sums of independent modes. If all states that a vehicle uses, its own included, are
+//! late by tau, a mode of stiffness K and damping C has the characteristic equation
 //!
 //! ```text
 //! s^2 - a22 s + (K + C s) e^(-s tau) = 0
 //! ```
 //!
-//! With the own state known at once and others heard late, own terms and others' part: see [`Heard`]. docs/margins.md derives
-//! all of this.
+//! If only the received states are late, own and received terms separate: see [`Heard`]. docs/margins.md has the
+//! derivations.
 
 use std::f64::consts::TAU;
 
@@ -19,19 +19,19 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::space::NearPairs;
 
-/// Linear motion about the slots under a law.
+/// Linearized motion about the slots under a law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Linear {
-    /// Modes of relative motion with nobody pushing anybody.
+    /// Modes of relative motion without contact (no pair within the range of the barrier).
     pub free: Vec<Mode>,
-    /// The stiffest that a mode can be with the nearest slots' vehicles on the edge of pushing each other; none where that is
-    /// not known, or nobody pushes.
+    /// Upper bound of the stiffest mode with the vehicles of the nearest slots at the edge of contact; `None` if it is
+    /// unknown or the law has no contact forces.
     pub stiffest_contact_mode: Option<Mode>,
-    /// What is heard of others, where the modes are known with that late and a vehicle's own state not.
+    /// Loop over received states, if its modes with late received and present own states are known.
     pub heard: Option<Heard>,
 }
 
-/// A mode x'' = a22 x' - K x - C x'.
+/// Mode x'' = a22 x' - K x - C x'.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     /// K \[1/s^2\].
@@ -40,8 +40,8 @@ pub struct Mode {
     pub damping_per_s: f64,
 }
 
-/// The loop over what vehicles hear of each other: with gains k and c on each link, u = -(k + c s) (D - A e^(-s tau)) x, where D
-/// has for each vehicle the number of those whom it hears and one more where it knows a reference, and A who hears whom.
+/// Loop over received states: u = -(k + c s) (D - A e^(-s tau)) x with gains k and c on each link. D is diagonal: the
+/// number of neighbours of each vehicle, plus one if it knows a reference. A is the adjacency matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heard {
     /// k \[1/s^2\] and c \[1/s\].
@@ -50,36 +50,36 @@ pub struct Heard {
     pub links: HeardLinks,
 }
 
-/// Links for which the modes are known though own and others' parts are not late alike.
+/// Links whose modes are known with different delays of own and received terms.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HeardLinks {
-    /// D is the same for all: D and A have the same modes.
+    /// D is a multiple of the identity, so D and A have the same modes.
     Alike {
-        /// That of each vehicle.
+        /// Diagonal entry of D.
         own: f64,
         /// Eigenvalues of A.
         others: Vec<f64>,
     },
-    /// A star, on which all who hear the hub alone move alike, or without the hub.
+    /// Star: its modes involve the hub and the mean of the leaves, or the leaves alone.
     Star {
-        /// D of the hub.
+        /// Entry of D for the hub.
         hub: f64,
-        /// D of the others.
+        /// Entry of D for each leaf.
         leaf: f64,
-        /// Their number.
+        /// Number of leaves.
         leaves: f64,
     },
 }
 
 impl Linear {
-    /// Longest delay \[s\] of all that vehicles know, own states too, below which every free mode is stable; infinite where any
-    /// is short enough.
+    /// Returns the longest delay \[s\] of all states, own included, below which every free mode is stable; infinite if
+    /// every delay is stable.
     #[must_use]
     pub fn delay_margin_s(&self, a22_per_s: f64) -> f64 {
         self.free.iter().map(|mode| mode.delay_margin_s(a22_per_s)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Longest time \[s\] between commands that are held below which every free mode is stable.
+    /// Returns the longest sampling period \[s\] of held commands below which every free mode is stable.
     #[must_use]
     pub fn sampling_margin_s(&self, a22_per_s: f64) -> f64 {
         self.free.iter().map(|mode| mode.sampling_margin_s(a22_per_s)).fold(f64::INFINITY, f64::min)
@@ -87,7 +87,7 @@ impl Linear {
 }
 
 impl Mode {
-    /// With so many times the gains.
+    /// Returns the mode with both gains multiplied by `factor`.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self { stiffness_per_s2: factor * self.stiffness_per_s2, damping_per_s: factor * self.damping_per_s }
@@ -97,10 +97,11 @@ impl Mode {
         self.damping_per_s > a22_per_s && self.stiffness_per_s2 >= 0.0
     }
 
-    /// Longest delay \[s\] below which the mode is stable; 0 where it is not stable without, infinite where it is with any.
+    /// Returns the longest delay \[s\] below which the mode is stable; 0 if it is unstable without delay, infinite if
+    /// it is stable with every delay.
     ///
-    /// On the edge s = i omega, and |K + i C omega| = |omega^2 + i a22 omega| gives omega^4 - (C^2 - a22^2) omega^2 - K^2 = 0, the
-    /// angles tau omega = atan(C omega/K) - atan(a22/omega).
+    /// At the stability limit s = i omega, |K + i C omega| = |omega^2 + i a22 omega| gives
+    /// omega^4 - (C^2 - a22^2) omega^2 - K^2 = 0. The angles give tau omega = atan(C omega/K) - atan(a22/omega).
     #[must_use]
     pub fn delay_margin_s(self, a22_per_s: f64) -> f64 {
         let Self { stiffness_per_s2: k, damping_per_s: c } = self;
@@ -115,16 +116,16 @@ impl Mode {
         (libm::atan2(c * omega, k) - libm::atan(a22_per_s / omega)) / omega
     }
 
-    /// Longest time \[s\] between commands that are held (zero-order hold) below which the mode is stable: min(2/C, 2 C/K) for a22
-    /// = 0.
+    /// Returns the longest sampling period \[s\] of held commands (zero-order hold) below which the mode is stable:
+    /// min(2/C, 2 C/K) for a22 = 0.
     ///
-    /// From one command to the next the state is multiplied by a matrix; both of its eigenvalues are within the unit circle where
-    /// its determinant is below 1 and the sum 1 + trace + determinant is positive (Jury).
+    /// From one command to the next the state is multiplied by a 2 x 2 matrix. Both eigenvalues lie within the unit
+    /// circle if its determinant is below 1 and 1 + trace + determinant is positive (Jury).
     #[must_use]
     pub fn sampling_margin_s(self, a22_per_s: f64) -> f64 {
-        /// Parts of the time scale that are looked at, and how far beyond it.
-        const LOOKS: u32 = 4000;
-        const SCALES: f64 = 20.0;
+        /// Number of periods scanned, and the end of the scan in units of the time scale.
+        const SCAN_STEPS: u32 = 4000;
+        const SCAN_END: f64 = 20.0;
         let Self { stiffness_per_s2: k, damping_per_s: c } = self;
         if !self.is_stable(a22_per_s) {
             return 0.0;
@@ -133,29 +134,29 @@ impl Mode {
             return f64::INFINITY;
         }
         let is_stable = |period_s: f64| {
-            let (bounded, moved_s, pushed_s2) = held(a22_per_s, period_s);
+            let (bounded, moved_s, pushed_s2) = zero_order_hold(a22_per_s, period_s);
             let trace = 1.0 + bounded - k * pushed_s2 - c * moved_s;
             let determinant = bounded - c * moved_s + k * (moved_s * moved_s - bounded * pushed_s2);
             determinant < 1.0 && 1.0 + trace + determinant > 0.0
         };
         let scale_s = if k > 0.0 { (2.0 / c.abs()).min(2.0 * c.abs() / k) } else { 2.0 / c.abs() };
-        let look_s = |look: u32| SCALES * scale_s * f64::from(look) / f64::from(LOOKS);
-        let Some(beyond) = (1..=LOOKS).find(|&look| !is_stable(look_s(look))) else { return f64::INFINITY };
-        bisect(look_s(beyond - 1), look_s(beyond), is_stable)
+        let period_at_s = |step: u32| SCAN_END * scale_s * f64::from(step) / f64::from(SCAN_STEPS);
+        let Some(beyond) = (1..=SCAN_STEPS).find(|&step| !is_stable(period_at_s(step))) else { return f64::INFINITY };
+        bisect(period_at_s(beyond - 1), period_at_s(beyond), is_stable)
     }
 }
 
-/// Over a period T: by how much a velocity has grown, e^(a22 T), how far a unit of it has gone \[s\], and how far a unit of
-/// acceleration \[s^2\].
-fn held(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
+/// Returns the response over a period T: the growth `e^(a22 T)` of a velocity, and the distances per unit of velocity
+/// \[s\] and per unit of acceleration \[s^2\].
+fn zero_order_hold(a22_per_s: f64, period_s: f64) -> (f64, f64, f64) {
     let x = a22_per_s * period_s;
     let ratio = if x == 0.0 { 1.0 } else { libm::expm1(x) / x };
-    // (e^x - 1 - x)/x^2, as a series where that cancels.
+    // (e^x - 1 - x)/x^2, as a series where the difference cancels.
     let second = if x.abs() < 1e-3 { 0.5 + x * (1.0 / 6.0 + x / 24.0) } else { (ratio - 1.0) / x };
     (libm::exp(x), period_s * ratio, period_s * period_s * second)
 }
 
-/// Where what holds below no longer holds.
+/// Returns the boundary between `low`, where the predicate holds, and `high`, where it does not.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = low + 0.5 * (high - low);
@@ -167,10 +168,10 @@ fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 impl Heard {
-    /// Longest delay \[s\] of what is heard of others, own states known at once, below which all modes are stable; infinite where
-    /// any is short enough. None where common motion grows by itself (a22 > 0) and no part of it can be told apart.
+    /// Returns the longest delay \[s\] of received states, with present own states, below which all modes are stable;
+    /// infinite if every delay is stable. `None` if the common motion is unstable (a22 > 0) and cannot be separated.
     ///
-    /// Common motion counts where a22 <= 0: a delay ties it to where the swarm was.
+    /// The common motion counts if a22 <= 0: with a delay it is tied to past positions of the swarm.
     #[must_use]
     pub fn delay_margin_s(&self, a22_per_s: f64) -> Option<f64> {
         match &self.links {
@@ -186,14 +187,14 @@ impl Heard {
         }
     }
 
-    /// q(i omega) of s^2 - a22 s = -(k + c s) q.
-    fn turned(&self, omega: f64, a22_per_s: f64) -> Complex<f64> {
+    /// Returns q(i omega) for s^2 - a22 s = -(k + c s) q.
+    fn link_ratio(&self, omega: f64, a22_per_s: f64) -> Complex<f64> {
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         Complex::new(omega * omega, a22_per_s * omega) / Complex::new(k, c * omega)
     }
 
-    /// Of s^2 - a22 s + (k + c s) (d - alpha e^(-s tau)) = 0: at s = i omega the moduli give a quadratic in omega^2, and the angles
-    /// the delay.
+    /// Returns the delay margin of s^2 - a22 s + (k + c s) (d - alpha e^(-s tau)) = 0. At s = i omega the moduli give a
+    /// quadratic in omega^2, and the angles give the delay.
     fn alike_s(&self, d: f64, alpha: f64, a22_per_s: f64) -> f64 {
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         let relative = d - alpha;
@@ -212,33 +213,34 @@ impl Heard {
             .filter(|&squared| crosses && squared > 1e-12 * half.abs())
             .map(|squared| {
                 let omega = squared.sqrt();
-                let turned = (Complex::new(d, 0.0) - self.turned(omega, a22_per_s)) / alpha;
-                (-turned.arg()).rem_euclid(TAU) / omega
+                let link_ratio = (Complex::new(d, 0.0) - self.link_ratio(omega, a22_per_s)) / alpha;
+                (-link_ratio.arg()).rem_euclid(TAU) / omega
             })
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Of hub and the others' mean: (hub - q)(leaf - q) = leaves e^(-2 s tau). The moduli are searched for where they agree.
+    /// Returns the delay margin of hub and leaf mean: (hub - q)(leaf - q) = leaves e^(-2 s tau). Scans omega for equal
+    /// moduli.
     fn star_s(&self, hub: f64, leaf: f64, leaves: f64, a22_per_s: f64) -> f64 {
-        const LOOKS: u32 = 4000;
-        // Those who hear the hub alone, without it.
+        const SCAN_STEPS: u32 = 4000;
+        // Modes of the leaves alone have no received terms.
         if !self.gain.times(leaf).is_stable(a22_per_s) {
             return 0.0;
         }
         let ratio = |omega: f64| {
-            let q = self.turned(omega, a22_per_s);
+            let q = self.link_ratio(omega, a22_per_s);
             (Complex::new(hub, 0.0) - q) * (Complex::new(leaf, 0.0) - q) / leaves
         };
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
-        // Beyond this the left side is the larger one.
+        // Above this frequency the left side is larger.
         let fastest = 4.0 * (hub + leaf + leaves) * (c + k.sqrt()) + 4.0 * a22_per_s.abs();
-        let look = |step: u32| fastest * libm::pow(10.0, 6.0 * (f64::from(step) / f64::from(LOOKS) - 1.0));
+        let omega_at = |step: u32| fastest * libm::pow(10.0, 6.0 * (f64::from(step) / f64::from(SCAN_STEPS) - 1.0));
         let is_below = |omega: f64| ratio(omega).norm() < 1.0;
-        let crossings = (1..=LOOKS).filter(|&step| is_below(look(step - 1)) != is_below(look(step)));
+        let crossings = (1..=SCAN_STEPS).filter(|&step| is_below(omega_at(step - 1)) != is_below(omega_at(step)));
         crossings
             .map(|step| {
-                let below = is_below(look(step - 1));
-                let omega = bisect(look(step - 1), look(step), |omega| is_below(omega) == below);
+                let below = is_below(omega_at(step - 1));
+                let omega = bisect(omega_at(step - 1), omega_at(step), |omega| is_below(omega) == below);
                 (-ratio(omega).arg()).rem_euclid(TAU) / (2.0 * omega)
             })
             .fold(f64::INFINITY, f64::min)
@@ -248,11 +250,11 @@ impl Heard {
 #[cfg(test)]
 mod tests;
 
-/// Distances of slots that differ by less, relatively, are the same one.
+/// Relative difference below which two slot distances count as equal.
 const SAME: f64 = 1e-6;
 
-/// The stiffest mode there: those at the nearest slots push each other with `V_R''` at R, which adds at most its product with the
-/// largest eigenvalue of the Laplacian of who is nearest. None for fewer than two vehicles.
+/// Returns an upper bound of the stiffest mode with the nearest slots in contact. Contact adds at most `V_R''` at R
+/// times the largest Laplacian eigenvalue of the graph of nearest slots. `None` for fewer than two vehicles.
 pub(super) fn stiffest_contact_mode(free: Mode, tension: &EdgeTension, formation: &Formation) -> Option<Mode> {
     let (_, nearest_m) = formation.min_distance()?;
     let mut near = NearPairs::default();

@@ -1,5 +1,5 @@
-//! Optimal reciprocal collision avoidance: each vehicle takes the velocity nearest to the one it prefers that no other, doing
-//! the same, needs to collide with.
+//! Optimal reciprocal collision avoidance (ORCA): each vehicle takes the velocity nearest to its preferred one that
+//! avoids collisions if all vehicles do the same.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,43 +16,44 @@ use crate::observation::Observation;
 use crate::space::NearLists;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
-/// Part of a speed below which it has no direction across the line of sight.
+/// Fraction of a speed below which its component across the line of sight has no direction.
 const STRAIGHT: f64 = 1e-9;
 
-/// The margin unless given, as a part of delta.
+/// Default margin, as a fraction of delta.
 const MARGIN: f64 = 0.01;
 
 /// Keys of `[law]` with `kind = "orca"`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OrcaKeys {
-    /// Preferred velocity towards the slot for each metre that it is away, in 1/s.
+    /// Preferred velocity towards the slot per metre of distance from it, in 1/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s: f64,
-    /// Highest speed that a vehicle prefers in m/s.
+    /// Largest preferred speed in m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_m_s: f64,
-    /// Highest speed that it may take in m/s.
+    /// Largest speed in m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: f64,
-    /// For how long a velocity must be free of collisions in s.
+    /// Time for which a velocity must be free of collisions in s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub horizon_s: f64,
-    /// Rate at which the chosen velocity is taken on in 1/s; vehicles that are too near each other part within its inverse.
+    /// Rate at which the chosen velocity is tracked in 1/s; vehicles that are too near each other part within its
+    /// inverse.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tracking_per_s: f64,
-    /// Highest acceleration that is commanded in m/s^2.
+    /// Largest commanded acceleration in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: f64,
-    /// How many others a vehicle minds at most, the nearest ones.
+    /// Largest number of neighbours that a vehicle considers, the nearest ones.
     #[schemars(range(min = 1))]
     pub neighbours_max: usize,
-    /// How near others must be to be minded in m; unless given, as far as two vehicles at their highest speeds come towards
-    /// each other within the horizon, and what they keep apart.
+    /// Largest distance of a neighbour that a vehicle considers in m. By default delta + margin plus the distance that
+    /// two vehicles at their highest speeds approach each other within the horizon.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range_m: Option<f64>,
-    /// How much more than delta vehicles mean to keep apart in m; a hundredth of delta unless given.
+    /// Distance that vehicles keep beyond delta in m; by default a hundredth of delta.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub margin_m: Option<f64>,
@@ -74,25 +75,28 @@ impl Default for OrcaKeys {
     }
 }
 
-/// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance, 2011), with
-/// half-spaces, for vehicles of diameter D = delta + margin that track the velocities it chooses:
+/// Optimal reciprocal collision avoidance (van den Berg, Guy, Lin, Manocha: Reciprocal n-body collision avoidance,
+/// 2011) with half-spaces. Vehicles have diameter D = delta + margin and track the velocities V:
 ///
 /// ```text
-/// V_i   = in |v| <= v_max and all half-spaces of i, the velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i|,   d_i = h_i + r - p_i
+/// V_i   = velocity nearest to r' + min(k |d_i|, speed) d_i/|d_i| with |v| <= v_max in all half-spaces of i
+/// d_i   = h_i + r - p_i
 /// u_i   = r'' + tracking (V_i - v_i) - a22 v_i,    |u_i| <= max_accel
 /// ```
 ///
-/// The velocity obstacle of a pair is the set of relative velocities that bring the two nearer than D within the horizon: a
-/// cone with a round tip. Where w takes `v_i - v_j` to the boundary of that set the shortest way, with its outward normal n there,
-/// the half-space of i is `n . (V - v_i - w/2) >= 0`: each of the two does half. Where not all half-spaces have a point in
-/// common, the velocity that violates least is taken. Two that are nearer than D part within 1/tracking.
+/// The velocity obstacle of a pair is the set of relative velocities with a separation below D within the horizon: a
+/// cone with a round tip. Let w be the shortest vector from `v_i - v_j` to the boundary of that set, and n the outward
+/// normal there. The half-space of i is `n . (V - v_i - w/2) >= 0`, so each vehicle of the pair contributes half of w.
+/// If the half-spaces have no common point, the velocity with the least largest violation is taken. Two vehicles nearer
+/// than D part within 1/tracking.
 ///
 /// # Guarantee
-/// None. Velocities that are taken on at once, chosen anew all the time and free of conflicts, keep delta. Accelerations that are
-/// limited, velocities that are tracked, and crowds in which no velocity is free void that; without a margin, vehicles that pass come to D exactly, and rounding decides.
+/// None. Velocities that are free of conflicts, chosen continuously and taken on at once keep delta. Acceleration
+/// limits, velocity tracking and crowds without a free velocity break this. Without a margin, passing vehicles come to
+/// exactly D, and rounding decides.
 ///
 /// # Cost
-/// O(near pairs) a step without allocation.
+/// O(near pairs) per step without allocation.
 #[derive(Clone, Debug)]
 pub struct OrcaLaw {
     keys: OrcaKeys,
@@ -104,17 +108,17 @@ pub struct OrcaLaw {
     a22_per_s: f64,
     range_m: f64,
     near: NearLists,
-    /// Scratch: the nearest of a vehicle's near ones \[m^2\], the first `neighbours_max` of them.
+    /// Scratch: squared distances \[m^2\] and indices of the nearest near vehicles, at most `neighbours_max`.
     nearest: Vec<(f64, usize)>,
     half_spaces: HalfSpaces,
 }
 
 impl OrcaLaw {
-    /// The law of so many vehicles; links play no part.
+    /// Builds the law; links play no part.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, where a slot or a key is not
-    /// finite, or where there is a reference that some do not know.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a key is not finite, or
+    /// some vehicle does not know the reference.
     pub fn new(context: &LawContext<'_>, keys: OrcaKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, delta_m, a22_per_s, .. } = context;
         let gains = [
@@ -144,11 +148,10 @@ impl OrcaLaw {
         })
     }
 
-    /// Writes the velocities V \[m/s\], N x 3, that vehicles choose into `velocities`: what ORCA is before vehicles have a limit
-    /// to their acceleration.
+    /// Writes the chosen velocities V \[m/s\], N x 3, into `velocities`: pure ORCA without acceleration limits.
     ///
     /// # Errors
-    /// [`LawError`] where a state is not finite or two vehicles are in the same place.
+    /// [`LawError`] if a state is not finite or two vehicles are at the same position.
     pub fn velocities(&mut self, at: &Observation<'_>, velocities: &mut Rows) -> Result<(), LawError> {
         check_observation(self.count, at, velocities)?;
         self.near.update(self.count, at.near);
@@ -165,14 +168,14 @@ impl OrcaLaw {
         check_range(velocities)
     }
 
-    /// Where vehicle i would fly if it were alone.
+    /// Returns the preferred velocity of vehicle i without neighbours \[m/s\].
     fn preferred_m_s(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
         let reference = &at.target.reference;
         let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
         reference.velocity_m_s + (self.keys.k_per_s * missing_m).cap_magnitude(self.keys.speed_m_s)
     }
 
-    /// Keeps the nearest of those whom vehicle i sees within the range, the nearest first and of equals the lower index.
+    /// Finds the nearest vehicles that vehicle i senses within the range, in order of distance and then of index.
     fn find_nearest(&mut self, at: &Observation<'_>, i: usize) {
         self.nearest.clear();
         let own_m = row(&at.own.positions_m, i);
@@ -189,7 +192,7 @@ impl OrcaLaw {
         }
     }
 
-    /// What vehicle j leaves of vehicle i's velocities.
+    /// Returns the half-space of velocities of vehicle i that vehicle j allows.
     fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
         let seen = at.seen(i, j);
         let own_m_s = row(&at.own.velocities_m_s, i);
@@ -211,11 +214,11 @@ impl Law for OrcaLaw {
 
     fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         self.velocities(at, command)?;
-        let fed_m_s2 = self.reference_use.fed_m_s2(&at.target.reference);
+        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&at.target.reference);
         for i in 0..self.count {
             let own_m_s = row(&at.own.velocities_m_s, i);
             let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
-            let wanted = fed_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
+            let wanted = feed_forward_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
             set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
         }
         check_range(command)
@@ -233,8 +236,8 @@ impl Law for OrcaLaw {
         }
     }
 
-    /// A vehicle alone follows x'' = -tracking (x' + k x). Nothing is known where others are within the range: the velocity that
-    /// is chosen may turn as fast as two of them pass. Vehicles track velocities of their own, and a22 is made up for.
+    /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: the
+    /// chosen velocity may turn as fast as two vehicles pass. a22 is compensated, so the common mode does not grow.
     fn rates(&self, at: &RateQuery) -> Rates {
         let OrcaKeys { tracking_per_s, k_per_s, .. } = self.keys;
         let alone_per_s = tracking_per_s.max((tracking_per_s * k_per_s).sqrt());
@@ -243,23 +246,24 @@ impl Law for OrcaLaw {
     }
 }
 
-/// The relative velocities of vehicle i against vehicle j with which i comes nearer to j than a diameter within the horizon.
+/// Relative velocities of vehicle i with respect to vehicle j that bring the pair nearer than a diameter within the
+/// horizon.
 struct VelocityObstacle {
-    /// From i to j \[m\], not zero.
+    /// Vector from i to j \[m\], not zero.
     towards_m: Vector3<f64>,
     diameter_m: f64,
     horizon_s: f64,
-    /// In place of the horizon where the two are too near already: the time in which they part.
+    /// Time to part, used in place of the horizon if the pair is already too near.
     parting_s: f64,
 }
 
 impl VelocityObstacle {
-    /// The outward normal where a relative velocity is nearest to the boundary, and how deep inside it lies \[m/s\]; negative
-    /// outside.
+    /// Returns the outward normal at the boundary point nearest to a relative velocity, and the depth of the velocity
+    /// inside the set \[m/s\]; negative outside.
     ///
-    /// The set is the ball of radius diameter/horizon about `towards_m`/horizon, and its shadow away from the origin: a cone whose
-    /// half-angle has the sine diameter/distance. The nearest point is on the ball where the way from its centre to the velocity
-    /// leads off the cone's mantle, and on the mantle elsewhere.
+    /// The set is the ball of radius diameter/horizon about `towards_m`/horizon and its shadow away from the origin.
+    /// The shadow is a cone whose half-angle has the sine diameter/distance. The nearest point is on the ball if the
+    /// vector from the centre to the velocity points off the cone's lateral surface, and on that surface otherwise.
     fn way_out(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
         let Self { towards_m, diameter_m, horizon_s, parting_s } = self;
         let distance_m = towards_m.norm();
@@ -285,8 +289,8 @@ impl VelocityObstacle {
     }
 }
 
-/// The direction of a velocity across a line of sight. Where it has none, to the left as seen from above, so that the two of a
-/// pair turn to different sides; along a vertical line of sight, to x.
+/// Returns the unit direction of a velocity across a line of sight. If it has none, returns left as seen from above, so
+/// that the two vehicles turn to different sides; along a vertical line of sight, x.
 fn across(velocity_m_s: Vector3<f64>, sight: Vector3<f64>) -> Vector3<f64> {
     let rest = velocity_m_s - sight * sight.dot(&velocity_m_s);
     let rest = rest - sight * sight.dot(&rest);

@@ -1,4 +1,4 @@
-//! Consensus on slots over links, with whoever knows the reference drawn to it: the product of the pinned Laplacian.
+//! Consensus on slots over links, with a pull to the reference for vehicles that know it (pinned Laplacian).
 
 use nalgebra::Vector3;
 
@@ -20,12 +20,12 @@ pub(super) struct Gains {
     pub(super) velocity: f64,
 }
 
-/// The links of a swarm and who knows the reference, with the errors `e_i = p_i - h_i` in mind.
+/// Links of a swarm and the vehicles that know the reference. Position errors are `e_i = p_i - h_i`.
 #[derive(Clone, Debug)]
 pub(super) struct PinnedConsensus {
     pub(super) graph: Graph,
     pub(super) pinning: Pinning,
-    /// Scratch: `k e_i + c v_i`, where links are many.
+    /// Scratch: `k e_i + c v_i`, used on graphs with many links.
     pulls: Rows,
 }
 
@@ -34,7 +34,7 @@ impl PinnedConsensus {
         Self { graph: graph.clone(), pinning, pulls: Rows::zeros(graph.count()) }
     }
 
-    /// Least eigenvalue of the pinned Laplacian M; a vehicle alone, with no neighbour to be pulled by, has 1.
+    /// Returns the least eigenvalue of the pinned Laplacian M; 1 for a single vehicle without a reference.
     pub(super) fn connectivity(&self) -> f64 {
         if self.graph.count() == 1 && self.pinning == Pinning::Nobody {
             return 1.0;
@@ -42,8 +42,8 @@ impl PinnedConsensus {
         self.graph.pinned_connectivity(&self.pinning)
     }
 
-    /// Linear motion about the slots with these gains times the pinned Laplacian M: a leader is drawn to the reference by the
-    /// gains `lead` alone.
+    /// Returns the linearized motion about the slots with `gain` times the pinned Laplacian M. A leader follows the
+    /// reference with the gains `lead`.
     pub(super) fn linear(&self, gain: Mode, lead: Mode) -> Linear {
         let leads = self.pinning.leader().map(|_| lead);
         let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
@@ -52,12 +52,12 @@ impl PinnedConsensus {
         Linear { free, stiffest_contact_mode: None, heard: links.map(|links| Heard { gain, links }) }
     }
 
-    /// The loop over links, where own and others' parts have the same modes, and on a star.
+    /// Returns the loop over links if own and received terms have the same modes, or on a star.
     fn heard_links(&self, eigenvalues: &[f64]) -> Option<HeardLinks> {
         let own = self.graph.pinned_diagonal(&self.pinning);
         let (&first, &last) = (own.first()?, own.last()?);
         if own.iter().all(|&other| other == first) {
-            // M = D - A, and common motion has the eigenvalue 0 where nobody knows a reference.
+            // M = D - A. Without a reference the common motion has the eigenvalue 0 of M.
             let common = (self.pinning == Pinning::Nobody).then_some(first);
             return Some(HeardLinks::Alike {
                 own: first,
@@ -72,8 +72,8 @@ impl PinnedConsensus {
         is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
 
-    /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, and
-    /// `k (e_i - r) + c (v_i - r')` where i knows the reference.
+    /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, plus `scale` times
+    /// `k (e_i - r) + c (v_i - r')` if i knows the reference.
     pub(super) fn add_pulls(
         &mut self,
         at: &Observation<'_>,
@@ -92,7 +92,7 @@ impl PinnedConsensus {
             if self.graph.is_complete() || self.graph.edge_count() <= self.graph.count() {
                 add_laplacian_product(&self.graph, &pulls, scale, sums);
             } else {
-                // Each is wanted at several links.
+                // Each row is read at several links, so it is computed once.
                 for (pull, column) in pulls.iter().zip(columns_mut(&mut self.pulls)) {
                     column.iter_mut().enumerate().for_each(|(i, kept)| *kept = pull(i));
                 }
@@ -114,17 +114,17 @@ impl PinnedConsensus {
         Ok(())
     }
 
-    /// Puts what keeps a leader on the reference, whatever others do, in the place of its row.
+    /// Replaces the leader's row by its own tracking of the reference, independent of other vehicles.
     pub(super) fn lead(&self, at: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
         if let Some(leader) = self.pinning.leader() {
             let (error_m, velocity_m_s) = off_reference(at, leader);
             let back = gains.position * error_m + gains.velocity * velocity_m_s;
-            set_row(command, leader, fed_forward(&at.target.reference, a22_per_s) - back);
+            set_row(command, leader, feed_forward_acceleration(&at.target.reference, a22_per_s) - back);
         }
     }
 
-    /// `e' M e` \[m^2\]: the sum over links of `|e_i - e_j|^2`, and of `|e_i|^2` over those who know the reference, for
-    /// errors that are counted from it.
+    /// Returns `e' M e` \[m^2\]: the sum of `|e_i - e_j|^2` over links, plus the sum of `|e_i|^2` over the vehicles
+    /// that know the reference. Errors are relative to the reference.
     pub(super) fn stretch_m2(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
         let count = self.graph.count();
         let links = if self.graph.is_complete() {
@@ -136,8 +136,8 @@ impl PinnedConsensus {
         links + pinned.sum::<f64>()
     }
 
-    /// `1/2 sum |v~_i|^2` \[m^2/s^2\], relative to the mean where nobody knows a reference, to the leader where one leads, and
-    /// otherwise to the reference.
+    /// Returns `1/2 sum |v~_i|^2` \[m^2/s^2\]. Velocities v~ are relative to the mean without a reference, to the
+    /// leader if there is one, and otherwise to the reference.
     pub(super) fn kinetic_energy(&self, swarm: &Swarm, reference: &Reference) -> f64 {
         let velocity_m_s = match self.pinning {
             Pinning::Nobody => return relative_kinetic_energy(swarm),
@@ -156,12 +156,12 @@ fn off_reference(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>)
     (error_m, row(&at.own.velocities_m_s, i) - reference.velocity_m_s)
 }
 
-/// `p_i - h_i` from a place \[m\].
+/// Returns `p_i - h_i - place` \[m\].
 pub(super) fn error_m(positions_m: &Rows, formation: &Formation, place_m: Vector3<f64>, i: usize) -> Vector3<f64> {
     row(positions_m, i) - row(&formation.slots_m, i) - place_m
 }
 
-/// What holds a vehicle that is on the reference on it: `r'' - a22 r'` \[m/s^2\].
-pub(super) fn fed_forward(reference: &Reference, a22_per_s: f64) -> Vector3<f64> {
+/// Returns the acceleration `r'' - a22 r'` \[m/s^2\] that keeps a vehicle on the reference.
+pub(super) fn feed_forward_acceleration(reference: &Reference, a22_per_s: f64) -> Vector3<f64> {
     reference.acceleration_m_s2 - a22_per_s * reference.velocity_m_s
 }

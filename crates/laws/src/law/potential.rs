@@ -1,4 +1,4 @@
-//! An artificial potential field: consensus on the formation, repulsion from whoever is near, each vehicle braking itself.
+//! Artificial potential field: consensus on the formation, repulsion from near vehicles, damping of each own velocity.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -25,13 +25,13 @@ pub struct PotentialKeys {
     /// Gain on positions over links in 1/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub k_per_s2: f64,
-    /// Braking of each vehicle's own velocity in 1/s.
+    /// Damping of each vehicle's own velocity in 1/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub c_per_s: f64,
     /// Scale of the repulsion in m^4/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub eta_m4_per_s2: f64,
-    /// Highest acceleration that is commanded in m/s^2; no limit unless given.
+    /// Largest commanded acceleration in m/s^2; no limit by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
@@ -43,7 +43,7 @@ impl Default for PotentialKeys {
     }
 }
 
-/// The potential field of Khatib (1986) between vehicles, on an undirected graph of N vehicles: with `e_i = p_i - h_i`
+/// The potential field of Khatib (1986) between vehicles, on an undirected graph of N vehicles. With `e_i = p_i - h_i`
 /// and the clearance rho = l - delta,
 ///
 /// ```text
@@ -51,20 +51,22 @@ impl Default for PotentialKeys {
 /// U(l) = (eta/2) (1/rho - 1/rho_R)^2,    R = smallest distance of two slots,    rho_R = R - delta
 /// ```
 ///
-/// Vehicles repel each other while they are nearer than slots are, whether they are linked or not. Where an acceleration is limited,
-/// longer ones are shortened to that, and nothing is certified.
+/// Pairs nearer than the smallest slot distance repel each other, linked or not. With an acceleration limit, longer
+/// accelerations are shortened to it, and the certificate is void.
 ///
 /// # Energy
 /// ```text
-/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U,   dE/dt = (a22 - c) sum |v_i|^2
+/// E = 1/2 sum |v_i|^2 + (k/2N) sum over links of |e_i - e_j|^2 + sum over near pairs of U
+/// dE/dt = (a22 - c) sum |v_i|^2
 /// ```
 ///
 /// # Certificate
-/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. It assumes exact knowledge of
-/// links and near pairs, no limit on the acceleration, no disturbance, continuous time.
+/// For c >= a22 the energy never grows, so U(l) <= E(0) for *every* pair, on every graph. Assumptions: exact states
+/// over links and of near pairs, no limit on the acceleration, no disturbance, continuous time.
 ///
 /// # Cost
-/// O(links + near pairs) a step without allocation, and so is its energy; that of any other state compares all pairs.
+/// O(links + near pairs) per step without allocation, energy included. The energy of any other state compares all
+/// pairs.
 #[derive(Clone, Debug)]
 pub struct PotentialLaw {
     graph: Graph,
@@ -73,18 +75,18 @@ pub struct PotentialLaw {
     a22_per_s: f64,
     /// R \[m\].
     range_m: f64,
-    /// That of the target that R is taken from.
+    /// Revision of the target that set R.
     revision: u64,
     /// Sum of U over the near pairs.
     cache: PotentialCache,
 }
 
 impl PotentialLaw {
-    /// The law on these links, with the smallest slot distance as its range.
+    /// Builds the law on the links of the context, with the smallest slot distance as its range.
     ///
     /// # Errors
-    /// [`ParameterError`] where graph and formation do not have the same number of vehicles, or where a slot or a gain
-    /// is not finite.
+    /// [`ParameterError`] if graph and formation have different numbers of vehicles, a slot or a gain is not finite, or
+    /// two slots are at most delta apart.
     pub fn new(context: &LawContext<'_>, keys: PotentialKeys) -> Result<Self, ParameterError> {
         let gains = [("k", keys.k_per_s2), ("c", keys.c_per_s), ("eta", keys.eta_m4_per_s2)];
         ParameterError::check(context.links, context.formation, &gains)?;
@@ -103,7 +105,7 @@ impl PotentialLaw {
         })
     }
 
-    /// `1/rho - 1/rho_R` \[1/m\] and 1/rho at a distance \[m\] within the range.
+    /// Returns `1/rho - 1/rho_R` and 1/rho \[1/m\] at a distance within the range.
     fn steepness(&self, pair: Pair, separation_m: f64) -> Result<(f64, f64), LawError> {
         if separation_m <= self.delta_m {
             return Err(LawError::Collision { pair, separation_m, delta_m: self.delta_m });
@@ -112,7 +114,7 @@ impl PotentialLaw {
         Ok((inverse - 1.0 / (self.range_m - self.delta_m), inverse))
     }
 
-    /// What vehicle `i` makes of vehicle `j` from whom it sees itself so far apart \[m\], and U; nothing out of range.
+    /// Returns the push of vehicle `j` on vehicle `i` at relative position `apart_m`, and U; `None` out of range.
     fn repulsion(&self, i: usize, j: usize, apart_m: Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError> {
         let separation_m = apart_m.norm();
         if separation_m >= self.range_m {
@@ -148,8 +150,8 @@ impl PotentialLaw {
     }
 }
 
-/// R of a formation \[m\]: the smallest distance of two slots, which must be more than delta. Where it is not, the two and
-/// their distance are the error.
+/// Returns R of a formation \[m\]: the smallest slot distance, which must exceed delta. Otherwise returns the pair and
+/// its distance as the error.
 fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
     match formation.min_distance() {
         Some((pair, distance_m)) if distance_m <= delta_m => Err((pair, distance_m)),
@@ -158,10 +160,10 @@ fn range(formation: &Formation, delta_m: f64) -> Result<f64, (Pair, f64)> {
 }
 
 impl PotentialLaw {
-    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3` at
-    /// `nearest_m` along its line (and less across it), a vehicle has at most as many near ones as balls of that diameter
-    /// fit around it within R + `nearest_m`/2, and the eigenvalues of a sum over pairs are at most twice the sum at a
-    /// vehicle.
+    /// The links add at most k to omega^2. A near pair adds at most `U'' = eta (1/rho + 2 (1/rho - 1/rho_R)) / rho^3`
+    /// at `nearest_m` along its line, and less across it. The number of near vehicles is at most the number of balls of
+    /// diameter `nearest_m` that fit around a vehicle within R + `nearest_m`/2. The eigenvalues of a sum over pairs are
+    /// at most twice the sum at a vehicle.
     fn fastest_per_s(&self, nearest_m: f64, a22_per_s: f64) -> Option<f64> {
         let nearest_m = nearest_m.min(self.range_m);
         let (steep, inverse) = self.steepness(Pair::new(0, 1), nearest_m).ok()?;
@@ -170,7 +172,7 @@ impl PotentialLaw {
         let near = packed.min(self.graph.count().saturating_sub(1) as f64);
         let omega = (self.keys.k_per_s2 + 2.0 * near * curvature).sqrt();
         let half = 0.5 * (self.keys.c_per_s - a22_per_s).abs();
-        // A mode that the repulsion pushes apart grows at up to this rate, and no other is faster.
+        // A mode that the repulsion destabilizes grows at up to this rate, and no other mode is faster.
         Some(half + half.hypot(omega))
     }
 }
@@ -240,7 +242,11 @@ impl Law for PotentialLaw {
 
     fn capabilities(&self) -> Capabilities {
         Capabilities {
-            needs: &["all share a compass", "each sees who is nearer than slots are", "each knows its own velocity"],
+            needs: &[
+                "a common compass",
+                "each vehicle senses vehicles nearer than the slot distance",
+                "each vehicle knows its own velocity",
+            ],
             barrier_m: Some(self.delta_m),
             sensing_range_m: Some(self.range_m),
             max_command_m_s2: self.keys.max_accel_m_s2,

@@ -1,4 +1,4 @@
-//! The list of laws. Every law is built by `new(context, keys)` of its own file.
+//! List of the laws that scenarios may name. Each law is built by `new(context, keys)` of its own file.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,16 +24,16 @@ macro_rules! laws {
         }
 
         impl LawSpec {
-            /// Every law, with its default parameters.
+            /// Returns every law with its default parameters.
             #[must_use]
             pub fn all() -> Vec<Self> {
                 vec![$(Self::$kind(<$keys>::default()),)+]
             }
 
-            /// The law, ready to fly.
+            /// Builds the law.
             ///
             /// # Errors
-            /// [`ParameterError`] where it does not exist for these parameters.
+            /// [`ParameterError`] if the law does not exist for these parameters.
             pub fn build(&self, context: &LawContext<'_>) -> Result<Box<dyn Law>, ParameterError> {
                 Ok(match self { $(Self::$kind(keys) => Box::new(<$law>::new(context, keys.clone())?),)+ })
             }
@@ -42,7 +42,7 @@ macro_rules! laws {
 }
 
 impl LawSpec {
-    /// With the keys that follow from others where they are not given.
+    /// Sets keys that are not given and follow from others.
     #[must_use]
     pub fn complete(self, a22_per_s: f64) -> Self {
         match self {
@@ -51,7 +51,7 @@ impl LawSpec {
         }
     }
 
-    /// Whether the law keeps numbers of each edge of a complete graph, which itself takes no memory for them.
+    /// Whether the law stores numbers per edge even for a complete graph, whose edges take no memory themselves.
     #[must_use]
     pub fn keeps_edges(&self) -> bool {
         matches!(self, Self::EdgeTension(_))
@@ -61,16 +61,16 @@ impl LawSpec {
 laws! {
     /// Distances as springs with a barrier at delta: collision-free on the complete graph.
     EdgeTension(EdgeTensionKeys) => EdgeTensionLaw,
-    /// Consensus on the slots over any connected graph, and a tension between all who are near: collision-free.
+    /// Consensus on the slots over any connected graph, and a tension between near vehicles: collision-free.
     Displacement(DisplacementKeys) => DisplacementLaw,
-    /// The Laplacian baseline: converges from every start and avoids nothing.
+    /// The Laplacian baseline: converges from every start, without collision avoidance.
     Laplacian(LaplacianKeys) => LaplacianLaw,
-    /// A potential field: consensus on the slots, repulsion from whoever is near, each vehicle braking itself.
+    /// Potential field: consensus on the slots, repulsion from near vehicles, damping of each own velocity.
     Potential(PotentialKeys) => PotentialLaw,
-    /// Velocities that are reciprocally free of collisions, tracked.
+    /// Tracking of velocities that are reciprocally free of collisions.
     Orca(OrcaKeys) => OrcaLaw,
-    /// A controller to the slot, overruled where two could no longer brake.
+    /// A controller to the slot, limited by control barrier functions that keep every pair able to brake.
     CbfQp(CbfQpKeys) => CbfQpLaw,
-    /// One distance to all who are near, bounded forces: a lattice, not given slots.
+    /// One distance between near vehicles, bounded forces: forms a lattice; slots are not assigned.
     Flocking(FlockingKeys) => FlockingLaw,
 }

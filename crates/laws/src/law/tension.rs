@@ -1,9 +1,9 @@
-//! The edge tension (5), (6): the potential that holds one pair of vehicles apart and together.
-#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel are made of the functions here")]
+//! The edge tension (5), (6): a potential of one pair with a barrier at delta and its minimum at the desired distance.
+#![expect(clippy::inline_always, reason = "the vectorised sums of the kernel inline these functions")]
 
 use std::hint::select_unpredictable;
 
-/// asinh(1) = ln(1 + sqrt 2), the scaled clearance s = (l - delta)/K of the minimum.
+/// asinh(1) = ln(1 + sqrt 2): the scaled clearance s = (l - delta)/K at the minimum.
 pub(super) const REST: f64 = 0.881_373_587_019_543;
 /// exp(-2 asinh(1)) = (sqrt 2 - 1)^2.
 const REST_DECAY: f64 = 0.171_572_875_253_809_9;
@@ -18,13 +18,18 @@ const REST_DECAY_ROOT: f64 = 0.414_213_562_373_095_05;
 /// V''(l) = (2 alpha/K^2) coth(s) csch^2(s)
 /// ```
 ///
-/// V is strictly convex, 0 at its minimum l = d, infinite at delta and nearly a line of slope alpha/K far out.
+/// V is strictly convex, 0 at its minimum l = d, infinite at delta, and tends to a line of slope alpha/K for large l.
 ///
 /// # Accuracy
-/// With h = s - asinh(1) both V = alpha \[h - (sqrt 2 - 1)(1 - e^(-2h))/(1 - e^(-2s))\] and
-/// V' = (alpha/K) (1 - e^(-2h)) (1 - e^(-2(s + asinh 1))) / (1 - e^(-2s))^2 hold exactly. Neither subtracts nearly
-/// equal numbers at the barrier, and V' does not at the minimum either: it is good to a few units in the last place
-/// of its own size everywhere, and V to a few units of that of alpha h.
+/// With h = s - asinh(1) these forms hold exactly:
+///
+/// ```text
+/// V  = alpha [ h - (sqrt 2 - 1) (1 - e^(-2h))/(1 - e^(-2s)) ]
+/// V' = (alpha/K) (1 - e^(-2h)) (1 - e^(-2(s + asinh 1)))/(1 - e^(-2s))^2
+/// ```
+///
+/// Neither subtracts nearly equal numbers at the barrier, and V' does not do so at the minimum either. The error of V'
+/// is a few units in its last place everywhere; the error of V is a few units in the last place of alpha h.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeTension {
     alpha: f64,
@@ -33,25 +38,25 @@ pub struct EdgeTension {
     k_m: f64,
 }
 
-/// Why there is no edge tension for some parameters.
+/// Reason why the edge tension does not exist for some parameters.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TensionError {
     /// alpha is not a positive finite number.
     #[error("alpha is {alpha}; it must be a positive finite number")]
     Alpha {
-        /// As given \[m^2/s^2\].
+        /// Given value \[m^2/s^2\].
         alpha: f64,
     },
     /// delta is negative or not finite.
     #[error("the safety distance delta is {delta_m} m; it must be a finite number of at least 0")]
     Delta {
-        /// As given \[m\].
+        /// Given value \[m\].
         delta_m: f64,
     },
     /// The rest length does not exceed delta: K = (d - delta)/asinh(1) would not be positive.
     #[error("the desired distance is {rest_m} m; it must be finite and greater than the safety distance {delta_m} m")]
     Rest {
-        /// As given \[m\].
+        /// Given value \[m\].
         rest_m: f64,
         /// Safety distance \[m\].
         delta_m: f64,
@@ -59,7 +64,7 @@ pub enum TensionError {
 }
 
 impl EdgeTension {
-    /// The tension of scale `alpha` \[m^2/s^2\] with its barrier at `delta_m` and its minimum at `rest_m`.
+    /// Builds the tension of scale `alpha` \[m^2/s^2\] with its barrier at `delta_m` and its minimum at `rest_m`.
     ///
     /// # Errors
     /// [`TensionError`] unless alpha > 0, delta >= 0, d > delta and all are finite.
@@ -71,7 +76,7 @@ impl EdgeTension {
             return Err(TensionError::Delta { delta_m });
         }
         let k_m = (rest_m - delta_m) / REST;
-        // A subnormal gap has no finite inverse.
+        // A subnormal K has no finite inverse.
         if !(k_m >= f64::MIN_POSITIVE && k_m.is_finite()) {
             return Err(TensionError::Rest { rest_m, delta_m });
         }
@@ -141,21 +146,21 @@ impl EdgeTension {
         2.0 * self.alpha / (self.k_m * self.k_m) * coth * csch_squared
     }
 
-    /// The distance l in (delta, d] on the pushing side of the minimum with V(l) = `value` \[m^2/s^2\].
+    /// Returns the distance l in (delta, d] on the pushing side of the minimum with V(l) = `value` \[m^2/s^2\].
     ///
-    /// d for a value at or below 0, delta for an infinite one, NaN for NaN. Where the clearance l - delta is below
-    /// the resolution of l, the result rounds to delta.
+    /// Returns d for a value at or below 0, delta for an infinite value, NaN for NaN. If the clearance l - delta is
+    /// below the resolution of l, the result rounds to delta.
     ///
     /// # Method
-    /// In s the equation coth(s) = V/alpha + sqrt 2 + asinh(1) - s has one root in (0, asinh(1)], and since the right
-    /// hand side lies between its values at the ends, so does the root between the areas coth^-1 of these: a bracket
-    /// whose ends differ by less than a factor of 2. Newton's method runs on sqrt(V), which unlike V has a simple
-    /// zero at the minimum; it is convex, so the steps from the lower end climb to the root without passing it. A
-    /// step that rounding takes out of the bracket is replaced by bisection.
+    /// In s the equation coth(s) = V/alpha + sqrt 2 + asinh(1) - s has one root in (0, asinh(1)]. The inverse
+    /// hyperbolic cotangents of the right-hand side at both ends bracket the root; they differ by less than a factor of
+    /// 2. Newton's method runs on sqrt(V), which unlike V has a simple zero at the minimum. The square root is convex
+    /// too, so the steps from the lower end climb to the root without passing it. A step that rounding takes out of the
+    /// bracket is replaced by bisection.
     ///
     /// # Guarantee
-    /// Every iteration keeps the root in the bracket. It ends where a step falls below the resolution of s: in fewer
-    /// than 10 iterations in practice, and in 64 at most (54 bisections alone would give every digit).
+    /// Every iteration keeps the root in the bracket. Iteration stops when a step falls below the resolution of s: in
+    /// fewer than 10 iterations in practice, and in 64 at most (54 bisections alone would give every digit).
     #[must_use]
     pub fn push_side_root(&self, value: f64) -> f64 {
         if value.is_nan() {
@@ -172,11 +177,11 @@ impl EdgeTension {
     }
 }
 
-/// Some distance is not in (delta, infinity), or so short or long that V has no finite value.
+/// A distance is outside (delta, infinity), or so short or long that V is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct OutOfDomain;
 
-/// The scaled clearance s in (0, asinh(1)] with V/alpha = `value` > 0, and the iterations taken.
+/// Returns the scaled clearance s in (0, asinh(1)] with V/alpha = `value` > 0, and the number of iterations.
 fn push_side_root(value: f64) -> (f64, u32) {
     const MOST_ITERATIONS: u32 = 64;
     if value == f64::INFINITY {
@@ -208,21 +213,21 @@ fn push_side_root(value: f64) -> (f64, u32) {
     (s, MOST_ITERATIONS)
 }
 
-/// V/alpha at the scaled clearance s > 0, with h = s - asinh(1).
+/// Returns V/alpha at the scaled clearance s > 0, with h = s - asinh(1).
 #[inline(always)]
 pub(super) fn value(s: f64, h: f64) -> f64 {
     let (of_s, of_h) = decay_complements(s, h);
     h - REST_DECAY_ROOT * of_h / of_s
 }
 
-/// V' K/alpha = 1 - csch^2(s) at the scaled clearance s > 0, with h = s - asinh(1).
+/// Returns V' K/alpha = 1 - csch^2(s) at the scaled clearance s > 0, with h = s - asinh(1).
 #[inline(always)]
 pub(super) fn slope(s: f64, h: f64) -> f64 {
     let (of_s, of_h) = decay_complements(s, h);
     of_h * (1.0 - REST_DECAY * (1.0 - of_s)) / (of_s * of_s)
 }
 
-/// [`slope`] over a length, and [`value`], with one division for both; `power` is [`expm1`] of their [`exponent`].
+/// Returns [`slope`] divided by `length`, and [`value`], with a single division. `power` is [`expm1`] of [`exponent`].
 #[inline(always)]
 pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64, power: f64) -> (f64, f64) {
     let (of_s, of_h) = complements_from(s, power);
@@ -231,19 +236,19 @@ pub(super) fn slope_and_value_over(length: f64, s: f64, h: f64, power: f64) -> (
     (slope, h - REST_DECAY_ROOT * (ratio * (of_s * length)))
 }
 
-/// 1 - e^(-2s) and 1 - e^(-2h) for s > 0 and h = s - asinh(1), both to a few units in the last place.
+/// Returns 1 - e^(-2s) and 1 - e^(-2h) for s > 0 and h = s - asinh(1), both to a few units in the last place.
 ///
-/// One exponential serves for both: it is taken about the zero that is nearer, and the other follows from it without
+/// One exponential serves both: it is evaluated about the nearer zero, and the other follows from it without
 /// cancellation.
 #[inline(always)]
 fn decay_complements(s: f64, h: f64) -> (f64, f64) {
     complements_from(s, expm1(exponent(s, h)))
 }
 
-/// The exponent of the exponential that serves for both complements of s > 0 and h = s - asinh(1).
+/// Returns the exponent of the exponential that serves both complements of s > 0 and h = s - asinh(1).
 #[inline(always)]
 pub(super) fn exponent(s: f64, h: f64) -> f64 {
-    // Chosen and not branched to: a loop over edges is to become vector instructions.
+    // A selection in place of a branch lets the compiler vectorise loops over edges.
     -2.0 * select_unpredictable(is_near_barrier(s), s, h)
 }
 
@@ -260,13 +265,13 @@ fn is_near_barrier(s: f64) -> bool {
     s < 0.5 * REST
 }
 
-/// e^x - 1 for x <= 1, to two units in the last place.
+/// Returns e^x - 1 for x <= 1, to two units in the last place.
 ///
-/// Built from additions and multiplications alone and without branches: the compiler can turn it into vector
-/// instructions of any width, and its bits are the same on every machine.
+/// Consists of additions and multiplications without branches. The compiler can vectorise it for any width, and its
+/// bits are the same on every machine.
 #[inline(always)]
 pub(super) fn expm1(x: f64) -> f64 {
-    /// Adding this to a small number rounds it to an integer, held in the lowest bits of the sum.
+    /// Adding this constant to a small number rounds it to an integer, held in the lowest bits of the sum.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts; products of the first with integers of up to 11 bits are exact.
     const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
@@ -280,8 +285,8 @@ pub(super) fn expm1(x: f64) -> f64 {
     let r = (x - exponent * LN_2_HIGH) - exponent * LN_2_LOW;
     let power = f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52);
 
-    // e^r - 1 = r + r^2 (c2 + c3 r + ... + c13 r^11), |r| <= ln(2)/2, cn = 1/n!; the first term left out is below
-    // 2e-17 of the whole.
+    // e^r - 1 = r + r^2 (c2 + c3 r + ... + c13 r^11), |r| <= ln(2)/2, cn = 1/n!. The truncation error is below 2e-17
+    // of the sum.
     let r2 = r * r;
     let r4 = r2 * r2;
     let r8 = r4 * r4;

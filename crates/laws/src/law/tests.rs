@@ -1,4 +1,4 @@
-//! What every law of the list does alike.
+//! Tests of properties that all laws share.
 
 use super::*;
 use crate::formation::Formation;
@@ -10,7 +10,7 @@ use tautline_core::swarm::{Rows, Swarm};
 
 const COUNT: usize = 6;
 
-/// Off its slots, moving, and nobody within 1 m of another.
+/// Returns a moving swarm off its slots, with separations above 1 m.
 fn swarm() -> Swarm {
     let stir = |i: usize, axis: usize| 0.2 * libm::sin((3 * i + axis) as f64);
     let slots_m = Formation::grid(COUNT, 1.7).slots_m;
@@ -34,7 +34,7 @@ fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
 }
 
 #[test]
-fn a_state_that_each_holds_is_answered_like_the_same_state_shared() {
+fn separate_exact_tables_give_the_command_of_the_shared_state() {
     let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
     let held = Held {
         heard: vec![swarm.clone(); COUNT],
@@ -48,13 +48,13 @@ fn a_state_that_each_holds_is_answered_like_the_same_state_shared() {
             let expected = command(law.as_mut(), &shared);
             let found = command(law.as_mut(), &Observation { others: Others::Held(&held), ..shared });
             assert!((&found - &expected).amax() < 1e-12 * expected.amax(), "{spec:?}: {found} {expected}");
-            assert!(expected.amax() > 0.1, "{spec:?} does something");
+            assert!(expected.amax() > 0.1, "{spec:?}: command is not zero");
         }
     }
 }
 
 #[test]
-fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
+fn a_command_depends_only_on_the_tables_of_its_vehicle() {
     let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
     let pictures = |vehicle: Option<usize>| {
         let mut held = Held {
@@ -63,7 +63,7 @@ fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
             seen: vec![swarm.clone(); COUNT],
         };
         if let Some(vehicle) = vehicle {
-            // Everybody else is a little elsewhere and dashes to the middle, as this one has it.
+            // This vehicle's tables have all others displaced and moving quickly to the middle.
             for picture in [&mut held.heard[vehicle], &mut held.seen[vehicle]] {
                 picture.positions_m.iter_mut().enumerate().for_each(|(k, x)| *x += 0.05 * libm::sin(k as f64));
                 picture.velocities_m_s -= 6.0 * &picture.positions_m;
@@ -74,30 +74,30 @@ fn a_vehicle_rests_on_its_own_picture_and_on_that_of_nobody_else() {
     for spec in LawSpec::all() {
         for links in [Graph::complete(COUNT), Graph::star(COUNT), Graph::ring(COUNT)] {
             let mut law = built(&spec, &links, &formation);
-            let mut asked = |vehicle: Option<usize>| {
+            let mut command_with = |vehicle: Option<usize>| {
                 let held = pictures(vehicle);
                 let at = Observation { others: Others::Held(&held), ..Observation::exact(&swarm, &links, &formation) };
                 command(law.as_mut(), &at)
             };
-            let plain = asked(None);
+            let plain = command_with(None);
             let mut own = 0;
             for vehicle in 0..COUNT {
-                let other = asked(Some(vehicle));
+                let other = command_with(Some(vehicle));
                 let changed = |i: usize| (0..3).any(|axis| other[(i, axis)] != plain[(i, axis)]);
                 own += u32::from(changed(vehicle));
                 assert!(
                     (0..COUNT).all(|i| i == vehicle || !changed(i)),
-                    "{spec:?}: somebody looks at {vehicle}'s picture"
+                    "{spec:?}: a command depends on the tables of vehicle {vehicle}"
                 );
             }
-            // Half-spaces may leave a vehicle what it wants whatever it sees.
-            assert!(own > 0, "{spec:?}: nobody looks at the own picture");
+            // Half-spaces may leave the preferred value of a vehicle unchanged.
+            assert!(own > 0, "{spec:?}: no command depends on its vehicle's own tables");
         }
     }
 }
 
 #[test]
-fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
+fn following_new_slots_equals_building_the_law_for_them() {
     let (swarm, first, next) = (swarm(), Formation::grid(COUNT, 2.0), Formation::grid(COUNT, 2.6));
     for spec in LawSpec::all() {
         let links = Graph::complete(COUNT);
@@ -117,22 +117,22 @@ fn a_law_that_follows_new_slots_is_the_law_of_these_slots() {
 }
 
 #[test]
-fn who_compares_directions_needs_a_compass_and_who_senses_needs_a_sensor() {
+fn needs_include_a_compass_for_displacements_and_sensing_for_a_range() {
     for spec in LawSpec::all() {
         let law = built(&spec, &Graph::complete(COUNT), &Formation::grid(COUNT, 2.0));
         let needs = |what: &str| law.capabilities().needs.iter().any(|need| need.contains(what));
         assert_eq!(needs("compass"), law.capabilities().controls == Controls::Displacements, "{spec:?}");
-        assert_eq!(needs("sees"), law.capabilities().sensing_range_m.is_some(), "{spec:?}");
+        assert_eq!(needs("senses"), law.capabilities().sensing_range_m.is_some(), "{spec:?}");
         assert!(law.capabilities().needs.iter().all(|need| !need.is_empty()), "{spec:?}");
         assert!(
-            law.capabilities().assumptions.starts_with("The certified distance holds for ")
+            law.capabilities().assumptions.starts_with("The certified separation holds for ")
                 && law.capabilities().assumptions.ends_with('.')
         );
     }
 }
 
 #[test]
-fn every_law_is_named_as_its_kind_is() {
+fn laws_are_named_like_their_kinds() {
     let (links, formation) = (Graph::complete(COUNT), Formation::grid(COUNT, 2.0));
     let specs = LawSpec::all();
     let names: Vec<_> = specs.iter().map(|spec| built(spec, &links, &formation).name().to_owned()).collect();

@@ -1,53 +1,53 @@
-//! Lengths in which the safe sets of vehicles are balls.
+//! Scaled lengths in which keep-out ellipsoids are balls.
 
 use nalgebra::Vector3;
 
 use tautline_core::swarm::{Rows, row, set_row};
 
-/// Scaled lengths `l = |S (p_i - p_j)|` with S = diag(1, 1, 1/ratio): around each vehicle lies an upright ellipsoid, `ratio` times
-/// as high as it is wide, and two of them touch where l is their common width. With a ratio of 1 they are balls, and lengths
-/// are metres.
+/// Scaled lengths `l = |S (p_i - p_j)|` with S = diag(1, 1, 1/ratio). The keep-out region of each vehicle is an upright
+/// ellipsoid, `ratio` times as high as it is wide. Two of them touch where l is their common width. With a ratio of 1
+/// they are balls, and lengths are metres.
 ///
-/// A force from a potential V(l) is `-V'(l) S^2 (p_i - p_j)/l`: its work is what V loses. With S in the place of `S^2` it would
-/// be no gradient.
+/// A force from a potential V(l) is `-V'(l) S^2 (p_i - p_j)/l`, the negative gradient of V. With S in place of `S^2`
+/// the force would not be a gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metric {
     ratio: f64,
 }
 
 impl Default for Metric {
-    /// Metres.
+    /// Returns the metric in metres (ratio 1).
     fn default() -> Self {
         Self { ratio: 1.0 }
     }
 }
 
 impl Metric {
-    /// Of ellipsoids so many times as high as they are wide: a positive finite number.
+    /// Creates the metric of ellipsoids with this ratio of height to width, a positive finite number.
     #[must_use]
     pub fn of_ratio(ratio: f64) -> Self {
         Self { ratio }
     }
 
-    /// Height over width.
+    /// Returns height over width.
     #[must_use]
     pub fn ratio(self) -> f64 {
         self.ratio
     }
 
-    /// Whether lengths are metres.
+    /// Whether scaled lengths are metres.
     #[must_use]
     pub fn is_metres(self) -> bool {
         self.ratio == 1.0
     }
 
-    /// `S v`.
+    /// Returns `S v`.
     #[must_use]
     pub fn scaled(self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::new(v.x, v.y, v.z / self.ratio)
     }
 
-    /// `S` of every row.
+    /// Writes `S` times every row into `scaled`.
     pub fn scale(self, rows: &Rows, scaled: &mut Rows) {
         scaled.clone_from(rows);
         if !self.is_metres() {
@@ -55,7 +55,7 @@ impl Metric {
         }
     }
 
-    /// `S` of every row.
+    /// Returns `S` times every row.
     #[must_use]
     pub fn scaled_rows(self, rows: &Rows) -> Rows {
         let mut scaled = rows.clone();
@@ -63,19 +63,19 @@ impl Metric {
         scaled
     }
 
-    /// The most metres that a scaled length may be.
+    /// Returns the largest distance in metres of a scaled length.
     #[must_use]
     pub fn longest_m(self, length: f64) -> f64 {
         length * self.ratio.max(1.0)
     }
 
-    /// The most that so many metres may be in scaled lengths.
+    /// Returns the largest scaled length of a distance in metres.
     #[must_use]
     pub fn most_scaled(self, length_m: f64) -> f64 {
         length_m / self.ratio.min(1.0)
     }
 
-    /// The fewest metres that a scaled length may be.
+    /// Returns the smallest distance in metres of a scaled length.
     #[must_use]
     pub fn shortest_m(self, length: f64) -> f64 {
         length * self.ratio.min(1.0)

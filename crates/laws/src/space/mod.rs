@@ -1,7 +1,13 @@
-//! Who is near whom, and what is in the way: one search of neighbours and the shapes of obstacles.
+//! Geometry in space: search of near pairs, scaled lengths and the shapes of obstacles.
 //!
-//! [`NearPairs`] finds the pairs of a whole table at once, [`KeptPairs`] keeps them while points move little, [`closest_pair`]
-//! is the nearest of them, [`Spaced`] keeps points apart as they come one by one, [`Shape`] says how far a point is from a solid, and [`Metric`] scales lengths to what must stay empty. The judge of `audit` uses none of this: a fault here must not blind it.
+//! - [`NearPairs`] finds all near pairs of a table.
+//! - [`KeptPairs`] reuses them while points move little.
+//! - [`closest_pair`] finds the nearest pair.
+//! - [`Spaced`] accepts points one by one that keep a minimum distance.
+//! - [`Shape`] gives the distance of a point from a solid.
+//! - [`Metric`] scales lengths so that keep-out ellipsoids become balls.
+//!
+//! The auditor in `audit` uses none of this, so a defect here cannot hide a violation.
 
 mod metric;
 mod near;
@@ -18,22 +24,22 @@ use nalgebra::Vector3;
 
 use tautline_core::swarm::{Rows, row};
 
-/// A solid at rest that vehicles keep clear of.
+/// Fixed solid that vehicles keep clear of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
-    /// What it is called.
+    /// Name of the obstacle.
     pub name: String,
-    /// Where the shape's own origin is \[m\].
+    /// Position of the shape's origin \[m\].
     pub place_m: Vector3<f64>,
-    /// The solid.
+    /// Shape of the solid.
     pub shape: Shape,
-    /// Distance that the centre of a vehicle must keep from the surface \[m\].
+    /// Least distance of a vehicle's centre from the surface \[m\].
     pub clearance_m: f64,
 }
 
 impl Obstacle {
-    /// How much farther from the surface than its clearance a point is \[m\], and the direction in which that grows by one
-    /// metre a metre ([`Shape::signed_distance_m`]).
+    /// Returns the clearance margin of a point \[m\], its distance from the surface less the clearance, and the
+    /// gradient of the margin, a unit vector ([`Shape::signed_distance_m`]).
     #[must_use]
     pub fn room_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
         let (distance_m, normal) = self.shape.signed_distance_m(point_m - self.place_m);
@@ -41,8 +47,8 @@ impl Obstacle {
     }
 }
 
-/// The least room that rows of positions have from any obstacle \[m\], with the row and the obstacle; none where there is
-/// nothing to compare.
+/// Returns the smallest clearance margin of any position at any obstacle \[m\], with the row and the obstacle; `None`
+/// without positions or obstacles.
 #[must_use]
 pub fn least_room(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
     let rooms = (0..positions_m.nrows()).flat_map(|i| {

@@ -1,4 +1,4 @@
-//! Pairs within a range, by cells in sorted order.
+//! Search of pairs within a range, by sorted cells.
 
 use std::ops::Range;
 
@@ -6,56 +6,57 @@ use nalgebra::Vector3;
 
 use tautline_core::swarm::{Rows, columns, row};
 
-/// Bits of a cell's number along one axis.
+/// Bits of a cell number along one axis.
 const BITS: u32 = 21;
-/// Most cells along an axis: their numbers, those of the cells around them included, fit in [`BITS`].
+/// Largest number of cells along an axis, so that their numbers and those of adjacent cells fit in [`BITS`].
 const MOST_CELLS: f64 = (1_u64 << (BITS - 1)) as f64;
-/// How much wider than the range a cell is: more than the rounding of up to [`MOST_CELLS`] cells, so that whatever is
-/// within the range of a point is in its cell or in one that touches it.
-const WIDER: f64 = 1.0 + 1e-6;
-/// Distances are compared by their squares first: more than the rounding of a square.
-const SQUARED: f64 = 1.0 + 1e-12;
+/// Ratio of cell size to range: exceeds the rounding of up to [`MOST_CELLS`] cells, so that points within the range are
+/// in the same or adjacent cells.
+const CELL_MARGIN: f64 = 1.0 + 1e-6;
+/// Factor for the comparison of squared distances: exceeds the rounding of a square.
+const SQUARE_MARGIN: f64 = 1.0 + 1e-12;
 const ALONG_Y: u64 = 1 << BITS;
 const ALONG_Z: u64 = 1 << (2 * BITS);
-/// From a cell to the rows of cells after its own that touch it.
+/// Offsets from a cell to the later rows of cells that touch it.
 const LATER_ROWS: [u64; 4] = [ALONG_Y, ALONG_Z - ALONG_Y, ALONG_Z, ALONG_Z + ALONG_Y];
 
-/// The pairs of points within a range of each other.
+/// Search of the pairs of points within a range of each other.
 ///
-/// Points are sorted by the cell that they lie in, and cells are a range wide, so the points near another are in five
-/// runs of that order, which move on as the point does. A search takes O(N log N + pairs) where points are spread out,
-/// and allocates nothing once its lists have grown.
+/// Points are sorted by cell, and cells are as wide as the range. The points near a given point are therefore in five
+/// contiguous runs, which move on with the point. A search takes O(N log N + pairs) for spread-out points, and
+/// allocates nothing once its lists have grown.
 #[derive(Clone, Debug, Default)]
 pub struct NearPairs {
     cells: Vec<(u64, usize)>,
     points: Vec<Vector3<f64>>,
     found: Vec<(usize, usize)>,
-    /// For each point the end of its pairs in `pairs`.
+    /// End of the pairs of each point in `pairs`.
     ends: Vec<usize>,
     pairs: Vec<(usize, usize)>,
 }
 
 impl NearPairs {
-    /// The pairs `(i, j)` found last, i < j, in ascending order.
+    /// Returns the pairs `(i, j)` of the last search, i < j, in ascending order.
     #[must_use]
     pub fn pairs(&self) -> &[(usize, usize)] {
         &self.pairs
     }
 
-    /// Finds every pair of rows whose [separation](tautline_core::swarm::separation) is at most `range_m` \[m\]. A row that is not finite is in no pair.
+    /// Finds every pair of rows whose [separation](tautline_core::swarm::separation) is at most `range_m` \[m\]. A row
+    /// that is not finite is in no pair.
     pub fn update(&mut self, positions_m: &Rows, range_m: f64) {
         self.sort(positions_m, range_m);
         self.sweep(range_m);
         self.order(positions_m.nrows());
     }
 
-    /// Sorts the finite points by cell, those of a cell by index.
+    /// Sorts the finite points by cell, and within a cell by index.
     fn sort(&mut self, positions_m: &Rows, range_m: f64) {
         let finite = || (0..positions_m.nrows()).map(|i| (i, row(positions_m, i))).filter(|(_, p)| is_finite(p));
         let none = Vector3::repeat(f64::INFINITY);
         let (low, high) = finite().fold((none, -none), |(low, high), (_, p)| (low.inf(&p), high.sup(&p)));
-        let cell_m = (range_m * WIDER).max((high - low).max() / MOST_CELLS);
-        // A cell without width holds all points, as one without bound does.
+        let cell_m = (range_m * CELL_MARGIN).max((high - low).max() / MOST_CELLS);
+        // With a cell width of 0 or infinity all points are in one cell.
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most MOST_CELLS, and from 1")]
         let number = |offset_m: f64| (offset_m / cell_m) as u64 + 1;
         self.cells.clear();
@@ -68,10 +69,10 @@ impl NearPairs {
         self.points.extend(self.cells.iter().map(|&(_, i)| row(positions_m, i)));
     }
 
-    /// Compares each point with those after it in its own row of cells and in the four later rows that touch its cell.
+    /// Compares each point with later points in its own row of cells and in the four later rows that touch its cell.
     fn sweep(&mut self, range_m: f64) {
         let Self { cells, points, found, .. } = self;
-        let squared = range_m * range_m * SQUARED;
+        let squared = range_m * range_m * SQUARE_MARGIN;
         let mut starts = [0; LATER_ROWS.len()];
         found.clear();
         for (place, (&(cell, i), &point)) in cells.iter().zip(points.iter()).enumerate() {
@@ -95,7 +96,7 @@ impl NearPairs {
         }
     }
 
-    /// Puts what was found in order, by counting.
+    /// Sorts the found pairs by counting.
     fn order(&mut self, count: usize) {
         let Self { found, ends, pairs, .. } = self;
         ends.clear();
@@ -124,22 +125,21 @@ fn is_finite(point: &Vector3<f64>) -> bool {
     point.iter().all(|x| x.is_finite())
 }
 
-/// How much farther than the range is searched, as a part of the range: points may move half of that before a pair can be
-/// missing.
+/// Additional search range, as a fraction of the range. Points may move half of it before a pair can be missing.
 const SKIN: f64 = 0.3;
-/// Rounding of distances, as a part of the range.
+/// Rounding of distances, as a fraction of the range.
 const ROUNDING: f64 = 1e-9;
-/// Points that are looked at together, without a branch for each.
+/// Number of points compared together without branches.
 const SIDE_BY_SIDE: usize = 128;
 
-/// The pairs of points within a range of each other, and some that are up to 30 % farther apart.
+/// Pairs of points within a range of each other, and some pairs that are up to 30 % farther apart.
 ///
-/// They are searched anew only where a point has moved so far since the last search that a pair could be missing, so most
-/// updates take O(N). Nothing is allocated once the lists have grown.
+/// The search is repeated only if a point has moved so far that a pair could be missing, so most updates take O(N).
+/// Allocates nothing once the lists have grown.
 #[derive(Clone, Debug)]
 pub struct KeptPairs {
     near: NearPairs,
-    /// Where the points were when they were searched last, and within which range \[m\].
+    /// Positions of the last search, and its range \[m\].
     searched_m: Rows,
     range_m: f64,
 }
@@ -151,13 +151,13 @@ impl Default for KeptPairs {
 }
 
 impl KeptPairs {
-    /// The pairs `(i, j)`, i < j, in ascending order: all that are within the range, and some that are a little farther.
+    /// Returns the pairs `(i, j)`, i < j, in ascending order: all within the range, and some slightly farther apart.
     #[must_use]
     pub fn pairs(&self) -> &[(usize, usize)] {
         self.near.pairs()
     }
 
-    /// Sees to it that every pair of rows whose separation is at most `range_m` \[m\] is there.
+    /// Updates the pairs so that they contain every pair of rows with a separation of at most `range_m` \[m\].
     pub fn update(&mut self, positions_m: &Rows, range_m: f64) {
         if !self.holds(positions_m, range_m) {
             self.near.update(positions_m, (1.0 + SKIN) * range_m);
@@ -166,7 +166,7 @@ impl KeptPairs {
         }
     }
 
-    /// Whether no pair can be missing: not where a number is none.
+    /// Whether no pair can be missing; false if a value is NaN.
     fn holds(&self, positions_m: &Rows, range_m: f64) -> bool {
         let (count, free_m) = (positions_m.nrows(), (0.5 * SKIN - ROUNDING) * range_m);
         self.range_m == range_m
@@ -176,7 +176,7 @@ impl KeptPairs {
                 .all(|first| self.stay_within(free_m, positions_m, first..count.min(first + SIDE_BY_SIDE)))
     }
 
-    /// Whether these points, at most [`SIDE_BY_SIDE`], are no farther than that from where they were searched.
+    /// Whether these points, at most [`SIDE_BY_SIDE`], are within `free_m` of their positions at the last search.
     fn stay_within(&self, free_m: f64, positions_m: &Rows, points: Range<usize>) -> bool {
         let mut squares_m2 = [0.0; SIDE_BY_SIDE];
         for (now_m, searched_m) in columns(positions_m).into_iter().zip(columns(&self.searched_m)) {
@@ -187,16 +187,16 @@ impl KeptPairs {
     }
 }
 
-/// Who is near to each vehicle, in index order. Nothing is allocated once the lists have grown.
+/// Near vehicles of each vehicle, in index order. Allocates nothing once the lists have grown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NearLists {
-    /// For each vehicle the end of its list in `others`.
+    /// End of the list of each vehicle in `others`.
     ends: Vec<usize>,
     others: Vec<usize>,
 }
 
 impl NearLists {
-    /// The lists of these pairs i < j, which are in ascending order, of so many vehicles.
+    /// Builds the lists of `count` vehicles from pairs i < j in ascending order.
     pub(crate) fn update(&mut self, count: usize, pairs: &[(usize, usize)]) {
         let Self { ends, others } = self;
         ends.clear();
@@ -218,7 +218,7 @@ impl NearLists {
         }
     }
 
-    /// Who is near to vehicle `i`.
+    /// Returns the near vehicles of vehicle `i`.
     pub(crate) fn of(&self, i: usize) -> &[usize] {
         let start = if i == 0 { 0 } else { self.ends[i - 1] };
         &self.others[start..self.ends[i]]
@@ -246,13 +246,20 @@ mod tests {
         ]
     }
 
+    fn points() -> impl Strategy<Value = Vec<[f64; 3]>> {
+        prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..60)
+    }
+
+    /// Ranges with extreme and invalid values.
+    const RANGES_M: [f64; 8] = [0.0, 1.0, 1e-9, 1e3, 1e10, f64::MAX, -1.0, f64::NAN];
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(512))]
 
         #[test]
-        fn cells_find_what_comparing_all_pairs_finds(
-            tables in prop::collection::vec(prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..60), 1..4),
-            range_m in prop_oneof![0.0..3.0, prop::sample::select(vec![0.0, 1.0, 1e-9, 1e3, 1e10, f64::MAX, -1.0, f64::NAN])],
+        fn cells_find_the_same_pairs_as_a_full_search(
+            tables in prop::collection::vec(points(), 1..4),
+            range_m in prop_oneof![0.0..3.0, prop::sample::select(RANGES_M.to_vec())],
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
         ) {
             let mut near = NearPairs::default();
@@ -267,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_swarm_in_the_plane_and_in_space_is_searched_whole() {
+    fn all_near_pairs_of_a_large_swarm_are_found() {
         for (count, depth) in [(1500_u32, 0.0), (1500, 1.0)] {
             let place = |k: u32| {
                 let [x, y, z] =
@@ -287,7 +294,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_pair_within_the_range_is_ever_missing(
+        fn kept_pairs_contain_every_pair_within_the_range(
             start in prop::collection::vec(-4.0..4.0_f64, 90),
             steps in prop::collection::vec((prop::collection::vec(-1.0..1.0_f64, 90), 0.01..0.6_f64), 1..12),
             ranges_m in prop::collection::vec(prop::sample::select(vec![0.5, 1.5, 1.5, 1.5]), 12),
@@ -309,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_move_little_are_not_searched_anew_and_what_is_no_number_is() {
+    fn the_search_repeats_after_large_moves_and_for_nan() {
         let mut kept = KeptPairs::default();
         let mut positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 1.2, 0.0, 0.0]);
         kept.update(&positions_m, 1.0);
@@ -325,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn each_vehicle_has_its_others_in_index_order() {
+    fn near_lists_are_in_index_order() {
         let mut lists = NearLists::default();
         for (pairs, expected) in [
             (&[(0, 2), (0, 3), (1, 2), (2, 4)][..], [&[2, 3][..], &[2], &[0, 1, 4], &[0], &[2]]),

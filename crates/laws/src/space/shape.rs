@@ -1,40 +1,40 @@
-//! Solids that a vehicle may have to keep clear of.
+//! Shapes of obstacles and distances from their surfaces.
 
 use nalgebra::Vector3;
 
-/// The form of an obstacle around its place.
+/// Shape of an obstacle around its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// A ball.
+    /// Ball.
     Ball {
         /// Radius \[m\].
         radius_m: f64,
     },
-    /// A box, upright.
+    /// Upright box.
     Box {
-        /// Half of its lengths \[m\].
+        /// Half side lengths \[m\].
         half_m: Vector3<f64>,
-        /// How far it is turned about the vertical \[deg\], counter-clockwise from above.
+        /// Rotation about the vertical \[deg\], counterclockwise from above.
         yaw_deg: f64,
     },
-    /// Everything within a radius of a straight line.
+    /// Capsule: all points within a radius of a straight line segment.
     Capsule {
-        /// One end of the line, from the place of the obstacle \[m\].
+        /// One end of the segment, relative to the obstacle's position \[m\].
         from_m: Vector3<f64>,
         /// The other end \[m\].
         to_m: Vector3<f64>,
         /// Radius \[m\].
         radius_m: f64,
     },
-    /// Everything behind a plane through the place of the obstacle.
+    /// Half-space behind a plane through the obstacle's position.
     HalfSpace {
-        /// Points out of it; of any length but zero.
+        /// Outward normal, of any nonzero length.
         normal: Vector3<f64>,
     },
 }
 
 impl Shape {
-    /// How far its points are from its place at most \[m\], as far as it has an end.
+    /// Returns the largest distance of its points from its position \[m\]; 0 for a half-space, which is unbounded.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
         match *self {
@@ -45,12 +45,12 @@ impl Shape {
         }
     }
 
-    /// Distance of a point from the surface \[m\], below zero within, and the unit normal of the surface point that is
-    /// nearest, pointing out: the direction in which the distance grows by one metre a metre. The point is given from the
-    /// obstacle's place \[m\].
+    /// Returns the distance of a point from the surface \[m\], negative inside, and the outward unit normal at the
+    /// nearest surface point, which is the gradient of the distance. The point is relative to the obstacle's position
+    /// \[m\].
     ///
-    /// Where several surface points are nearest (the centre of a ball, the axis of a capsule, an inner diagonal of a box)
-    /// the normal is that of one of them.
+    /// If several surface points are nearest (centre of a ball, axis of a capsule, inner diagonal of a box), the normal
+    /// is that of one of them.
     #[must_use]
     pub fn signed_distance_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
         match *self {
@@ -79,14 +79,14 @@ impl Shape {
     }
 }
 
-/// Outside a core by the given vector: distance from the surface `radius_m` around the core, and the normal, which is
-/// `instead` on the core itself.
+/// Returns distance and normal for the surface at `radius_m` around a core, from the vector `off` that points from the
+/// core to the point. On the core itself the normal is `instead`.
 fn from_core(off: Vector3<f64>, radius_m: f64, instead: Vector3<f64>) -> (f64, Vector3<f64>) {
     let distance_m = off.norm();
     (distance_m - radius_m, if distance_m > 0.0 { off / distance_m } else { instead })
 }
 
-/// The same for a box along the axes around the origin.
+/// Returns distance and normal for an axis-aligned box about the origin.
 fn from_box(point: Vector3<f64>, half_m: Vector3<f64>) -> (f64, Vector3<f64>) {
     let off = point.zip_map(&half_m, |x, half| x - x.clamp(-half.max(0.0), half.max(0.0)));
     if off.norm_squared() > 0.0 {
@@ -99,7 +99,7 @@ fn from_box(point: Vector3<f64>, half_m: Vector3<f64>) -> (f64, Vector3<f64>) {
     (depths[axis], normal)
 }
 
-/// A unit vector at right angles to another, up as far as it can be.
+/// Returns a unit vector perpendicular to `along`, as far upwards as possible.
 fn across(along: Vector3<f64>) -> Vector3<f64> {
     let up = Vector3::z() * along.norm_squared() - along * along.z;
     up.try_normalize(0.0).unwrap_or_else(|| if along.z == 0.0 { Vector3::z() } else { Vector3::x() })
@@ -136,7 +136,7 @@ mod tests {
         ]
     }
 
-    /// Distance from the surface by the library that has shapes of its own.
+    /// Distance from the surface computed by parry.
     fn by_parry(shape: &Shape, point: Vector3<f64>) -> f64 {
         let vector = |v: Vector3<f64>| Vector::new(v.x, v.y, v.z);
         let point = vector(point);
@@ -160,13 +160,13 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
-        fn distances_are_those_of_parry(shape in shape(), point in vector(5.0)) {
+        fn distances_match_parry(shape in shape(), point in vector(5.0)) {
             let (distance_m, _) = shape.signed_distance_m(point);
             prop_assert!((distance_m - by_parry(&shape, point)).abs() < TOLERANCE_M, "{shape:?}: {distance_m}");
         }
 
         #[test]
-        fn the_surface_is_as_far_as_said_along_the_normal_and_nowhere_nearer(
+        fn the_surface_lies_at_the_distance_along_the_normal(
             shape in shape(), point in vector(5.0), directions in prop::collection::vec(vector(1.0), 200),
         ) {
             let (distance_m, normal) = shape.signed_distance_m(point);
@@ -180,18 +180,18 @@ mod tests {
         }
 
         #[test]
-        fn the_normal_is_where_the_distance_grows(shape in shape(), point in vector(5.0)) {
+        fn the_normal_is_the_gradient_of_the_distance(shape in shape(), point in vector(5.0)) {
             const STEP_M: f64 = 1e-6;
             let (distance_m, normal) = shape.signed_distance_m(point);
             let (farther_m, same) = shape.signed_distance_m(point + normal * STEP_M);
-            // Not where the nearest feature changes within the step.
+            // Excludes points where the nearest feature changes within the step.
             prop_assume!((same - normal).norm() < 1e-3);
             prop_assert!((farther_m - distance_m - STEP_M).abs() < 1e-9, "{shape:?}");
         }
     }
 
     #[test]
-    fn a_point_with_many_nearest_surface_points_has_the_normal_of_one() {
+    fn the_normal_is_defined_where_several_surface_points_are_nearest() {
         let up = Vector3::z();
         assert_eq!(Shape::Ball { radius_m: 2.0 }.signed_distance_m(Vector3::zeros()), (-2.0, up));
         let capsule = |to_m| Shape::Capsule { from_m: Vector3::zeros(), to_m, radius_m: 0.5 };

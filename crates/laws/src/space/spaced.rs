@@ -1,4 +1,4 @@
-//! Points that keep a distance from each other.
+//! Point sets with a minimum spacing, and the closest pair of a table.
 
 use std::collections::HashMap;
 
@@ -6,11 +6,10 @@ use nalgebra::Vector3;
 
 use tautline_core::swarm::{Pair, Rows, first_row_not_finite, separation};
 
-/// A set of points of which no two are within a distance of each other. Inserting takes constant time.
+/// Set of points in which every two are farther apart than a given distance. Insertion takes constant time.
 ///
-/// Points lie in cubic cells of twice the distance, so whatever is within the distance of a point is in its cell or in
-/// one that touches it, rounding of the cell's number included; and a cell holds few points, because they keep their
-/// distance.
+/// Points lie in cubic cells of twice the distance. Points within the distance are therefore in the same or adjacent
+/// cells, rounding of the cell number included. A cell holds few points because of the spacing.
 #[derive(Clone, Debug)]
 pub struct Spaced {
     distance_m: f64,
@@ -19,17 +18,17 @@ pub struct Spaced {
 }
 
 impl Spaced {
-    /// No points yet; `distance_m` must be positive.
+    /// Creates an empty set; `distance_m` must be positive.
     #[must_use]
     pub fn new(distance_m: f64) -> Self {
         Self { distance_m, cells: HashMap::new(), count: 0 }
     }
 
-    /// Adds a point, unless one of those before it (numbered from 0 in order of insertion; the lowest is named) is at
-    /// the distance or nearer.
+    /// Adds a point, unless an earlier one is at the distance or nearer. Points are numbered from 0 in order of
+    /// insertion.
     ///
     /// # Errors
-    /// That one and its separation \[m\], and the point is not added.
+    /// Returns the lowest such point and its separation \[m\]; the new point is not added.
     pub fn insert(&mut self, point: Vector3<f64>) -> Result<(), (usize, f64)> {
         let cell = self.cell(point);
         let mut nearest: Option<(usize, f64)> = None;
@@ -54,7 +53,7 @@ impl Spaced {
         Ok(())
     }
 
-    /// The cell of a point; coordinates beyond 2^62 cells share the last one.
+    /// Returns the cell of a point; coordinates beyond 2^62 cells share the last one.
     fn cell(&self, point: Vector3<f64>) -> [i64; 3] {
         const LAST: f64 = (1_i64 << 62) as f64;
         #[expect(clippy::cast_possible_truncation, reason = "clamped to what an i64 holds")]
@@ -63,8 +62,8 @@ impl Spaced {
     }
 }
 
-/// The two nearest rows of a table of positions and their distance \[m\]; the first such pair in index order, and none
-/// for fewer than two rows or where a number is not finite.
+/// Returns the two nearest rows of a table of positions and their distance \[m\]. Ties go to the first pair in index
+/// order. `None` for fewer than two rows or a value that is not finite.
 ///
 /// Sweeps along the axis of the greatest extent: O(N log N) for spread-out positions, O(N^2) at worst.
 #[must_use]
@@ -103,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_at_exactly_the_distance_is_too_near_and_one_beyond_is_not() {
+    fn a_point_at_the_minimum_spacing_is_rejected() {
         let mut spaced = Spaced::new(2.0);
         assert_eq!(spaced.insert(Vector3::zeros()), Ok(()));
         assert_eq!(spaced.insert(Vector3::new(2.0, 0.0, 0.0)), Err((0, 2.0)));
@@ -112,7 +111,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn cells_find_what_comparing_all_pairs_finds(
+        fn cells_find_the_same_pairs_as_a_full_search(
             points in prop::collection::vec([-3.0..3.0, -3.0..3.0, -0.5..0.5], 1..40),
             distance_m in 0.05..1.5,
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
@@ -138,20 +137,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_closest_pair_is_that_of_the_full_search(
+        fn the_closest_pair_matches_a_full_search(
             points in prop::collection::vec([coordinate(), coordinate(), coordinate()], 0..30),
         ) {
             let positions_m = Rows::from_row_slice(&points.concat());
             let distances = (0..points.len()).flat_map(|i| (i + 1..points.len()).map(move |j| Pair::new(i, j)));
             let distances = distances.map(|pair| (separation(&positions_m, pair.first(), pair.second()), pair));
             let is_finite = points.iter().flatten().all(|x| x.is_finite());
-            let expected = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).filter(|_| is_finite).map(|(distance_m, pair)| (pair, distance_m));
+            let least = distances.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).filter(|_| is_finite);
+            let expected = least.map(|(distance_m, pair)| (pair, distance_m));
             prop_assert_eq!(closest_pair(&positions_m), expected);
         }
     }
 
     #[test]
-    fn the_closest_pair_of_less_than_two_or_not_finite_positions_is_none() {
+    fn the_closest_pair_needs_two_finite_positions() {
         let rows = |points: &[[f64; 3]]| Rows::from_row_slice(&points.concat());
         assert_eq!(closest_pair(&Rows::zeros(1)), None);
         assert_eq!(closest_pair(&rows(&[[0.0; 3], [f64::NAN; 3], [1.0; 3]])), None);

@@ -1,4 +1,4 @@
-//! What counts as a reached formation.
+//! Arrival criteria: when a formation counts as reached.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,23 +7,24 @@ use crate::formation::{Formation, Freedom, PositionError, largest_edge_error_m};
 use crate::graph::Graph;
 use tautline_core::swarm::{Swarm, row, separation};
 
-/// Times are sums and products of steps: this much shorter than `hold_s` still counts as held \[s\].
+/// Tolerance of `hold_s` \[s\], because times are sums and products of steps.
 const TIME_ROUNDING_S: f64 = 1e-9;
 
-/// What counts as a reached formation: to the end of the flight, and at least for `hold_s`, both limits hold, and
-/// no vehicle is more than `edge_error_m` from its slot in the formation laid over them: turned and perhaps mirrored under a law
-/// that holds distances, moved alone under one that holds displacements, where the reference has carried it under one that
-/// follows a reference.
+/// Arrival criteria. To the end of the run, and at least for `hold_s`, both limits must hold, and every vehicle must be
+/// within `edge_error_m` of its slot in the fitted formation.
+///
+/// Under a law that controls distances the fit may rotate, mirror and translate the formation. Under a law that
+/// controls displacements it may translate it. Under a law that follows a reference, the slots move with the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Arrival {
-    /// Largest error of a desired distance over the edges of the graph, and of a vehicle's place in the formation, in m.
+    /// Largest error of a desired distance over the graph's edges, and of a vehicle's position in the formation, in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub edge_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, in m/s.
+    /// Largest speed relative to the swarm's mean velocity, or to the reference's if one is followed, in m/s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub disagreement_m_s: f64,
-    /// Shortest time for which all of it must hold in s.
+    /// Shortest time for which all limits must hold in s.
     #[schemars(extend("minimum" = 0))]
     pub hold_s: f64,
 }
@@ -34,23 +35,23 @@ impl Default for Arrival {
     }
 }
 
-/// How far a swarm is from its formation.
+/// Errors of a swarm with respect to its formation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
     /// Largest error of a desired distance over the graph's edges \[m\].
     pub max_edge_error_m: f64,
-    /// Root mean square distance from the formation in its best place \[m\]: turned and perhaps mirrored where it is free to
-    /// be.
+    /// Root mean square distance from the fitted formation \[m\]. The fit may rotate and mirror it if the law allows
+    /// this.
     pub rms_position_error_m: f64,
-    /// Distance of the vehicle that is farthest from its slot in that place \[m\].
+    /// Largest distance of a vehicle from its slot in the fitted formation \[m\].
     pub max_position_error_m: f64,
-    /// Largest speed relative to the mean velocity, or to the reference's where it is followed \[m/s\].
+    /// Largest speed relative to the mean velocity, or to the reference's if one is followed \[m/s\].
     pub disagreement_m_s: f64,
 }
 
 impl Distance {
-    /// Of a swarm from a formation that is free to be moved so from where the reference has carried it: O(edges), and no more than
-    /// [`largest_edge_error_m`] looks at.
+    /// Computes the errors of a swarm with respect to a formation at the reference, fitted within `freedom`. Takes
+    /// O(edges), or O(N) if [`largest_edge_error_m`] uses its bound.
     #[must_use]
     pub fn of(swarm: &Swarm, formation: &Formation, reference: &Reference, graph: &Graph, freedom: Freedom) -> Self {
         let error = PositionError::of(&swarm.positions_m, formation, reference.position_m, freedom);
@@ -62,7 +63,7 @@ impl Distance {
         }
     }
 
-    /// Largest speed relative to what the vehicles are meant to have in common \[m/s\].
+    /// Returns the largest speed relative to the common velocity \[m/s\].
     fn disagreement_m_s(swarm: &Swarm, reference: &Reference, freedom: Freedom) -> f64 {
         let relative_m_s = |i: usize| (row(&swarm.velocities_m_s, i) - reference.velocity_m_s).norm();
         match freedom {
@@ -71,7 +72,7 @@ impl Distance {
         }
     }
 
-    /// Of a run without samples: nothing is known.
+    /// Returns the errors of a run without samples: all NaN.
     #[must_use]
     pub fn unknown() -> Self {
         Self {
@@ -84,10 +85,11 @@ impl Distance {
 }
 
 impl Arrival {
-    /// Whether a swarm is within the limits of a formation, as [`Arrival::is_within`] says of its [`Distance::of`] it.
+    /// Whether a swarm is within the limits, as [`Arrival::is_within`] of its [`Distance::of`].
     ///
-    /// Looks at speeds first, then at some edges, then at places, and at all edges only where places do not decide: vehicles within
-    /// e of their slots have distances within 2 e of those of the slots. O(N) except near the limits, and no allocation.
+    /// Checks speeds first, then some edges, then positions. Checks all edges only if positions do not decide: vehicles
+    /// within e of their slots have distances within 2 e of the desired ones. O(N) except near the limits, without
+    /// allocation.
     #[must_use]
     pub fn holds(
         &self,
@@ -112,7 +114,7 @@ impl Arrival {
                 || largest_edge_error_m(positions_m, formation, graph) <= self.edge_error_m)
     }
 
-    /// Whether everything is within the limits at this instant; never where a number is not finite.
+    /// Whether all errors are within the limits; false for values that are not finite.
     #[must_use]
     pub fn is_within(&self, distance: &Distance) -> bool {
         distance.max_edge_error_m <= self.edge_error_m
@@ -120,7 +122,7 @@ impl Arrival {
             && distance.disagreement_m_s <= self.disagreement_m_s
     }
 
-    /// Whether limits that have been kept from one time to another \[s\] have been kept for long enough.
+    /// Whether limits that held from one time to another \[s\] held long enough.
     #[must_use]
     pub fn is_held(&self, since_s: f64, until_s: f64) -> bool {
         until_s - since_s >= self.hold_s - TIME_ROUNDING_S
@@ -133,7 +135,7 @@ mod tests {
     use tautline_core::swarm::set_row;
 
     #[test]
-    fn every_limit_is_a_limit_and_what_is_not_a_number_is_not_within() {
+    fn each_arrival_limit_counts_and_nan_is_outside() {
         let arrival = Arrival::default();
         let good = Distance {
             max_edge_error_m: 0.01,
@@ -150,13 +152,13 @@ mod tests {
     }
 
     #[test]
-    fn one_vehicle_beside_its_slot_keeps_many_from_having_arrived_on_graphs_that_do_not_feel_it() {
+    fn one_displaced_vehicle_prevents_arrival_without_edge_errors() {
         let count = 400;
         let formation = Formation::grid(count, 2.0);
         let graph = Graph::star(count);
         let hub_m = row(&formation.slots_m, 0);
         let mut swarm = Swarm::at_rest(formation.slots_m.clone());
-        // Across the edge to the hub: its length stays as it is to second order.
+        // The displacement is across the edge to the hub, whose length changes only to second order.
         let along = (row(&swarm.positions_m, 399) - hub_m).normalize();
         let off_m = row(&swarm.positions_m, 399) + 0.19 * nalgebra::Vector3::new(-along.y, along.x, 0.0);
         set_row(&mut swarm.positions_m, 399, off_m);
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn held_means_for_as_long_as_asked_but_for_rounding() {
+    fn hold_time_tolerates_rounding() {
         let arrival = Arrival { hold_s: 0.3, ..Arrival::default() };
         assert!(arrival.is_held(0.1, 0.1 + 0.1 + 0.2) && !arrival.is_held(0.1, 0.399));
     }

@@ -1,5 +1,5 @@
-//! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past; and before that,
-//! where vehicles are interchangeable, other slots for them.
+//! Deadlock recovery: reassigns interchangeable vehicles of a stalled swarm, or spreads its slots for a while so that
+//! vehicles can pass each other.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,11 +9,11 @@ use crate::formation::{Formation, Freedom};
 use crate::formation::{optimal_slots, optimal_slots_around};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row};
 
-/// When slots are spread, or interchangeable vehicles get others.
+/// Condition for spreading slots or reassigning interchangeable vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BreathingMode {
-    /// When the swarm is stalled, under a law whose promise is renewed then.
+    /// When the swarm is stalled, under a law whose certificate can be computed again.
     #[default]
     Auto,
     /// From the start of every leg, and when the swarm is stalled.
@@ -22,24 +22,24 @@ pub enum BreathingMode {
     Off,
 }
 
-/// How slots are spread.
+/// Spreading of slots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Breathing {
-    /// When.
+    /// Condition for spreading slots.
     pub mode: BreathingMode,
-    /// By how much the first time, about their centre; each time by one more.
+    /// First scale of the slots about their centre; each further time on a leg it is larger by one.
     #[schemars(extend("minimum" = 1))]
     pub scale: f64,
-    /// How often on a leg, at most.
+    /// Largest number of times that slots are spread on a leg.
     pub most: u32,
-    /// How long spread slots are held at least in s.
+    /// Shortest time for which spread slots are held in s.
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(extend("minimum" = 0, "default" = 0.0))]
     pub hold_s: f64,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(hold_s: &f64) -> bool {
     *hold_s == 0.0
 }
@@ -51,14 +51,14 @@ impl Default for Breathing {
 }
 
 impl Breathing {
-    /// Whether slots are spread at all.
+    /// Whether slots may be spread at all.
     #[must_use]
     pub fn is_on(&self) -> bool {
         self.mode != BreathingMode::Off && self.most > 0
     }
 }
 
-/// How errors of position settle under a law where nothing stands in their way.
+/// Settling of position errors under a law without contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settling {
     /// Rate of the slowest mode \[1/s\].
@@ -67,57 +67,63 @@ pub struct Settling {
     pub response_s: f64,
 }
 
-/// What a [supervisor](super::Supervisor) changed within a leg.
+/// Change of the target within a leg by a [supervisor](super::Supervisor).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
-    /// A breath began: slots are spread.
+    /// Slots are spread.
     Spread {
-        /// They are scaled by this about their centre, or about a leader's slot.
+        /// Scale of the slots about their centre, or about a leader's slot.
         scale: f64,
     },
-    /// Vehicles go to other slots.
+    /// Vehicles are reassigned to slots.
     Assigned {
-        /// Vehicle i goes to the slot that was vehicle `slots[i]`'s.
+        /// Vehicle i goes to the slot of vehicle `slots[i]`.
         slots: Vec<usize>,
     },
 }
 
-/// The root mean square speed below this part of the error times the rate of the law's slowest mode is no progress.
-const SLOW: f64 = 0.2;
-/// No progress for this long is a stall \[s\]; for twice as long as a law takes to bring vehicles from rest to that speed, where
-/// that is longer.
+/// Progress threshold: a root mean square speed below this fraction of (error times rate of the slowest mode) is no
+/// progress.
+const PROGRESS: f64 = 0.2;
+/// Time without progress that counts as a stall \[s\], unless twice the time in which the law brings vehicles from rest
+/// to the threshold speed is longer.
 const STALLED_S: f64 = 2.0;
-/// Errors of so many times what counts as reached are worth a breath.
-const WORTH: f64 = 2.0;
-/// After so long without progress spread slots are given up \[s\].
+/// Smallest error that justifies spreading, in units of the arrival limit.
+const MIN_ERROR: f64 = 2.0;
+/// Time without progress after which spread slots are given up \[s\].
 const GIVEN_UP_S: f64 = 10.0;
-/// Spread slots are held until no vehicle is farther from its own than this part of the distance of the slots.
+/// Largest error at which spread slots are closed, as a fraction of the smallest slot distance.
 const SETTLED: f64 = 0.25;
-/// Slots then come together with this e-folding time \[s\].
-const FOLDING_S: f64 = 2.0;
-/// Spread by less than this they are those of the leg again.
+/// Time constant with which spread slots close \[s\].
+const CLOSING_S: f64 = 2.0;
+/// Excess scale below which the slots are those of the leg again.
 const CLOSED: f64 = 0.01;
 
-/// Where a breath is.
+/// Phase of the recovery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// Slots are those of the leg; no progress has been made since this time \[s\].
+    /// Slots are those of the leg; no progress since this time \[s\].
     Flying { idle_since_s: Option<f64> },
-    /// Slots are spread since the one time, and no progress towards them has been made since the other \[s\].
+    /// Slots have been spread since `since_s`, without progress towards them since `idle_since_s` \[s\].
     Spread { scale: f64, since_s: f64, idle_since_s: Option<f64> },
-    /// Slots come together since this time \[s\].
+    /// Slots have been closing since this time \[s\].
     Closing { scale: f64, since_s: f64 },
 }
 
 /// Spreads the slots of a leg when the swarm is stalled.
 ///
-/// Stalled is a swarm whose vehicles are more than twice the limit of arrival from their slots and for 2 s or more move slower, root
-/// mean square, than 0.2 of the rate of the law's slowest mode times their root mean square error ([`Settling`]). Slots are then scaled about their centre, or
-/// about a leader's slot, held until every vehicle is within a quarter of the smallest slot distance of its own or no progress
-/// is made for 10 s, but at least for `hold_s`, and come together with an e-folding time of 2 s.
+/// The swarm is stalled if for 2 s or more two conditions hold:
 ///
-/// Where vehicles are interchangeable, they are first given the slots with the shortest ways from where they are; slots are
-/// spread where they have them already, or have been given others `most` times on the leg.
+/// - some vehicle is more than twice the arrival limit from its slot;
+/// - the root mean square speed is below 0.2 of the rate of the law's slowest mode times the root mean square error
+///   ([`Settling`]).
+///
+/// Slots are then scaled about their centre, or about a leader's slot. They are held at least for `hold_s`, until every
+/// vehicle is within a quarter of the smallest slot distance of its slot or there is no progress for 10 s. They close
+/// with a time constant of 2 s.
+///
+/// Interchangeable vehicles are first reassigned to the slots with the least sum of squared distances. Slots are spread
+/// if the assignment is optimal already, or after `most` assignments on the leg.
 #[derive(Clone, Debug)]
 pub(super) struct Breather {
     breathing: Breathing,
@@ -128,11 +134,11 @@ pub(super) struct Breather {
     phase: Phase,
     breaths: u32,
     assignments: u32,
-    /// Until it is taken.
+    /// Last change, until it is taken.
     change: Option<Change>,
 }
 
-/// Errors and speeds relative to what the formation may be moved by.
+/// Errors and speeds after removal of the motions that the formation is free to make.
 struct Errors {
     rms_m: f64,
     max_m: f64,
@@ -167,16 +173,16 @@ impl Breather {
         freedom: Freedom,
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
-        let tolerance_m = WORTH * arrival.edge_error_m;
+        let tolerance_m = MIN_ERROR * arrival.edge_error_m;
         Self { breathing, settling, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
     }
 
-    /// Looks at errors apart from what all have in common.
-    pub(super) fn forgive_common_errors(&mut self) {
+    /// Removes the common position error of all vehicles from the errors.
+    pub(super) fn ignore_common_errors(&mut self) {
         self.freedom = Freedom::Translation;
     }
 
-    /// A leg has begun with its slots as they are given.
+    /// Resets the recovery at the beginning of a leg.
     pub(super) fn begin_leg(&mut self) {
         self.phase = Phase::Flying { idle_since_s: None };
         (self.breaths, self.assignments) = (0, 0);
@@ -187,21 +193,21 @@ impl Breather {
         matches!(self.phase, Phase::Flying { .. })
     }
 
-    /// What has been changed since this was taken.
+    /// Takes the last change.
     pub(super) fn take_change(&mut self) -> Option<Change> {
         self.change.take()
     }
 
     fn is_idle(&self, errors: &Errors) -> bool {
-        errors.max_m > self.tolerance_m && errors.rms_m_s < SLOW * self.settling.rate_per_s * errors.rms_m
+        errors.max_m > self.tolerance_m && errors.rms_m_s < PROGRESS * self.settling.rate_per_s * errors.rms_m
     }
 
-    /// No progress for this long is a stall \[s\].
+    /// Returns the time without progress that counts as a stall \[s\].
     fn stalled_s(&self) -> f64 {
-        STALLED_S.max(2.0 * SLOW * self.settling.response_s)
+        STALLED_S.max(2.0 * PROGRESS * self.settling.response_s)
     }
 
-    /// Spreads the slots of a leg, once more.
+    /// Spreads the slots of a leg, unless the limit of times is reached.
     fn breathe(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
         if self.breaths >= self.breathing.most {
             return;
@@ -213,12 +219,13 @@ impl Breather {
         target.spread_formation(&leg.formation, scale, self.leader);
     }
 
-    /// Gives interchangeable vehicles slots with shorter ways. Whether there are any.
+    /// Reassigns interchangeable vehicles. Returns false if no assignment is better or the limit of assignments is
+    /// reached.
     fn assign(&mut self, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) -> bool {
         if !leg.interchangeable || self.assignments >= self.breathing.most {
             return false;
         }
-        let Some(slots) = shorter_ways(&sensed.positions_m, &leg.formation, self.leader) else { return false };
+        let Some(slots) = better_assignment(&sensed.positions_m, &leg.formation, self.leader) else { return false };
         self.assignments += 1;
         target.set_formation(&leg.formation.reordered(&slots));
         self.change = Some(Change::Assigned { slots });
@@ -226,7 +233,7 @@ impl Breather {
         true
     }
 
-    /// Looks at the swarm on its way to the slots of `leg` and may spread them, or give vehicles others.
+    /// Checks the progress of the swarm to the slots of `leg`, and may spread them or reassign vehicles.
     pub(super) fn supervise(&mut self, time_s: f64, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) {
         let errors = Errors::of(sensed, &target.view(), self.freedom);
         match self.phase {
@@ -243,7 +250,7 @@ impl Breather {
                 let slots_m = leg.formation.min_distance().map_or(f64::INFINITY, |(_, distance_m)| distance_m);
                 let idle_since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Spread { scale, since_s, idle_since_s };
-                // Those who come no nearer to spread slots either are not in each other's way.
+                // Vehicles without progress towards spread slots are not blocked by each other.
                 let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S.max(self.stalled_s()));
                 let is_held = time_s - since_s >= self.breathing.hold_s;
                 if is_held && (errors.max_m < SETTLED * slots_m || gives_up) {
@@ -251,7 +258,7 @@ impl Breather {
                 }
             }
             Phase::Closing { scale, since_s } => {
-                let beyond = (scale - 1.0) * libm::exp((since_s - time_s) / FOLDING_S);
+                let beyond = (scale - 1.0) * libm::exp((since_s - time_s) / CLOSING_S);
                 if beyond < CLOSED {
                     self.phase = Phase::Flying { idle_since_s: None };
                     target.set_formation(&leg.formation);
@@ -263,12 +270,12 @@ impl Breather {
     }
 }
 
-/// The sum of squared ways must become less by more than this part of it.
-const SHORTER: f64 = 1e-9;
+/// Relative decrease of the sum of squared distances that justifies a new assignment.
+const IMPROVEMENT: f64 = 1e-9;
 
-/// Whose slot each vehicle gets so that the sum of squared ways is least, where that is less than it is; a leader keeps its
-/// own. Wherever the formation is moved to, the same ones are best.
-fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
+/// Returns the assignment with the least sum of squared distances if it is better than the present one; a leader keeps
+/// its slot. The result does not depend on a translation of the formation.
+fn better_assignment(positions_m: &Rows, formation: &Formation, leader: Option<usize>) -> Option<Vec<usize>> {
     let found = match leader {
         Some(leader) => optimal_slots_around(positions_m, formation, leader)?,
         None => optimal_slots(positions_m, formation, Freedom::Fixed)?,
@@ -278,11 +285,11 @@ fn shorter_ways(positions_m: &Rows, formation: &Formation, leader: Option<usize>
     let way = |i: usize, slot: usize| row(positions_m, i) - row(&formation.slots_m, slot);
     let mean_m = free().map(|i| way(i, i)).sum::<Vector3<f64>>() / free().count().max(1) as f64;
     let sum = |slot: &dyn Fn(usize) -> usize| free().map(|i| (way(i, slot(i)) - mean_m).norm_squared()).sum::<f64>();
-    (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - SHORTER)).then_some(found)
+    (sum(&|i| found[i]) < sum(&|i| i) * (1.0 - IMPROVEMENT)).then_some(found)
 }
 
 impl Leg {
-    /// Its slots scaled about the slot of a leader, or about their centre.
+    /// Returns the slots scaled about the slot of a leader, or about their centre.
     #[must_use]
     pub fn spread(&self, scale: f64, leader: Option<usize>) -> Formation {
         let mut formation = self.formation.clone();
@@ -298,7 +305,7 @@ mod tests {
     const SETTLING: Settling = Settling { rate_per_s: 1.0, response_s: 1.0 };
     const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
 
-    /// The spread of the target at times 0, 0.5, 1, ... while vehicle 2 is `off(time)` m from its slot of the leg.
+    /// Returns the spread at times 0, 0.5, 1, ... while vehicle 2 is at x = `off_m(time)` \[m\].
     fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
@@ -315,16 +322,16 @@ mod tests {
     }
 
     #[test]
-    fn a_swarm_that_stands_elsewhere_breathes_once_it_has_for_long_enough() {
+    fn slots_spread_after_a_stall_and_close_again() {
         let found = spreads(Breathing::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
         assert_eq!(found[..13], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
-        // Settled at 6 s: from then on 1 + exp(-t/2), until that is 1.01.
+        // Settled at 6 s: from then on 1 + exp(-t/2), until it falls below 1.01.
         assert!((found[14] - (1.0 + libm::exp(-0.5))).abs() < 1e-15, "{found:?}");
         assert!(found[15..].windows(2).all(|pair| pair[1] <= pair[0]) && found[39] == 1.0);
     }
 
     #[test]
-    fn spread_slots_are_held_as_long_as_is_asked_for() {
+    fn spread_slots_are_held_for_the_given_time() {
         let breathing = Breathing { hold_s: 9.0, ..Breathing::default() };
         let found = spreads(breathing, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
         // Spread at 2 s, settled at 6 s, held to 11 s.
@@ -333,9 +340,9 @@ mod tests {
     }
 
     #[test]
-    fn the_next_breath_is_deeper_and_after_the_last_there_is_none() {
+    fn slots_spread_further_each_time_up_to_the_limit() {
         let breathing = Breathing { most: 2, ..Breathing::default() };
-        // Settles whenever slots are spread, and is off again when they are not.
+        // Settles whenever slots are spread, and has an error again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
         let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Translation);
@@ -351,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn who_arrives_or_moves_or_is_not_to_breathe_does_not_and_who_begins_so_does() {
+    fn slots_stay_on_arrival_or_with_mode_off_and_spread_with_mode_start() {
         assert!(spreads(Breathing::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
         let off = Breathing { mode: BreathingMode::Off, most: 0, ..Breathing::default() };
         assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
@@ -359,7 +366,7 @@ mod tests {
         assert_eq!(spreads(start, |_| 0.0, 1), [2.0]);
     }
 
-    /// What is changed while vehicles stand so far from their first slots along x.
+    /// Returns the changes while the vehicles stand at these places along x.
     fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
         let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
         let mut leg = leg.clone();
@@ -381,17 +388,17 @@ mod tests {
     }
 
     #[test]
-    fn interchangeable_vehicles_get_the_nearest_slots_and_breathe_only_where_they_have_them() {
+    fn interchangeable_vehicles_are_reassigned_before_slots_spread() {
         let given = Leg::first(Formation::line(3, 2.0));
         let leg = Leg { interchangeable: true, ..given.clone() };
         let assigned = |slots: [usize; 3]| Change::Assigned { slots: slots.to_vec() };
         let spread = [Change::Spread { scale: 2.0 }];
-        // In the slots of others, and at rest there: then nobody is anywhere else.
+        // With vehicles in each other's slots, the assignment leaves no error.
         assert_eq!(changes(&leg, None, [4.0, 0.0, 2.0]), [assigned([2, 0, 1])]);
         assert_eq!(changes(&leg, None, [4.5, 0.5, 2.5]), [assigned([2, 0, 1]), spread[0].clone()]);
         assert_eq!(changes(&leg, None, [0.5, 2.5, 4.5]), spread, "nothing is shorter");
         assert_eq!(changes(&given, None, [4.0, 0.0, 2.0]), spread, "each has its own");
-        // A leader keeps its slot, and the others share what is left.
+        // A leader keeps its slot, and the others share the remaining ones.
         assert_eq!(changes(&leg, Some(0), [0.0, 4.0, 2.0]), [assigned([0, 2, 1])]);
         assert_eq!(changes(&leg, Some(1), [2.0, 2.0, 2.0]), spread);
     }

@@ -1,32 +1,33 @@
-//! The legs of a flight as it was flown: when each began, and who went to which slot.
+//! Legs of a run as flown: when each began, and the assignment of vehicles to slots.
 
 use super::Leg;
 use crate::formation::Formation;
 use tautline_core::record::Event;
 
-/// Legs with the times at which they began and at which vehicles were assigned to their slots anew, as the flight tells.
+/// Legs with their start times and with the times of new assignments, as recorded in the events of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Course {
-    /// From when on \[s\] each leg, from 0, is under way, but for the first.
+    /// Start time \[s\] and index of each leg except the first.
     begun: Vec<(f64, usize)>,
-    /// From when on \[s\] vehicles go to these slots; the first from the start.
+    /// Time \[s\] from which each assignment holds, with the legs as assigned; the first holds from the start.
     assigned: Vec<(f64, Vec<Leg>)>,
 }
 
 impl Course {
-    /// A flight through these legs.
+    /// Creates the course of a run through these legs.
     #[must_use]
     pub fn new(legs: &[Leg]) -> Self {
         Self { begun: Vec::new(), assigned: vec![(f64::NEG_INFINITY, legs.to_vec())] }
     }
 
-    /// A leg, from 0, began at a time \[s\] that is not before that of another.
+    /// Records that a leg (from 0) began at a time \[s\]. Calls must be in order of time.
     pub fn begin(&mut self, leg: usize, time_s: f64) {
         self.begun.push((time_s, leg));
     }
 
-    /// From a time \[s\] on, not before that of another assignment, vehicle i goes to the slot that was vehicle `slots[i]`'s on
-    /// the leg under way and those that follow it ([`assign_anew`]). What is no order of the vehicles changes nothing.
+    /// Records an assignment at a time \[s\]: on the present leg and the following ones, vehicle i goes to the slot of
+    /// vehicle `slots[i]` ([`assign_anew`]). Calls must be in order of time. Ignores `slots` that are not a
+    /// permutation.
     pub fn assign(&mut self, slots: &[usize], time_s: f64) {
         let leg = self.leg_at(time_s);
         let Some((_, legs)) = self.assigned.last() else { return };
@@ -36,7 +37,7 @@ impl Course {
         }
     }
 
-    /// Takes an event: a leg that began, or an assignment.
+    /// Records an event if it is the start of a leg or an assignment.
     pub fn note(&mut self, event: &Event) {
         match event {
             &Event::LegBegan { leg, time_s } => self.begin(leg, time_s),
@@ -51,15 +52,15 @@ impl Course {
         self.assigned.first().map_or(0, |(_, legs)| legs.len())
     }
 
-    /// The leg that is under way at a time \[s\], from 0.
+    /// Returns the leg at a time \[s\], from 0.
     #[must_use]
     pub fn leg_at(&self, time_s: f64) -> usize {
         let begun = self.begun[..self.begun.partition_point(|&(from_s, _)| from_s <= time_s)].last();
         begun.map_or(0, |&(_, leg)| leg).min(self.count().saturating_sub(1))
     }
 
-    /// The formations one after the other, each from when on \[s\] it is under way as vehicles are assigned to it; the first
-    /// from the start.
+    /// Returns the formations in order, as assigned, each with the time \[s\] from which it is the target; the first
+    /// holds from the start.
     #[must_use]
     pub fn formations(&self) -> Vec<(f64, &Formation)> {
         let mut times_s: Vec<f64> = self.assigned.iter().map(|&(from_s, _)| from_s).collect();
@@ -69,8 +70,7 @@ impl Course {
         times_s.into_iter().filter_map(|from_s| Some((from_s, self.formation_at(from_s)?))).collect()
     }
 
-    /// The slots of the leg that is under way at a time \[s\], as vehicles are assigned to them then; none where there is no
-    /// leg.
+    /// Returns the slots of the leg at a time \[s\], as assigned then; `None` without legs.
     #[must_use]
     pub fn formation_at(&self, time_s: f64) -> Option<&Formation> {
         let assigned = self.assigned.partition_point(|&(from_s, _)| from_s <= time_s);
@@ -79,8 +79,8 @@ impl Course {
     }
 }
 
-/// Gives vehicle i the slot that is vehicle `slots[i]`'s on a leg, from 0, and on those that follow it as long as vehicles are
-/// interchangeable there. Whether that is an order of the vehicles: nothing changes where it is not.
+/// Gives vehicle i the slot of vehicle `slots[i]` on a leg (from 0) and on the following legs, as long as vehicles are
+/// interchangeable there. Returns false, and changes nothing, if `slots` is not a permutation of the vehicles.
 pub fn assign_anew(legs: &mut [Leg], leg: usize, slots: &[usize]) -> bool {
     let count = legs.get(leg).map_or(0, |leg| leg.formation.count());
     let mut taken = vec![false; count];
@@ -102,13 +102,13 @@ mod tests {
         interchangeable.map(|interchangeable| Leg { interchangeable, ..Leg::first(Formation::line(3, 2.0)) }).to_vec()
     }
 
-    /// x of the slots at a time.
+    /// Returns x of the slots at a time.
     fn slots(course: &Course, time_s: f64) -> Vec<f64> {
         course.formation_at(time_s).expect("a leg").slots_m.column(0).iter().copied().collect()
     }
 
     #[test]
-    fn a_leg_is_under_way_from_its_beginning_to_that_of_the_next() {
+    fn a_leg_lasts_until_the_next_one_begins() {
         let mut course = Course::new(&[legs([false; 3]), legs([false; 3])].concat());
         course.begin(1, 2.0);
         course.begin(2, 2.0);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_assigned_anew_goes_to_another_slot_from_then_on_and_on_the_legs_that_follow_on_from_it() {
+    fn an_assignment_holds_for_following_interchangeable_legs() {
         let mut course = Course::new(&legs([true, true, false]));
         let given = slots(&course, 0.0);
         course.assign(&[2, 0, 1], 3.0);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_order_of_the_vehicles_changes_nothing() {
+    fn an_invalid_permutation_changes_nothing() {
         for wrong in [&[0, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 0]] {
             let mut course = Course::new(&legs([true; 3]));
             course.assign(wrong, 1.0);

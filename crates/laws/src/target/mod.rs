@@ -1,8 +1,7 @@
-//! Where the swarm shall go: timed legs of formations, the motion that they are carried along with, and the leg that is
-//! flown towards now.
+//! Targets of a swarm: timed legs of formations, the reference motion that moves them, and the present target.
 //!
-//! A [`Leg`] is a formation and the event that begins it. A [`Target`] is what a law sees of the present leg. A
-//! [`Supervisor`] reads what the vehicles sense and may change it; [`Schedule`] is the one that goes from leg to leg.
+//! A [`Leg`] is a formation and the event that begins it. A [`Target`] is the view that a law has of the present leg. A
+//! [`Supervisor`] reads the sensed states and may change the target; [`Schedule`] is the one that goes from leg to leg.
 
 mod arrival;
 mod breathing;
@@ -21,35 +20,35 @@ use nalgebra::{Rotation3, Vector3};
 use crate::formation::Formation;
 use tautline_core::swarm::{Rows, mean_row, row, set_row};
 
-/// One formation of a flight, flown towards until the next leg begins.
+/// One formation of a run, the target until the next leg begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leg {
-    /// The slots.
+    /// Slots of the leg.
     pub formation: Formation,
-    /// What ends the leg before and begins this one. The first leg begins with the flight, whatever stands here.
+    /// Event that begins this leg and ends the previous one. Ignored for the first leg, which begins with the run.
     pub begins: Begins,
-    /// Whether any vehicle may go to any slot: a swarm that is stalled is then assigned anew before its slots are spread.
+    /// Whether any vehicle may go to any slot. A stalled swarm is then reassigned before its slots are spread.
     pub interchangeable: bool,
 }
 
-/// What begins a leg.
+/// Event that begins a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Begins {
-    /// A time of the flight \[s\].
+    /// A time of the run \[s\].
     At(f64),
-    /// The leg before it has been reached, and held for as long as [`Arrival::hold_s`] says.
+    /// Arrival at the previous leg, held for [`Arrival::hold_s`].
     Reached,
 }
 
 impl Leg {
-    /// The first leg of a flight.
+    /// Creates the first leg of a run.
     #[must_use]
     pub fn first(formation: Formation) -> Self {
         Self { formation, begins: Begins::At(0.0), interchangeable: false }
     }
 
-    /// The same leg with its slots scaled by `scale` and turned by `yaw_rad` (counterclockwise seen from above) about
-    /// their centre, and then moved by `offset_m`.
+    /// Returns the leg with its slots scaled by `scale` and rotated by `yaw_rad` (counterclockwise seen from above)
+    /// about their centre, and then moved by `offset_m`.
     #[must_use]
     pub fn placed(mut self, scale: f64, yaw_rad: f64, offset_m: Vector3<f64>) -> Self {
         let slots_m = &mut self.formation.slots_m;
@@ -76,30 +75,30 @@ fn spread_slots(slots_m: &mut Rows, scale: f64, leader: Option<usize>) {
     }
 }
 
-/// What the vehicles are told to reach, at one instant.
+/// Target of the vehicles at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target<'a> {
     /// The leg, from 0.
     pub leg: usize,
-    /// Grows by at least one whenever a distance between two slots changes; 0 for the first leg as it was given.
+    /// Counter that grows whenever a distance between two slots changes; 0 for the first leg as given.
     pub revision: u64,
-    /// The slots h.
+    /// Slots h.
     pub formation: &'a Formation,
-    /// They are those of the leg scaled by this about their centre, or about a leader's slot; 1 for the leg as it was given.
+    /// Scale of the slots about their centre, or about a leader's slot; 1 for the leg as given.
     pub spread: f64,
-    /// The motion r(t) that the formation shall be carried along with.
+    /// Reference motion r(t) that moves the formation.
     pub reference: Reference,
 }
 
 impl<'a> Target<'a> {
-    /// A formation at rest, as the first leg of a flight.
+    /// Target of a formation at rest, as the first leg of a run.
     #[must_use]
     pub fn at_rest(formation: &'a Formation) -> Self {
         Self { leg: 0, revision: 0, formation, spread: 1.0, reference: Reference::at_rest() }
     }
 }
 
-/// The target of a flight under way: what a [`Supervisor`] changes and a [`Target`] is a view of.
+/// Target of a run in progress. A [`Supervisor`] changes it, and a [`Target`] is a view of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurrentTarget {
     leg: usize,
@@ -110,14 +109,14 @@ pub struct CurrentTarget {
 }
 
 impl CurrentTarget {
-    /// The first of these legs; `None` without any.
+    /// Creates the target of the first of these legs; `None` without legs.
     #[must_use]
     pub fn first_of(legs: &[Leg]) -> Option<Self> {
         let formation = legs.first()?.formation.clone();
         Some(Self { leg: 0, revision: 0, formation, spread: 1.0, reference: Reference::at_rest() })
     }
 
-    /// What a law sees.
+    /// Returns the view that a law has.
     #[must_use]
     pub fn view(&self) -> Target<'_> {
         let &Self { leg, revision, ref formation, spread, reference } = self;
@@ -135,8 +134,8 @@ impl CurrentTarget {
         self.spread_formation(formation, 1.0, None);
     }
 
-    /// Changes the slots within the leg to these, scaled by `spread` about the slot of a leader, or about their centre.
-    /// Allocates nothing for as many slots as before.
+    /// Sets the slots within the leg to these, scaled by `spread` about the slot of a leader, or about their centre.
+    /// Allocates nothing if the number of slots stays the same.
     pub fn spread_formation(&mut self, formation: &Formation, spread: f64, leader: Option<usize>) {
         if self.formation.count() == formation.count() {
             self.formation.slots_m.copy_from(&formation.slots_m);
@@ -159,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_placed_leg_is_scaled_and_turned_about_its_centre_and_then_moved() {
+    fn placing_a_leg_scales_rotates_and_then_moves_it() {
         let leg =
             Leg::first(Formation::line(2, 2.0)).placed(3.0, std::f64::consts::FRAC_PI_2, Vector3::new(10.0, 0.0, 5.0));
         let slots = &leg.formation.slots_m;
@@ -170,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn new_slots_are_told_by_the_revision() {
+    fn new_slots_raise_the_revision() {
         let legs = [Leg::first(Formation::line(2, 2.0)), Leg::first(Formation::line(2, 3.0))];
         let mut target = CurrentTarget::first_of(&legs).expect("legs");
         assert_eq!(target.view(), Target::at_rest(&legs[0].formation));

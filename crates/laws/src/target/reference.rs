@@ -1,81 +1,82 @@
-//! A motion that a formation is carried along with, and who knows it.
+//! Reference motion of a formation, and the vehicles that know it.
 
 use nalgebra::Vector3;
 
 use crate::graph::Pinning;
 
-/// A reference motion at one instant, in the frame of the positions.
+/// Reference motion at one instant, in the frame of the positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
-    /// r \[m\].
+    /// Position r \[m\].
     pub position_m: Vector3<f64>,
-    /// r' \[m/s\].
+    /// Velocity r' \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// r'' \[m/s^2\].
+    /// Acceleration r'' \[m/s^2\].
     pub acceleration_m_s2: Vector3<f64>,
 }
 
 impl Reference {
-    /// At rest at the origin: slots are where they are given.
+    /// Reference at rest at the origin: slots stay where they are given.
     #[must_use]
     pub fn at_rest() -> Self {
         Self::at(Vector3::zeros())
     }
 
-    /// At rest in a place \[m\].
+    /// Reference at rest at a position \[m\].
     #[must_use]
     pub fn at(position_m: Vector3<f64>) -> Self {
         Self { position_m, velocity_m_s: Vector3::zeros(), acceleration_m_s2: Vector3::zeros() }
     }
 }
 
-/// The reference of a flight: its motion, who knows where it is, and whether everybody is told how it accelerates.
+/// Reference of a run: its motion, the vehicles that know it, and feed-forward.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guidance {
-    /// r(t).
+    /// Motion r(t).
     pub motion: ReferenceMotion,
-    /// Who knows r and r'. A leader flies it.
+    /// Vehicles that know r and r'. A leader flies it.
     pub known_by: Pinning,
     /// Whether r'' - a22 r' is fed forward to every vehicle.
     pub feed_forward: bool,
 }
 
-/// r(t), with a velocity that does not jump.
+/// Motion r(t) with continuous velocity.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReferenceMotion {
-    /// Always in one place.
+    /// At rest.
     Rest {
-        /// The place \[m\].
+        /// Position \[m\].
         position_m: Vector3<f64>,
     },
-    /// Along a straight line at one speed.
+    /// Straight line at constant velocity.
     Velocity {
-        /// Place at time 0 \[m\].
+        /// Position at time 0 \[m\].
         from_m: Vector3<f64>,
-        /// r' \[m/s\].
+        /// Velocity r' \[m/s\].
         velocity_m_s: Vector3<f64>,
     },
-    /// Around a circle in a plane of constant z, counterclockwise seen from above, from the point of largest x.
+    /// Circle in a plane of constant z, counterclockwise seen from above, starting at the point of largest x.
     Circle {
-        /// Middle of the circle \[m\].
+        /// Centre of the circle \[m\].
         centre_m: Vector3<f64>,
         /// Radius \[m\].
         radius_m: f64,
-        /// Time of one turn \[s\]; below zero clockwise.
+        /// Period of one turn \[s\]; negative for clockwise.
         period_s: f64,
     },
-    /// From rest to rest between points, along straight lines: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of the way at the part x of the
-    /// time, whose largest speed is 15/8 of the mean. At rest before the first and after the last.
+    /// From rest to rest between points along straight lines: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of the distance at the
+    /// fraction x of the time. The largest speed is 15/8 of the mean. At rest before the first and after the last
+    /// point.
     WayPoints {
-        /// When it is where \[s\] \[m\], in the order of time.
+        /// Times \[s\] and positions \[m\], in order of time.
         points: Vec<(f64, Vector3<f64>)>,
     },
-    /// Through points of a table, as the natural cubic spline: r'' is continuous, and zero at both ends.
+    /// Natural cubic spline through points of a table: r'' is continuous, and zero at both ends.
     Table(Spline),
 }
 
 impl ReferenceMotion {
-    /// Where it is at a time of the flight \[s\]. A table goes on straight beyond its ends.
+    /// Returns the reference at a time of the run \[s\]. A table continues straight beyond its ends.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Reference {
         match self {
@@ -98,7 +99,7 @@ impl ReferenceMotion {
         }
     }
 
-    /// How far it comes from where it is at time 0, at most, up to a time \[m\].
+    /// Returns an upper bound of the distance from the position at time 0, up to a time \[m\].
     #[must_use]
     pub fn reach_m(&self, until_s: f64) -> f64 {
         let start_m = self.at(0.0).position_m;
@@ -110,7 +111,7 @@ impl ReferenceMotion {
             Self::Velocity { velocity_m_s, .. } => velocity_m_s.norm() * until_s,
             Self::Circle { radius_m, .. } => 2.0 * radius_m,
             Self::WayPoints { points } => away_m(&mut points.iter().map(|&(_, point)| point)),
-            // Between its points a spline stays within some 1.2 of their span; beyond the last it goes on straight.
+            // Between its points a spline stays within some 1.2 of their span; beyond the last point it is straight.
             Self::Table(spline) => {
                 2.0 * away_m(&mut spline.rows.iter().map(|row| row.position_m))
                     + (self.at(until_s).position_m - start_m).norm()
@@ -118,8 +119,8 @@ impl ReferenceMotion {
         }
     }
 
-    /// The shortest time in which it turns round: of a quarter of a circle, a way from rest to rest, two points of a table
-    /// \[s\].
+    /// Returns the shortest time scale of the motion \[s\]: a quarter period of a circle, the time between two way
+    /// points, or twice the shortest time between two table points.
     #[must_use]
     pub fn shortest_s(&self) -> f64 {
         let least = |times_s: &mut dyn Iterator<Item = f64>| {
@@ -135,7 +136,7 @@ impl ReferenceMotion {
         }
     }
 
-    /// Whether it stays in the plane z = 0.
+    /// Whether the motion stays in the plane z = 0.
     #[must_use]
     pub fn is_level(&self) -> bool {
         match self {
@@ -147,13 +148,13 @@ impl ReferenceMotion {
         }
     }
 
-    /// Whether it never accelerates.
+    /// Whether the motion never accelerates.
     #[must_use]
     pub fn is_uniform(&self) -> bool {
         matches!(self, Self::Rest { .. } | Self::Velocity { .. })
     }
 
-    /// Whether it never moves.
+    /// Whether the reference never moves.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         match self {
@@ -164,7 +165,7 @@ impl ReferenceMotion {
     }
 }
 
-/// Of points that are in the order of time.
+/// Returns the reference between way points in order of time.
 fn between_way_points(points: &[(f64, Vector3<f64>)], time_s: f64) -> Reference {
     let next = points.partition_point(|&(at_s, _)| at_s <= time_s);
     let (before, after) = (next.checked_sub(1).and_then(|k| points.get(k)), points.get(next));
@@ -186,7 +187,7 @@ fn between_way_points(points: &[(f64, Vector3<f64>)], time_s: f64) -> Reference 
     }
 }
 
-/// A natural cubic spline through points in time.
+/// Natural cubic spline through points in time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spline {
     rows: Vec<Knot>,
@@ -196,12 +197,13 @@ pub struct Spline {
 struct Knot {
     time_s: f64,
     position_m: Vector3<f64>,
-    /// r'' there \[m/s^2\].
+    /// Acceleration r'' at the knot \[m/s^2\].
     bend_m_s2: Vector3<f64>,
 }
 
 impl Spline {
-    /// Through these points: at least one, all finite, at times \[s\] that grow; none otherwise.
+    /// Builds the spline through these points; `None` unless there is at least one, all are finite and times \[s\]
+    /// increase.
     #[must_use]
     pub fn through(points: &[(f64, Vector3<f64>)]) -> Option<Self> {
         let finite = |&(time_s, place): &(f64, Vector3<f64>)| time_s.is_finite() && place.iter().all(|x| x.is_finite());
@@ -217,7 +219,7 @@ impl Spline {
         Some(Self { rows })
     }
 
-    /// The points that it goes through: time \[s\] and place \[m\].
+    /// Returns the points: time \[s\] and position \[m\].
     pub fn points(&self) -> impl Iterator<Item = (f64, Vector3<f64>)> + '_ {
         self.rows.iter().map(|row| (row.time_s, row.position_m))
     }
@@ -254,7 +256,7 @@ impl Spline {
     }
 }
 
-/// r'' at every point, zero at both ends: the tridiagonal system of a natural spline, eliminated from the front.
+/// Computes r'' at every knot, zero at both ends, from the tridiagonal system of a natural spline.
 fn solve_bends(rows: &mut [Knot]) {
     let count = rows.len();
     let mut shares = vec![0.0; count];
@@ -298,7 +300,7 @@ mod tests {
         const STEP_S: f64 = 1e-4;
         for motion in motions() {
             for k in 0..110 {
-                // Never on a point in time where the third derivative jumps.
+                // Avoids the knots, where the third derivative jumps.
                 let time_s = 0.0137 + 0.1 * f64::from(k);
                 let [before, now, after] = [-STEP_S, 0.0, STEP_S].map(|off_s| motion.at(time_s + off_s));
                 let slope = (after.position_m - before.position_m) / (2.0 * STEP_S);
@@ -310,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_passed_at_their_times_and_the_way_between_is_within_reach() {
+    fn points_are_passed_at_their_times_within_the_reach() {
         for motion in motions() {
             if let ReferenceMotion::WayPoints { points } = &motion {
                 for &(at_s, place_m) in points {
@@ -328,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spline_through_a_straight_line_is_the_line_and_what_does_not_grow_is_none() {
+    fn a_spline_through_a_line_is_the_line_and_times_must_increase() {
         let line: Vec<_> = [0.0, 1.0, 2.5, 4.0].map(|t| (t, Vector3::new(2.0 * t, -t, 1.0))).to_vec();
         let spline = ReferenceMotion::Table(Spline::through(&line).expect("a spline"));
         for time_s in [-1.0, 0.3, 2.0, 7.0] {

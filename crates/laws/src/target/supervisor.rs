@@ -1,4 +1,4 @@
-//! Who changes the target while the swarm flies.
+//! Supervisors: they change the target during a run.
 
 use dyn_clone::DynClone;
 
@@ -12,54 +12,54 @@ use tautline_core::swarm::Swarm;
 ///
 /// Its memory is saved with a simulation, so it must be [`Clone`].
 pub trait Supervisor: DynClone + Send {
-    /// Called once at every instant at which the law is asked, before it.
+    /// Reads the sensed states and may change the target. Called once per instant, before the law.
     fn supervise(&mut self, time_s: f64, sensed: &Swarm, target: &mut CurrentTarget);
 
-    /// Whether it never changes anything: then it is not asked.
+    /// Whether the supervisor never changes the target; then it is not called.
     fn is_idle(&self) -> bool {
         false
     }
 
-    /// Whether the formations that it goes through are those of these legs, in their order: what a law promises for them
-    /// holds then.
+    /// Whether the supervisor goes through the formations of these legs in order, so that the certificate for them
+    /// holds.
     fn keeps_to(&self, _legs: &[Leg]) -> bool {
         self.is_idle()
     }
 
-    /// What it changed within a leg when it was asked last, where that breaks a promise: what the law promised is renewed
-    /// then. Told once.
+    /// Takes the last change within a leg that invalidates the certificate, which is then computed again. Returns each
+    /// change once.
     fn take_change(&mut self) -> Option<Change> {
         None
     }
 
-    /// The formations that are still to come after the present target's.
+    /// Returns the formations after the present target's.
     fn ahead(&self, _target: &Target<'_>) -> Vec<&Formation> {
         Vec::new()
     }
 
-    /// Begins its random numbers anew.
+    /// Restarts the random numbers of the supervisor.
     fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Supervisor);
 
-/// Goes from leg to leg by time, or when the leg before has been reached and held; and may assign interchangeable vehicles
-/// anew, or spread the slots of a leg, where the swarm is stalled ([`Breathing`]).
+/// Goes from leg to leg by time, or when the previous leg has been reached and held. If the swarm is stalled, may
+/// reassign interchangeable vehicles or spread the slots of a leg ([`Breathing`]).
 #[derive(Clone, Debug)]
 pub struct Schedule {
     legs: Vec<Leg>,
     links: Graph,
     arrival: Arrival,
     freedom: Freedom,
-    /// Since when the present leg has been within the limits \[s\].
+    /// Time since which the present leg has been within the limits \[s\].
     within_since_s: Option<f64>,
     breather: Option<Breather>,
-    /// Until it is taken.
+    /// Last change, until it is taken.
     change: Option<Change>,
 }
 
 impl Schedule {
-    /// The legs of a flight on this graph; the first is under way.
+    /// Creates the schedule of these legs on a graph, at the first leg.
     #[must_use]
     pub fn new(legs: &[Leg], links: &Graph, arrival: Arrival) -> Self {
         Self {
@@ -73,16 +73,15 @@ impl Schedule {
         }
     }
 
-    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    /// Sets the motions by which a reached formation may differ from its slots; any rigid motion by default.
     #[must_use]
     pub fn free_by(mut self, freedom: Freedom) -> Self {
         self.freedom = freedom;
         self
     }
 
-    /// The same, spreading slots (about those of a leader, where there is one) where the swarm is stalled under a law by which
-    /// errors settle so.
-    /// To be said after [`Schedule::free_by`].
+    /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled.
+    /// `settling` describes the law. Call after [`Schedule::free_by`].
     #[must_use]
     pub fn breathing(mut self, breathing: Breathing, settling: Settling, leader: Option<usize>) -> Self {
         self.breather =
@@ -90,12 +89,12 @@ impl Schedule {
         self
     }
 
-    /// The same in a wind, which moves all from their slots and keeps them there: what all have in common is no reason to spread
-    /// slots. To be said after [`Schedule::breathing`].
+    /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps
+    /// all vehicles off their slots. Call after [`Schedule::breathing`].
     #[must_use]
     pub fn blown(mut self, is_blown: bool) -> Self {
         if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {
-            breather.forgive_common_errors();
+            breather.ignore_common_errors();
         }
         self
     }
@@ -166,7 +165,7 @@ mod tests {
         vec![Leg::first(Formation::line(2, 1.0)), leg(2.0, begins[0]), leg(3.0, begins[1])]
     }
 
-    /// The leg at times 0, 0.5, 1, ... while the swarm is in the formation of leg `at(time)`.
+    /// Returns the leg at times 0, 0.5, 1, ... while the swarm is in the formation of leg `at(time)`.
     fn flown(legs: &[Leg], at: impl Fn(f64) -> usize) -> Vec<usize> {
         let mut schedule = Schedule::new(legs, &Graph::complete(2), Arrival::default());
         let mut target = CurrentTarget::first_of(legs).expect("legs");
@@ -181,13 +180,13 @@ mod tests {
     }
 
     #[test]
-    fn legs_begin_at_their_times_and_two_may_be_due_at_once() {
+    fn legs_begin_at_their_times_also_two_at_once() {
         assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
         assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
     }
 
     #[test]
-    fn a_leg_that_is_reached_and_held_ends_and_one_that_is_lost_does_not() {
+    fn a_leg_ends_only_when_its_formation_is_held() {
         let legs = legs([Begins::Reached, Begins::Reached]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s > 1.0)), [0, 0, 1, 1, 1, 2, 2, 2]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s == 0.5)), [0, 0, 0, 0, 1, 1, 1, 1]);

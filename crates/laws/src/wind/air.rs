@@ -1,4 +1,4 @@
-//! The wind in flight.
+//! Wind of a run, advanced step by step.
 
 use std::collections::VecDeque;
 
@@ -10,28 +10,28 @@ use super::spec::WindSpec;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, set_row};
 
-/// Instants a second at which turbulence is drawn \[Hz\]; in between it goes straight on. Even 20 m/s past the smallest scale
-/// of 3 m is resolved 39 times, and less than 1 % of the variance lost.
+/// Rate at which turbulence is drawn \[Hz\]; in between it is linear. At 20 m/s the smallest length scale of 3 m gets
+/// 39 samples, and less than 1 % of the variance is lost.
 const TURBULENCE_HZ: f64 = 256.0;
 
-/// Random numbers of the wind are streams of their own, whatever else draws from the same seed.
+/// First random stream of the wind, separate from other users of the same seed.
 const STREAMS: u64 = 0x7769_6e64 << 32;
 
-/// The wind that a swarm flies in, at an instant that is moved on step by step.
+/// Wind of a run at an instant that advances step by step.
 ///
-/// It is a function of the seed and of time: how time is cut into steps changes nothing, and the last step can be taken back.
+/// It is a function of the seed and of time: the step lengths do not matter, and the last step can be undone.
 #[derive(Clone, Debug)]
 pub struct Wind {
     spec: WindSpec,
     count: usize,
     now_s: f64,
-    /// Before the last step.
+    /// Time before the last step.
     before_s: f64,
     turbulence: Option<Turbulence>,
 }
 
 impl Wind {
-    /// At time 0, for so many vehicles, with turbulence from a seed.
+    /// Creates the wind of `count` vehicles at time 0, with turbulence from a seed.
     #[must_use]
     pub fn new(spec: &WindSpec, count: usize, seed: u64) -> Self {
         let turbulence = spec.turbulence.map(|dryden| {
@@ -41,7 +41,7 @@ impl Wind {
         Self { spec: spec.clone(), count, now_s: 0.0, before_s: 0.0, turbulence }
     }
 
-    /// Moves on by `dt_s` seconds. Allocates nothing once a step of that length was taken.
+    /// Advances by `dt_s` seconds. Allocates nothing after the first step of that length.
     pub fn advance(&mut self, dt_s: f64) {
         (self.before_s, self.now_s) = (self.now_s, self.now_s + dt_s);
         if let Some(turbulence) = &mut self.turbulence {
@@ -49,51 +49,52 @@ impl Wind {
         }
     }
 
-    /// Takes the last [`Wind::advance`] back.
+    /// Undoes the last [`Wind::advance`].
     pub fn undo(&mut self) {
         self.now_s = self.before_s;
     }
 
-    /// The time that was moved on to \[s\].
+    /// Returns the present time \[s\].
     #[must_use]
     pub fn now_s(&self) -> f64 {
         self.now_s
     }
 
-    /// The next time \[s\] at which turbulence turns: up to then, but for where gusts begin and end, the wind is smooth.
+    /// Returns the next time \[s\] at which turbulence changes slope. Until then only gusts change the derivative of
+    /// the wind.
     #[must_use]
     pub fn next_turn_s(&self, time_s: f64) -> f64 {
-        // A turn that is reached but for rounding is passed.
+        // A change within rounding of `time_s` counts as passed.
         let turned = |_: &Turbulence| ((time_s * TURBULENCE_HZ + 1e-9).floor() + 1.0) / TURBULENCE_HZ;
         self.turbulence.as_ref().map_or(f64::INFINITY, turned)
     }
 
-    /// Velocity of the air that a vehicle meets now \[m/s\].
+    /// Returns the present velocity of the air at a vehicle \[m/s\].
     #[must_use]
     pub fn air_m_s(&self, vehicle: usize) -> Vector3<f64> {
         self.air_at_m_s(vehicle, self.now_s)
     }
 
-    /// The same at a time of the last step \[s\].
+    /// Returns the velocity of the air at a vehicle at a time within the last step \[m/s\].
     #[must_use]
     pub fn air_at_m_s(&self, vehicle: usize, time_s: f64) -> Vector3<f64> {
         let turbulence = self.turbulence.as_ref().map_or_else(Vector3::zeros, |air| air.at(vehicle, time_s));
         self.spec.steady_m_s(vehicle, time_s) + turbulence
     }
 
-    /// Writes the air of every vehicle now \[m/s\].
+    /// Writes the present velocity of the air at every vehicle \[m/s\].
     pub fn write(&self, air_m_s: &mut Rows) {
         (0..self.count).for_each(|i| set_row(air_m_s, i, self.air_m_s(i)));
     }
 
-    /// Turbulence goes on from where it is with the random numbers of another seed.
+    /// Continues the turbulence from its present state with the random numbers of another seed.
     pub fn reseed(&mut self, seed: u64) {
         if let Some(turbulence) = &mut self.turbulence {
             turbulence.reseed(seed);
         }
     }
 
-    /// What is recorded of the wind, without values yet.
+    /// Returns the recorded channel of the wind, without values.
     #[must_use]
     pub fn channel() -> Channel {
         Channel::new("wind", &["wind_x_m_s", "wind_y_m_s", "wind_z_m_s"])
@@ -106,18 +107,18 @@ impl Wind {
     }
 }
 
-/// Turbulence at the instants that it is drawn at, as far as time has come.
+/// Turbulence at its sampling instants, up to the present time.
 #[derive(Clone, Debug)]
 struct Turbulence {
     frame: [Vector3<f64>; 3],
     step: Step,
-    /// One for each vehicle, or one for all.
+    /// Filters: one per vehicle, or one for all.
     eddies: Vec<Eddy>,
-    /// Which instant the first row of the window is.
+    /// Index of the sampling instant of the first row of the window.
     first: u64,
-    /// The air of each eddy at consecutive instants \[m/s\], from before the last step to after its end.
+    /// Velocity of the air at consecutive sampling instants, one row per instant \[m/s\]. Covers the last step.
     window: VecDeque<Vec<Vector3<f64>>>,
-    /// Rows to be used again.
+    /// Rows for reuse.
     spare: Vec<Vec<Vector3<f64>>>,
 }
 
@@ -144,7 +145,7 @@ impl Turbulence {
         self.eddies.iter_mut().enumerate().for_each(|(stream, eddy)| eddy.reseed(normals(seed, stream)));
     }
 
-    /// Appends the air of all eddies as they are.
+    /// Appends the present velocity of the air of all filters.
     fn push(&mut self) {
         let Self { frame: [along, across, up], step, eddies, window, spare, .. } = self;
         let mut row = spare.pop().unwrap_or_default();
@@ -156,7 +157,7 @@ impl Turbulence {
         window.push_back(row);
     }
 
-    /// Keeps what is needed from one time to a later one.
+    /// Moves the window so that it covers the times from one to the other.
     fn reach(&mut self, from_s: f64, to_s: f64) {
         while self.window.len() > 2 && (self.first + 1) as f64 <= from_s * TURBULENCE_HZ {
             self.spare.extend(self.window.pop_front());
@@ -171,7 +172,11 @@ impl Turbulence {
     fn at(&self, vehicle: usize, time_s: f64) -> Vector3<f64> {
         let stream = if self.eddies.len() == 1 { 0 } else { vehicle };
         let place = (time_s * TURBULENCE_HZ - self.first as f64).clamp(0.0, (self.window.len() - 1) as f64);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the window")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "the index is clamped to the window"
+        )]
         let before = (place as usize).min(self.window.len() - 2);
         let (from, to) = (self.window[before][stream], self.window[before + 1][stream]);
         from + (place - before as f64) * (to - from)
@@ -187,7 +192,7 @@ mod tests {
         WindSpec { mean_m_s: Vector3::new(3.0, 4.0, 0.0), turbulence, shared, ..WindSpec::default() }
     }
 
-    /// The air of vehicle 2 at multiples of 0.1 s.
+    /// Returns the air of vehicle 2 at multiples of 0.1 s, with each interval split into `cut` steps.
     fn flown(wind: &mut Wind, steps: u32, cut: u32) -> Vec<Vector3<f64>> {
         let advance = |_| {
             (0..cut).for_each(|_| wind.advance(0.1 / f64::from(cut)));
@@ -197,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wind_is_a_function_of_time_and_seed_however_time_is_cut() {
+    fn the_wind_is_a_function_of_time_and_seed() {
         for shared in [true, false] {
             let coarse = flown(&mut Wind::new(&stormy(shared), 3, 5), 40, 1);
             let fine = flown(&mut Wind::new(&stormy(shared), 3, 5), 40, 64);
@@ -208,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_is_taken_back_and_flown_in_halves_is_the_same_wind_and_so_is_a_copy() {
+    fn undoing_halving_and_cloning_steps_keep_the_wind() {
         let (mut straight, mut halting) = (Wind::new(&stormy(false), 3, 1), Wind::new(&stormy(false), 3, 1));
         let mut copy = straight.clone();
         for step in 0..200 {
@@ -234,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn one_turbulence_is_shared_or_each_vehicle_has_its_own() {
+    fn turbulence_is_shared_or_separate() {
         for shared in [true, false] {
             let mut wind = Wind::new(&stormy(shared), 3, 5);
             wind.advance(0.7);

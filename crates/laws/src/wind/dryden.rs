@@ -1,33 +1,33 @@
-//! Dryden turbulence at low altitude (MIL-F-8785C), by filters whose variance does not depend on the step.
+//! Dryden turbulence at low altitude (MIL-F-8785C), by filters whose variance is independent of the time step.
 
 use nalgebra::Vector3;
 
 use super::normal::Normals;
 
-/// Metres of a foot.
+/// Length of a foot \[m\].
 const FOOT_M: f64 = 0.3048;
 
-/// The least speed at which turbulence is carried past a vehicle \[m/s\]: in no wind it would never change.
+/// Least speed at which turbulence is carried past a vehicle \[m/s\]; without mean wind it would never change.
 const SLOWEST_M_S: f64 = 1.0;
 
-/// Below this step, in units of L/V, the last of a filter's factors is rounding, and its leading term stands for it.
+/// Step in units of L/V below which the factor `l22` is lost to rounding and replaced by its leading term.
 const SHORT: f64 = 1e-3;
 
-/// How strong turbulence is and how large its eddies are, near the ground:
+/// Dryden turbulence near the ground, with these intensities and length scales:
 ///
 /// ```text
 /// sigma_w = 0.1 W20,   sigma_u = sigma_v = sigma_w/(0.177 + 0.000823 h)^0.4
 /// L_w = h,             L_u = L_v = h/(0.177 + 0.000823 h)^1.2                 h in feet, from 10 to 1000
 /// ```
 ///
-/// u blows along the horizontal part of the mean wind (along x where there is none), v across it and w up. The air is frozen
-/// and carried past vehicles at the mean wind's speed V, and at 1 m/s at least. Correlations over a time t, with
-/// x = V|t|/L: sigma^2 e^-x of u, sigma^2 e^-x (1 - x/2) of v and w.
+/// u is along the horizontal part of the mean wind (along x without one), v across it and w up. The air is frozen and
+/// carried past vehicles at the mean wind's speed V, and at 1 m/s at least. With x = V|t|/L the correlation over a time
+/// t is sigma^2 e^-x for u and sigma^2 e^-x (1 - x/2) for v and w.
 #[derive(Clone, Copy, Debug, serde::Deserialize, PartialEq, serde::Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(description = "How strong turbulence is, and how large its eddies are.")]
+#[schemars(description = "Intensity and length scales of the turbulence.")]
 pub struct Dryden {
-    /// Wind speed 20 feet above the ground in m/s: a tenth of it is the standard deviation of the vertical part.
+    /// Wind speed 20 feet above the ground in m/s. The vertical standard deviation is a tenth of it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub speed_20ft_m_s: f64,
     /// Height above the ground in m.
@@ -36,9 +36,9 @@ pub struct Dryden {
 }
 
 impl Dryden {
-    /// Least height that the scales are made for: 10 feet \[m\].
+    /// Least height of the model: 10 feet \[m\].
     pub const LOWEST_M: f64 = 10.0 * FOOT_M;
-    /// Largest height that they are made for: 1000 feet \[m\].
+    /// Largest height of the model: 1000 feet \[m\].
     pub const HIGHEST_M: f64 = 1000.0 * FOOT_M;
 
     fn roughness(&self) -> f64 {
@@ -53,21 +53,21 @@ impl Dryden {
         Vector3::new(level_m_s, level_m_s, up_m_s)
     }
 
-    /// Scales L of u, v and w \[m\].
+    /// Length scales L of u, v and w \[m\].
     #[must_use]
     pub fn length_m(&self) -> Vector3<f64> {
         let level_m = self.height_m / libm::pow(self.roughness(), 1.2);
         Vector3::new(level_m, level_m, self.height_m)
     }
 
-    /// The exact step of `dt_s` seconds in a mean wind.
+    /// Returns the exact step of `dt_s` seconds in a mean wind.
     pub(super) fn step(&self, mean_m_s: Vector3<f64>, dt_s: f64) -> Step {
         let carried_m = mean_m_s.norm().max(SLOWEST_M_S) * dt_s;
         let [along, across, up] = (Vector3::repeat(carried_m).component_div(&self.length_m())).into();
         Step { intensity_m_s: self.intensity_m_s(), along: Along::new(along), across: [across, up].map(Across::new) }
     }
 
-    /// Where u, v and w blow.
+    /// Returns the unit directions of u, v and w.
     pub(super) fn frame(mean_m_s: Vector3<f64>) -> [Vector3<f64>; 3] {
         let level = Vector3::new(mean_m_s.x, mean_m_s.y, 0.0);
         let along = level.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::x);
@@ -83,7 +83,7 @@ pub(super) struct Step {
     across: [Across; 2],
 }
 
-/// u+ = p u + sqrt(1 - p^2) xi with p = e^-d, d = V dt/L.
+/// Filter of u: u+ = p u + sqrt(1 - p^2) xi with p = e^-d, d = V dt/L.
 #[derive(Clone, Copy, Debug)]
 struct Along {
     p: f64,
@@ -96,14 +96,17 @@ impl Along {
     }
 }
 
-/// Two lags in a row, x and then y, whose difference has the zero of the filter:
+/// Filter of v and w: two lags in a row, x and then y, whose combination has the zero of the filter:
 ///
 /// ```text
 /// y+ = p (y + d x) + l21 xi1 + l22 xi2,   x+ = p x + l11 xi1,   out = sqrt 3 x + (1 - sqrt 3) y
 /// ```
 ///
-/// with the Cholesky factors of the covariance of what a step adds,
-/// Q11 = (1 - p^2)/2, Q12 = (1 - (1 + 2d) p^2)/4, Q22 = (1 - (1 + 2d + 2d^2) p^2)/4.
+/// with the Cholesky factors of the covariance of the noise of a step:
+///
+/// ```text
+/// Q11 = (1 - p^2)/2,   Q12 = (1 - (1 + 2d) p^2)/4,   Q22 = (1 - (1 + 2d + 2d^2) p^2)/4
+/// ```
 #[derive(Clone, Copy, Debug)]
 struct Across {
     p: f64,
@@ -126,17 +129,17 @@ impl Across {
     }
 }
 
-/// The air of one vehicle, or of all: what the filters remember, for variances of 1.
+/// Filter states of the turbulence of one vehicle, or of all, scaled to unit variance.
 #[derive(Clone, Debug)]
 pub(super) struct Eddy {
     along: f64,
-    /// x and y of v and of w.
+    /// States x and y of v and of w.
     across: [[f64; 2]; 2],
     normals: Normals,
 }
 
 impl Eddy {
-    /// Somewhere in the stationary distribution.
+    /// Draws the states from the stationary distribution.
     pub(super) fn new(normals: Normals) -> Self {
         let mut eddy = Self { along: 0.0, across: [[0.0; 2]; 2], normals };
         eddy.along = eddy.normals.next();
@@ -147,7 +150,7 @@ impl Eddy {
         eddy
     }
 
-    /// Goes on with other random numbers.
+    /// Continues from the present states with other random numbers.
     pub(super) fn reseed(&mut self, normals: Normals) {
         self.normals = normals;
     }
@@ -162,7 +165,7 @@ impl Eddy {
         }
     }
 
-    /// u, v and w \[m/s\].
+    /// Returns u, v and w \[m/s\].
     pub(super) fn velocity_m_s(&self, step: &Step) -> Vector3<f64> {
         let root = 3.0_f64.sqrt();
         let [v, w] = self.across.map(|[x, y]| root * x + (1.0 - root) * y);

@@ -1,7 +1,7 @@
-//! Air that moves: a mean wind, gusts and turbulence.
+//! Wind: mean wind, gusts and turbulence.
 //!
-//! [`WindSpec`] says what blows; [`Wind`] is that wind in flight, with the chance in it. Mean and gusts are functions of
-//! time, the same wherever a vehicle is; turbulence is a random process.
+//! [`WindSpec`] describes the wind of a scenario; [`Wind`] is its realization in a run, with random turbulence. Mean
+//! and gusts are functions of time and do not depend on position; turbulence is a random process.
 
 mod air;
 mod dryden;

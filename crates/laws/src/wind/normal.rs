@@ -1,20 +1,21 @@
-//! Normal random numbers, the same on every machine.
+//! Normal random numbers with the same bits on every machine.
 
 use std::f64::consts::TAU;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-/// Normal numbers of mean 0 and variance 1: Box and Muller's pairs from `ChaCha8` words, by `libm` alone.
+/// Generator of normal numbers of mean 0 and variance 1: Box-Muller pairs from `ChaCha8` words, with `libm` functions
+/// only.
 #[derive(Clone, Debug)]
 pub struct Normals {
     random: ChaCha8Rng,
-    /// The second of a pair, until it is asked for.
+    /// Second number of a pair, until it is used.
     second: Option<f64>,
 }
 
 impl Normals {
-    /// Generator of a seed and a stream; streams are independent.
+    /// Creates the generator of a seed and a stream; streams are independent.
     #[must_use]
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -22,20 +23,20 @@ impl Normals {
         Self { random, second: None }
     }
 
-    /// The next normal number (mean 0, variance 1).
-    #[expect(clippy::should_implement_trait, reason = "it never ends, and is no Option")]
+    /// Returns the next normal number (mean 0, variance 1).
+    #[expect(clippy::should_implement_trait, reason = "the generator never ends and returns no Option")]
     pub fn next(&mut self) -> f64 {
         if let Some(second) = self.second.take() {
             return second;
         }
-        // In (0, 1], of which the logarithm is finite.
+        // In (0, 1], so that the logarithm is finite.
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
         let angle = TAU * self.unit();
         self.second = Some(radius * libm::sin(angle));
         radius * libm::cos(angle)
     }
 
-    /// Uniform in \[0, 1), a multiple of 2^-53.
+    /// Returns a uniform number in \[0, 1), a multiple of 2^-53.
     pub fn unit(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.random.next_u64() >> 11) as f64 * SCALE
@@ -47,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_normal_and_streams_are_their_own() {
+    fn numbers_are_normal_and_streams_independent() {
         let count = 200_000_u32;
         let (mut one, mut other) = (Normals::new(7, 1), Normals::new(7, 2));
         let pairs: Vec<_> = (0..count).map(|_| (one.next(), other.next())).collect();

@@ -1,4 +1,4 @@
-//! What blows: the mean wind and gusts as functions of time, and whose turbulence it is.
+//! Wind of a scenario: the mean wind and gusts as functions of time, and the turbulence.
 
 use std::f64::consts::PI;
 
@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 use super::dryden::Dryden;
 
-/// Standard deviations of turbulence that are taken for the most of it where an estimate must do.
+/// Number of standard deviations of turbulence used as its largest value in estimates.
 const SIGMAS: f64 = 4.0;
 
-/// Moving air. Points feel it if they have a drag (`vehicle.drag_per_s`).
+/// Wind. It acts on points that have a drag (`vehicle.drag_per_s`).
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WindSpec {
-    /// Constant velocity of the air in m/s; none unless given.
+    /// Constant velocity of the air in m/s; zero by default.
     #[serde(with = "point")]
     #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3, "default" = [0.0, 0.0, 0.0]))]
     pub mean_m_s: Vector3<f64>,
@@ -23,22 +23,23 @@ pub struct WindSpec {
     #[serde(rename = "gust", skip_serializing_if = "Vec::is_empty")]
     #[schemars(extend("default" = []))]
     pub gusts: Vec<Gust>,
-    /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed, and at 1 m/s at least.
+    /// Dryden turbulence at low altitude (MIL-F-8785C), carried past vehicles at the mean wind's speed and at least at
+    /// 1 m/s.
     #[serde(rename = "dryden", skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Dryden")]
     pub turbulence: Option<Dryden>,
-    /// Whether all vehicles are in the same turbulence. Otherwise each vehicle has its own.
+    /// Whether all vehicles share one turbulence. Otherwise each vehicle has its own.
     pub shared: bool,
 }
 
 impl Default for WindSpec {
-    /// Still air.
+    /// Returns still air.
     fn default() -> Self {
         Self { mean_m_s: Vector3::zeros(), gusts: Vec::new(), turbulence: None, shared: true }
     }
 }
 
-/// Air that rises to a velocity, holds it and falls back, each slope half a period of 1 - cos:
+/// Gust that rises to a velocity, holds it and falls back; each slope is half a period of 1 - cos:
 ///
 /// ```text
 /// V/2 (1 - cos(pi (t - at)/rise))          at <= t < at + rise
@@ -46,11 +47,11 @@ impl Default for WindSpec {
 /// V/2 (1 + cos(pi (t - t_fall)/fall))      for fall seconds from there, t_fall = at + rise + hold
 /// ```
 ///
-/// Without a hold and with equal slopes it is the gust of airworthiness rules, a whole period of 1 - cos; one that holds to
-/// the end of the flight is that of MIL-F-8785C, which rises and stays.
+/// Without a hold and with equal slopes this is the gust of airworthiness rules, a full period of 1 - cos. A hold to
+/// the end of the run gives the gust of MIL-F-8785C, which rises and stays.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(description = "Air that rises to a velocity as 1 - cos, holds it, and falls back in the same way.")]
+#[schemars(description = "Gust that rises to a velocity as 1 - cos, holds it, and falls back in the same way.")]
 pub struct Gust {
     /// Start time in s.
     #[schemars(extend("minimum" = 0))]
@@ -62,25 +63,25 @@ pub struct Gust {
     #[serde(default)]
     #[schemars(extend("minimum" = 0))]
     pub hold_s: f64,
-    /// Fall time in s; the rise time unless given.
+    /// Fall time in s; by default the rise time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub fall_s: Option<f64>,
-    /// Velocity that the gust adds to the wind at its height in m/s.
+    /// Velocity that the gust adds to the wind at full strength in m/s.
     #[serde(with = "point")]
     #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
     pub velocity_m_s: Vector3<f64>,
-    /// Vehicles that the gust meets, from 0 and in ascending order; all vehicles without a list.
+    /// Vehicles that the gust affects, from 0 and in ascending order; `None` for all.
     #[serde(default, with = "vehicles", skip_serializing_if = "Option::is_none")]
     #[schemars(
         with = "Vec<u64>",
         inner(range(min = 1)),
-        description = "Vehicles that the gust meets, counted from 1; all unless given."
+        description = "Vehicles that the gust affects, counted from 1; all by default."
     )]
     pub vehicles: Option<Vec<usize>>,
 }
 
-/// A vector as a list of x, y and, unless it is 0, z.
+/// Serializes a vector as a list of x, y and z, and accepts a list without z.
 mod point {
     use nalgebra::Vector3;
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
@@ -98,18 +99,19 @@ mod point {
     }
 }
 
-/// Vehicles, counted from 1 in files and from 0 in memory.
+/// Serializes vehicles, counted from 1 in files and from 0 in memory.
 mod vehicles {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
-    #[expect(clippy::ref_option, reason = "serde asks for a reference to the field")]
+    #[expect(clippy::ref_option, reason = "serde passes a reference to the field")]
     pub(super) fn serialize<S: Serializer>(met: &Option<Vec<usize>>, serializer: S) -> Result<S::Ok, S::Error> {
         met.as_ref().map(|met| met.iter().map(|&vehicle| vehicle as u64 + 1).collect::<Vec<_>>()).serialize(serializer)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<usize>>, D::Error> {
         let numbers = Vec::<usize>::deserialize(deserializer)?.into_iter();
-        let indices = numbers.map(|number| number.checked_sub(1).ok_or_else(|| D::Error::custom("vehicle 0")));
+        let indices = numbers
+            .map(|number| number.checked_sub(1).ok_or_else(|| D::Error::custom("vehicles are counted from 1, got 0")));
         let mut met = indices.collect::<Result<Vec<_>, _>>()?;
         met.sort_unstable();
         met.dedup();
@@ -124,7 +126,7 @@ impl Gust {
         self.fall_s.unwrap_or(self.rise_s)
     }
 
-    /// The instants at which it begins to rise, to hold, to fall, and ends \[s\].
+    /// Returns the times at which the gust begins to rise, reaches full strength, begins to fall, and ends \[s\].
     #[must_use]
     pub fn corners_s(&self) -> [f64; 4] {
         let full_s = self.at_s + self.rise_s;
@@ -132,7 +134,7 @@ impl Gust {
         [self.at_s, full_s, falls_s, falls_s + self.fall_s()]
     }
 
-    /// What part of its velocity blows at a time \[s\].
+    /// Returns the strength at a time \[s\] as a fraction of the full velocity.
     #[must_use]
     pub fn share(&self, time_s: f64) -> f64 {
         let [begins_s, full_s, falls_s, ends_s] = self.corners_s();
@@ -148,7 +150,7 @@ impl Gust {
         }
     }
 
-    /// Whether it meets a vehicle.
+    /// Whether the gust affects a vehicle.
     #[must_use]
     pub fn meets(&self, vehicle: usize) -> bool {
         self.vehicles.as_ref().is_none_or(|met| met.binary_search(&vehicle).is_ok())
@@ -156,20 +158,21 @@ impl Gust {
 }
 
 impl WindSpec {
-    /// Whether nothing ever blows.
+    /// Whether there is no wind at any time.
     #[must_use]
     pub fn is_still(&self) -> bool {
         *self == Self { shared: self.shared, ..Self::default() }
     }
 
-    /// Mean and gusts that a vehicle meets at a time \[m/s\].
+    /// Returns the mean wind and gusts at a vehicle and a time \[m/s\].
     #[must_use]
     pub fn steady_m_s(&self, vehicle: usize, time_s: f64) -> Vector3<f64> {
         let met = self.gusts.iter().filter(|gust| gust.meets(vehicle));
         met.fold(self.mean_m_s, |sum, gust| sum + gust.share(time_s) * gust.velocity_m_s)
     }
 
-    /// No vehicle meets faster air than this \[m/s\]; with turbulence, which has no bound, hardly ever.
+    /// Returns an upper bound of the speed of the air at any vehicle \[m/s\]. With turbulence, which is unbounded, the
+    /// bound is an estimate that is rarely exceeded.
     #[must_use]
     pub fn fastest_m_s(&self) -> f64 {
         let gusts: f64 = self.gusts.iter().map(|gust| gust.velocity_m_s.norm()).sum();
@@ -195,7 +198,7 @@ mod tests {
         }
         assert_eq!((at(5.5), at(1e9)), (0.0, 0.0));
         assert!((at(2.0 + 1.0 / 3.0) - 0.25).abs() < 1e-15, "1/2 (1 - cos 60 deg)");
-        // Slopes begin and end flat: a triangle of the same height does not.
+        // Slopes begin and end flat, unlike those of a triangle of the same height.
         for corner_s in gust().corners_s() {
             let bend = |h: f64| (at(corner_s + h) - at(corner_s - h)).abs() / h;
             assert!(bend(1e-4) < 1e-3, "{corner_s}");
@@ -205,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gust_is_added_to_the_mean_for_those_whom_it_meets() {
+    fn a_gust_adds_to_the_mean_wind_of_listed_vehicles() {
         let gusts = vec![Gust { vehicles: Some(vec![1, 3]), ..gust() }];
         let wind = WindSpec { mean_m_s: Vector3::x(), gusts, ..WindSpec::default() };
         assert!(!wind.is_still() && WindSpec::default().is_still());

@@ -306,7 +306,7 @@ fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
     let closest_m = late.audit.closest.expect("a pair").separation_m;
     assert!(true_m >= closest_m && closest_m > 2.4, "{closest_m}");
     let reason = late.ending.reason().expect("it ended early");
-    assert!(reason.contains("by what they measured or heard of each other") && reason.contains("true distance is 2."));
+    assert!(reason.contains("sense or receive a separation of") && reason.contains("true separation is 2."));
     assert_eq!(flight(0.0).ending, Ending::Completed);
 }
 

@@ -1,4 +1,4 @@
-//! What is drawn, and its slots.
+//! Drawings and their slots.
 
 use thiserror::Error;
 
@@ -10,20 +10,20 @@ use super::spread::spread;
 
 use tautline_core::swarm::{Rows, set_row};
 
-/// Samples for each slot; odd, so that the middle of a part of a line is one.
+/// Samples per slot; odd, so that the middle of each segment of a line is a sample.
 const SAMPLES: usize = 33;
-/// Samples in all, unless slots ask for more.
+/// Smallest number of samples.
 const LEAST_SAMPLES: usize = 4097;
 
-/// Pixels along the longer side of an area, and the most where many slots ask for more.
+/// Pixels along the longer side of an area, and their largest number for many slots.
 const PIXELS: usize = 1024;
 const MOST_PIXELS: usize = 8192;
 
-/// Letters, lines or areas in the plane, of a size still to be chosen.
+/// Letters, lines or areas in the plane, without a scale.
 #[derive(Clone, Debug)]
 pub struct Drawing {
     drawn: Drawn,
-    /// Letters that each need a slot.
+    /// Number of letters; each needs a slot.
     letters: usize,
 }
 
@@ -35,37 +35,39 @@ enum Drawn {
 }
 
 impl Drawing {
-    /// The inside of letters, lines of text below each other.
+    /// Reads letters, filled, with lines of text below each other.
     ///
-    /// # Errors [`DrawingError`] for a character that the font does not have, more than
-    /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS), or blanks alone.
+    /// # Errors
+    /// [`DrawingError`] for a character that the font does not have, more than
+    /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS) characters, or blanks alone.
     pub fn text(text: &str) -> Result<Self, DrawingError> {
         let letters = outline::letters(text)?;
         Ok(Self { drawn: Drawn::Areas(regions(&letters, false)?), letters: letters.len() })
     }
 
-    /// SVG path data (`M 0 0 L 4 3 ...`, y downwards): its lines, or what they surround.
+    /// Reads SVG path data (`M 0 0 L 4 3 ...`, y downwards): its lines, or the area inside them.
     ///
     /// # Errors
-    /// [`DrawingError`] for data that cannot be read, are not finite, or draw nothing.
+    /// [`DrawingError`] for data that cannot be read, are not finite, or are empty.
     pub fn path(data: &str, filled: bool) -> Result<Self, DrawingError> {
         Self::curves(&outline::path(data)?, filled)
     }
 
-    /// An SVG file: the lines of its visible shapes, or what they surround. What is written in letters or holds pixels
-    /// is not drawn, and nothing that the file refers to is read.
+    /// Reads an SVG file: the lines of its visible shapes, or the area inside them. Text elements and images are
+    /// ignored, and referenced files are not read.
     ///
     /// # Errors
-    /// [`DrawingError`] for bytes that are no SVG, or draw nothing.
+    /// [`DrawingError`] for bytes that are not an SVG file, or an empty drawing.
     pub fn svg(bytes: &[u8], filled: bool) -> Result<Self, DrawingError> {
         Self::curves(&outline::file(bytes)?, filled)
     }
 
-    /// The pixels of a PNG picture that have this ink; without one, those that are opaque where some are not, or else
-    /// those that are dark.
+    /// Reads the pixels of a PNG picture that have this ink. By default these are the opaque pixels if some pixel is
+    /// not opaque, and otherwise the dark ones.
     ///
     /// # Errors
-    /// [`DrawingError`] for bytes that are no PNG, more than [`MAX_PIXELS`](super::MAX_PIXELS), or no such pixel.
+    /// [`DrawingError`] for bytes that are not a PNG file, more than [`MAX_PIXELS`](super::MAX_PIXELS), or an empty
+    /// drawing.
     pub fn png(bytes: &[u8], ink: Option<Ink>) -> Result<Self, DrawingError> {
         Ok(Self { drawn: Drawn::Pixels(mask(bytes, ink)?), letters: 0 })
     }
@@ -75,7 +77,7 @@ impl Drawing {
         Ok(Self { drawn: if filled { Drawn::Areas(regions) } else { Drawn::Lines(regions) }, letters: 0 })
     }
 
-    /// Width and height: the longer one is 1.
+    /// Returns width and height relative to the longer side.
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
         match &self.drawn {
@@ -87,11 +89,11 @@ impl Drawing {
         }
     }
 
-    /// Slots on the drawing in the plane z = 0, whose middle is the origin and whose longer side is 1 m: spread as
-    /// evenly as the drawing allows, always the same, near ones by near numbers.
+    /// Returns slots on the drawing in the plane z = 0, centred at the origin, with a longer side of 1 m. Slots are
+    /// spread as evenly as the drawing allows, deterministically. Slots near each other have near numbers.
     ///
-    /// # Errors [`DrawingError`] for more than [`MAX_DRAWN_SLOTS`], fewer than there are letters, or lines and areas
-    /// without extent.
+    /// # Errors
+    /// [`DrawingError`] for more than [`MAX_DRAWN_SLOTS`], fewer slots than letters, or lines and areas without extent.
     pub fn slots(&self, count: usize) -> Result<Formation, DrawingError> {
         if count > MAX_DRAWN_SLOTS {
             return Err(DrawingError::Slots(count));
@@ -136,7 +138,7 @@ impl Drawing {
     }
 }
 
-/// The raster of an area with about this many pixels drawn.
+/// Returns the raster of an area with about this many pixels drawn.
 fn fine_enough(regions: &[Region], least: usize) -> Mask {
     let coarse = Mask::of(regions, PIXELS);
     let finer = (least as f64 / coarse.count().max(1) as f64).sqrt();
@@ -148,20 +150,20 @@ fn fine_enough(regions: &[Region], least: usize) -> Mask {
     Mask::of(regions, pixels)
 }
 
-/// Most slots of a drawing.
+/// Largest number of slots of a drawing.
 pub const MAX_DRAWN_SLOTS: usize = 100_000;
 
-/// Most pixels of a picture in all, whatever its sides: 4096 x 4096.
+/// Largest number of pixels of a picture: 4096 x 4096, in any proportion.
 pub const MAX_PIXELS: u64 = 1 << 24;
 
 /// Longest text \[characters\].
 pub const MAX_TEXT_CHARS: usize = 1000;
 
-/// Why something cannot be drawn with slots.
+/// Reason why a drawing has no slots.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum DrawingError {
     /// A character that the font does not have.
-    #[error("the font has no {0:?}")]
+    #[error("the font has no glyph for {0:?}")]
     Glyph(char),
     /// A text that is too long.
     #[error("a text of {0} characters; at most {MAX_TEXT_CHARS} are drawn")]
@@ -169,22 +171,22 @@ pub enum DrawingError {
     /// Fewer slots than there are letters.
     #[error("{slots} slots for {letters} letters")]
     Letters {
-        /// Slots asked for.
+        /// Requested slots.
         slots: usize,
-        /// Letters of the text, blanks not counted.
+        /// Letters of the text without blanks.
         letters: usize,
     },
     /// Path data that cannot be read.
-    #[error("this is no SVG path: {0}")]
+    #[error("invalid SVG path: {0}")]
     Path(String),
     /// An SVG file that cannot be read.
-    #[error("this is no SVG file: {0}")]
+    #[error("invalid SVG file: {0}")]
     Svg(String),
-    /// An SVG file whose elements are nested too deep.
+    /// An SVG file whose elements are nested too deeply.
     #[error("elements of the SVG file are nested more than {0} deep")]
     Nesting(usize),
     /// A picture that cannot be read.
-    #[error("this is no PNG picture: {0}")]
+    #[error("invalid PNG picture: {0}")]
     Png(String),
     /// A picture that is too large.
     #[error("{width} x {height} pixels; at most {MAX_PIXELS} in all are read")]
@@ -194,13 +196,13 @@ pub enum DrawingError {
         /// Rows.
         height: u32,
     },
-    /// Lines that are not finite, or too far apart to compute with.
+    /// Lines that are not finite, or too long for double precision.
     #[error("drawing coordinates overflow")]
     NotFinite,
     /// No line and no area.
     #[error("nothing is drawn")]
     Empty,
-    /// More slots than a drawing is spread over.
+    /// Too many slots.
     #[error("{0} slots; a drawing has at most {MAX_DRAWN_SLOTS}")]
     Slots(usize),
 }

@@ -1,7 +1,7 @@
-//! Formations that are drawn: slots on the lines or all over the inside of letters, SVG and pictures.
+//! Drawn formations: slots on the lines or over the inside of letters, SVG and pictures.
 //!
-//! `outline` reads letters and SVG into curves, `picture` reads a PNG file into a mask. `outline` lays sample points on them, and
-//! `spread` chooses slots that keep apart among the points.
+//! `outline` reads letters and SVG into curves, `picture` reads a PNG file into a mask. `outline` then places sample
+//! points on them, and `spread` chooses evenly spaced slots among the points.
 
 mod drawing;
 mod outline;

@@ -1,4 +1,4 @@
-//! Curves as polylines of a drawing whose longer side is 1.
+//! Curves of letters and SVG as polylines of a drawing whose longer side is 1, and sample points on them.
 
 use kurbo::{Affine, BezPath, PathEl, Rect, Shape as _};
 use roxmltree::Document;
@@ -11,38 +11,35 @@ use usvg::{FillRule, Group, ImageHrefResolver, Node, Options, Tree};
 use super::drawing::{DrawingError, MAX_TEXT_CHARS};
 use super::picture::Mask;
 
-/// x to the right and y upwards, in longer sides of the drawing.
+/// Point with x to the right and y upwards, in units of the drawing's longer side.
 pub(super) type Point = [f64; 2];
 
-/// How far a polyline may lie from its curve.
+/// Largest distance of a polyline from its curve.
 const TOLERANCE: f64 = 1e-5;
 
-/// Coordinates are rounded to this part of the drawing, so that slots do not hang on the last bits of a platform's
-/// sines.
+/// Inverse of the rounding step of coordinates, so that slots do not depend on the last bits of a platform's sines.
 const GRID: f64 = (1_u64 << 36) as f64;
 
-/// Longest side of a drawing in its own units, and shortest: squares of both are normal numbers.
+/// Range of the drawing's longer side in its own units; squares of both ends are normal numbers.
 const SIDES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
-/// What is filled together, by one rule.
+/// Polylines that are filled together by one rule.
 #[derive(Clone, Debug)]
 pub(super) struct Region {
-    /// Polylines; as areas they are closed.
+    /// Polylines; closed when used as areas.
     pub(super) lines: Vec<Vec<Point>>,
-    /// Whether what an even number of lines surround is outside; else what they surround in sum no times, with their
-    /// sense.
+    /// Fill rule: even-odd if true, else nonzero winding number.
     pub(super) even_odd: bool,
 }
 
-/// A path as it was read, and its rule.
+/// Path as read, with its fill rule.
 #[derive(Clone, Debug)]
 pub(super) struct Curves {
     pub(super) path: BezPath,
     pub(super) even_odd: bool,
 }
 
-/// Curves as polylines, moved and scaled so that all of it just fits within 1 x 1, from the origin; turned upside down
-/// where y counts downwards.
+/// Converts curves to polylines that fit within 1 x 1 from the origin. Flips y if it points downwards.
 pub(super) fn regions(curves: &[Curves], y_is_down: bool) -> Result<Vec<Region>, DrawingError> {
     let boxes =
         curves.iter().filter(|curves| curves.path.segments().next().is_some()).map(|curves| curves.path.bounding_box());
@@ -84,22 +81,22 @@ fn polylines(path: &BezPath) -> Vec<Vec<Point>> {
     lines
 }
 
-/// Deepest nesting of elements: drawing goes down into them one by one.
+/// Largest nesting depth of elements, which limits the recursion.
 const MAX_NESTING: usize = 200;
 
-/// Path data, as the attribute `d` of SVG has it.
+/// Reads path data, as in the attribute `d` of SVG.
 pub(super) fn path(data: &str) -> Result<Vec<Curves>, DrawingError> {
     let path = BezPath::from_svg(data).map_err(|error| DrawingError::Path(error.to_string()))?;
     Ok(vec![Curves { path, even_odd: false }])
 }
 
-/// The visible shapes of a file. What is written in letters or holds pixels is not drawn.
+/// Reads the visible shapes of a file. Text elements and images are ignored.
 pub(super) fn file(bytes: &[u8]) -> Result<Vec<Curves>, DrawingError> {
     let text = std::str::from_utf8(bytes).map_err(|error| DrawingError::Svg(error.to_string()))?;
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| DrawingError::Svg(error.to_string()))?;
     check_nesting(&document)?;
-    // Nothing is read but this file.
+    // Referenced files are not read.
     let resolver = ImageHrefResolver { resolve_data: Box::new(|_, _, _| None), resolve_string: Box::new(|_, _| None) };
     let options = Options { image_href_resolver: resolver, ..Options::default() };
     let tree = Tree::from_xmltree(&document, &options).map_err(|error| DrawingError::Svg(error.to_string()))?;
@@ -152,16 +149,16 @@ fn curve(path: &usvg::tiny_skia_path::Path) -> BezPath {
     curve
 }
 
-/// A thin sans serif, and one that has more characters.
+/// Fonts: a thin sans serif, and one with more characters.
 const FONTS: [&[u8]; 2] = [epaint_default_fonts::UBUNTU_LIGHT, epaint_default_fonts::HACK_REGULAR];
 
-/// What is added between letters, so that slots of neighbours do not run together \[em\].
+/// Extra space between letters that separates the slots of neighbours \[em\].
 const TRACKING_EM: f32 = 0.1;
 
-/// From line to line \[em\].
+/// Distance of lines \[em\].
 const LINE_EM: f64 = 1.3;
 
-/// The letters of a text, left to right, a line below the other, an em high; blanks have none.
+/// Returns the outlines of the letters of a text, one em high; blanks have none.
 pub(super) fn letters(text: &str) -> Result<Vec<Curves>, DrawingError> {
     let length = text.chars().count();
     if length > MAX_TEXT_CHARS {
@@ -222,10 +219,10 @@ impl OutlinePen for Pen {
     }
 }
 
-/// Order of the curve that walks the inside of a raster: 2^16 pixels a side.
+/// Order of the Hilbert curve through a raster: 2^16 pixels a side.
 const ORDER: u8 = 16;
 
-/// Points at equal steps along polylines, from half a step after the first end on, and the step; none without length.
+/// Returns points at equal steps along polylines, from half a step after the start, and the step; none without length.
 pub(super) fn along(lines: &[&[Point]], points: usize) -> (Vec<Point>, f64) {
     let pieces =
         || lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1], length(ends[0], ends[1]))));
@@ -250,8 +247,8 @@ fn length([x0, y0]: Point, [x1, y1]: Point) -> f64 {
     libm::hypot(x1 - x0, y1 - y0)
 }
 
-/// Points inside a mask: `count` of the middles of its pixels, or of equal parts of them, the others evenly
-/// left out; with them the side of a part. None where nothing is drawn.
+/// Returns `count` sample points inside a mask, along a Hilbert curve, and the distance of neighbouring candidates. The
+/// candidates are pixel centres or centres of equal parts of pixels, evenly thinned out. Empty for an empty mask.
 pub(super) fn inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
     let drawn = mask.count();
     let parts = (1..=count.isqrt() + 1).find(|parts| drawn * parts * parts >= count).unwrap_or(1);

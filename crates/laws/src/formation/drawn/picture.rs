@@ -1,4 +1,4 @@
-//! Pictures as masks.
+//! Masks of PNG pictures and of filled regions.
 
 use std::io::Cursor;
 
@@ -8,19 +8,19 @@ use serde::{Deserialize, Serialize};
 use super::drawing::{DrawingError, MAX_PIXELS};
 use super::outline::{Point, Region};
 
-/// Which pixels of a picture are drawn.
+/// Pixels of a picture that are drawn.
 #[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Ink {
-    /// Those darker than middle grey, on white paper.
+    /// Pixels darker than middle grey on white.
     Dark,
-    /// Those lighter than middle grey, on black paper.
+    /// Pixels lighter than middle grey on black.
     Light,
-    /// Those that cover more than half of what is below them.
+    /// Pixels with an opacity of more than half.
     Opaque,
 }
 
-/// The drawn part of a PNG picture. Without an ink: what is opaque where something is not, or else what is dark.
+/// Returns the drawn part of a PNG picture. Without an ink: opaque pixels if some pixel is not opaque, else dark ones.
 pub(super) fn mask(bytes: &[u8], ink: Option<Ink>) -> Result<Mask, DrawingError> {
     let (pixels, width) = grey_and_alpha(bytes)?;
     let see_through = pixels.iter().any(|&[_, alpha]| !covers(alpha));
@@ -38,7 +38,7 @@ fn covers(alpha: u8) -> bool {
     alpha >= 128
 }
 
-/// The pixels, row by row from above, and how many a row has.
+/// Returns grey and alpha of the pixels, row by row from above, and the number of pixels per row.
 fn grey_and_alpha(bytes: &[u8]) -> Result<(Vec<[u8; 2]>, usize), DrawingError> {
     let wrong = |error: DecodingError| DrawingError::Png(error.to_string());
     let most = usize::try_from(8 * MAX_PIXELS).unwrap_or(usize::MAX);
@@ -66,7 +66,7 @@ fn grey_and_alpha(bytes: &[u8]) -> Result<(Vec<[u8; 2]>, usize), DrawingError> {
     Ok((pixels, width as usize))
 }
 
-/// The rows from below and columns that hold something; none if none does.
+/// Crops a raster to its drawn rows and columns, with rows from below; `None` if nothing is drawn.
 fn cropped(drawn: &[bool], width: usize) -> Option<Mask> {
     let rows: Vec<&[bool]> = drawn.chunks(width).collect();
     let holds = |row: &&[bool]| row.contains(&true);
@@ -78,18 +78,18 @@ fn cropped(drawn: &[bool], width: usize) -> Option<Mask> {
     Some(Mask { width, drawn, side: 1.0 / width.max(height) as f64 })
 }
 
-/// Rows of square pixels from below, each from the left.
+/// Raster of square pixels: rows from below, each from the left.
 #[derive(Clone, Debug)]
 pub(super) struct Mask {
     pub(super) width: usize,
-    /// One flag a pixel.
+    /// One flag per pixel.
     pub(super) drawn: Vec<bool>,
-    /// Side of a pixel, in longer sides of the drawing.
+    /// Side of a pixel, relative to the drawing's longer side.
     pub(super) side: f64,
 }
 
 impl Mask {
-    /// The raster of an area that fits within 1 x 1: `pixels` along a side of that. A pixel is drawn whose middle is.
+    /// Rasterizes an area within 1 x 1 with `pixels` pixels a side. A pixel is drawn if its centre is inside.
     pub(super) fn of(regions: &[Region], pixels: usize) -> Self {
         let mut mask = Self { width: pixels, drawn: vec![false; pixels * pixels], side: 1.0 / pixels as f64 };
         for region in regions {
@@ -98,12 +98,12 @@ impl Mask {
         mask
     }
 
-    /// Number of pixels that are drawn.
+    /// Number of drawn pixels.
     pub(super) fn count(&self) -> usize {
         self.drawn.iter().filter(|&&drawn| drawn).count()
     }
 
-    /// Column and row of each pixel that is drawn.
+    /// Returns column and row of each drawn pixel.
     pub(super) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> {
         let drawn = self.drawn.iter().enumerate().filter(|&(_, &drawn)| drawn);
         drawn.map(|(place, _)| [place % self.width, place / self.width])
@@ -124,7 +124,7 @@ impl Mask {
         }
     }
 
-    /// Where the middle line of each row crosses the region's lines, with +1 upwards and -1 downwards.
+    /// Returns the crossings of each row's centre line with the region's lines, with +1 upwards and -1 downwards.
     fn crossings(&self, region: &Region) -> Vec<Vec<(f64, i32)>> {
         let mut rows: Vec<Vec<(f64, i32)>> = vec![Vec::new(); self.width];
         let mut cross = |from: Point, to: Point| {
@@ -144,7 +144,7 @@ impl Mask {
         rows
     }
 
-    /// The first pixel of a row or column whose middle is not before a coordinate.
+    /// Returns the first pixel of a row or column whose centre is not before a coordinate.
     fn first_from(&self, coordinate: f64) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the raster")]
         let first = (coordinate / self.side - 0.5).ceil().clamp(0.0, self.width as f64) as usize;

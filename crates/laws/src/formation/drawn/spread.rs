@@ -1,30 +1,30 @@
-//! Slots among samples of a drawing, as evenly as it allows.
+//! Choice of slots among samples of a drawing, as evenly spaced as it allows.
 //!
-//! Slots begin at equal numbers of samples from each other in the order of their walk, then move to the middles of
-//! what is nearest to them (Lloyd 1982), never off the drawing. What still stands too near another one moves into a
-//! wider gap beside it.
+//! Slots start at equal numbers of samples along the walk through the drawing. They then move to the centres of their
+//! Voronoi cells (Lloyd 1982), or to the nearest sample if a centre is off the drawing. A slot that is still too near
+//! another one moves into a wider gap beside it.
 
 use super::outline::Point;
 
-/// Rounds in a row in which all slots move to the middles of their parts: fewer, the more samples there are.
+/// Least and largest number of consecutive Lloyd rounds: fewer for more samples.
 const ROUNDS: [usize; 2] = [10, 40];
-/// A round that moves no slot by more than this part of a cell is the last.
+/// Largest move, as a fraction of a cell, at which the Lloyd rounds end.
 const SETTLED: f64 = 1e-3;
-/// How often slots move into gaps and settle again: less often, the more samples there are.
+/// Least and largest number of gap moves followed by Lloyd rounds: fewer for more samples.
 const SPREADS: [usize; 2] = [1, 6];
-/// Samples that are looked at in all rounds, about, before rounds are fewer.
+/// Approximate number of sample visits in all rounds above which the rounds are reduced.
 const LOOKED_AT: usize = 40_000_000;
-/// Nearer to its neighbour than this part of what the median slot is, a slot moves into a gap before all settle again,
+/// Fraction of the median nearest distance below which a slot moves into a gap before the next Lloyd rounds.
 const NEAR: f64 = 0.9;
-/// and than this part in the end, to stay there.
+/// Fraction of the median nearest distance below which a slot moves into a gap after the last Lloyd round.
 const TOO_NEAR: f64 = 0.7;
-/// Most rounds in the end.
+/// Largest number of gap rounds after the last Lloyd round.
 const GAP_ROUNDS: usize = 8;
-/// Cells are enlarged by this factor until they are not more than there are slots.
+/// Factor by which cells are enlarged until there are no more cells than slots.
 const LARGER: f64 = 1.3;
 
-/// `count` places on the drawing, in the order of the samples where they begin. `step` is about the distance of
-/// neighbouring samples; a place may be off all samples by `off` at most.
+/// Returns `count` places on the drawing, in the order of their start samples. `step` is the approximate distance of
+/// neighbouring samples. A place may be off the nearest sample by at most `off`.
 pub(super) fn spread(samples: &[Point], count: usize, step: f64, off: f64) -> Vec<Point> {
     if samples.is_empty() {
         return Vec::new();
@@ -56,14 +56,14 @@ struct Slot {
 /// Samples and slots in square cells.
 struct Field {
     side: f64,
-    /// Samples, those of a cell after each other.
+    /// Samples, grouped by cell.
     samples: Vec<Point>,
-    /// Where the samples of each cell begin, and the end.
+    /// Index of the first sample of each cell, and the number of samples at the end.
     begins: Vec<usize>,
-    /// The cells around each cell, itself among them.
+    /// Cells around each cell, itself included.
     around: Vec<Vec<usize>>,
     slots: Vec<Slot>,
-    /// The slots in each cell.
+    /// Slots in each cell.
     members: Vec<Vec<usize>>,
 }
 
@@ -92,7 +92,7 @@ impl Field {
         field
     }
 
-    /// Writes down anew which slots are in which cell.
+    /// Rebuilds the lists of slots per cell.
     fn gather(&mut self) {
         self.members.iter_mut().for_each(Vec::clear);
         for (i, slot) in self.slots.iter().enumerate() {
@@ -100,14 +100,14 @@ impl Field {
         }
     }
 
-    /// The slots in and around a cell, by number and place.
+    /// Collects the slots in and around a cell, with number and place.
     fn near(&self, cell: usize, near: &mut Vec<(usize, Point)>) {
         near.clear();
         let members = self.around[cell].iter().flat_map(|&cell| &self.members[cell]);
         near.extend(members.map(|&i| (i, self.slots[i].place)));
     }
 
-    /// Moves all slots to the middles of their parts until none moves far, or for so many rounds.
+    /// Runs at most `rounds` Lloyd rounds, until no slot moves far.
     fn settle(&mut self, rounds: usize, off: f64) {
         for _ in 0..rounds {
             if self.step_to_middles(off) <= SETTLED * self.side {
@@ -116,8 +116,8 @@ impl Field {
         }
     }
 
-    /// Moves every slot to the middle of the samples that it is the nearest slot of, or else, where that is off the
-    /// drawing, to the one of them that is nearest to there; the farthest move.
+    /// Moves every slot to the centre of the samples nearest to it, or to the nearest of these samples if the centre is
+    /// off the drawing. Returns the largest move.
     fn step_to_middles(&mut self, off: f64) -> f64 {
         let owners = self.owners();
         let mut sums = vec![([0.0, 0.0], 0.0); self.slots.len()];
@@ -148,7 +148,7 @@ impl Field {
         farthest
     }
 
-    /// The nearest slot of each sample, none where no slot is near; the lower number of two that are as near.
+    /// Returns the nearest slot of each sample, `None` without a slot in reach. Ties go to the lower number.
     fn owners(&self) -> Vec<Option<usize>> {
         let mut owners = Vec::with_capacity(self.samples.len());
         let mut near = Vec::new();
@@ -162,9 +162,9 @@ impl Field {
         owners
     }
 
-    /// Moves each slot that is nearer to another one than this part of what the median slot is: to where, among the
-    /// samples around it, it is farthest from all others. Whether any has moved; no slot comes nearer to another one
-    /// than the one that moved was before.
+    /// Moves each slot whose nearest distance is below `near_part` of the median one: to the sample around it that is
+    /// farthest from all other slots. Returns whether a slot has moved. No slot ends up nearer to another one than the
+    /// moved slot was before.
     fn fill_gaps(&mut self, near_part: f64) -> bool {
         let mut near = Vec::new();
         let mut apart: Vec<f64> = (0..self.slots.len()).map(|i| self.apart(i, &mut near)).collect();
@@ -188,8 +188,8 @@ impl Field {
         moved
     }
 
-    /// The place among the samples around a slot that is farthest from the nearest other slot, if that is farther than
-    /// `least`; and the square of how far.
+    /// Returns the sample around a slot that is farthest from the nearest other slot, with the square of that distance.
+    /// If no sample is farther than `least`, returns the slot itself and `least`.
     fn widest(&self, i: usize, least: f64, near: &mut Vec<(usize, Point)>) -> (f64, Slot) {
         let mut widest = (least, self.slots[i]);
         for &cell in &self.around[self.slots[i].cell] {
@@ -205,7 +205,7 @@ impl Field {
         widest
     }
 
-    /// Square of the distance of a slot to the nearest other one; infinite where none is near.
+    /// Returns the square of the distance of a slot to the nearest other one; infinite without another slot in reach.
     fn apart(&self, i: usize, near: &mut Vec<(usize, Point)>) -> f64 {
         self.near(self.slots[i].cell, near);
         let others = near.iter().filter(|&&(other, _)| other != i);
@@ -213,7 +213,7 @@ impl Field {
     }
 }
 
-/// The cells that hold a sample, in order.
+/// Returns the cells that hold a sample, in order.
 fn occupied(samples: &[Point], side: f64) -> Vec<[i64; 2]> {
     let mut cells: Vec<[i64; 2]> = samples.iter().map(|&point| cell(point, side)).collect();
     cells.dedup();
@@ -225,7 +225,7 @@ fn occupied(samples: &[Point], side: f64) -> Vec<[i64; 2]> {
 fn cell(point: Point, side: f64) -> [i64; 2] {
     #[expect(
         clippy::cast_possible_truncation,
-        reason = "a drawing is within 1 x 1, and a cell not smaller than a sample's step"
+        reason = "a drawing is within 1 x 1, and cells are at least as large as the sample spacing"
     )]
     let number = point.map(|x| (x / side).floor() as i64);
     number

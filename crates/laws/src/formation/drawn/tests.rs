@@ -4,14 +4,14 @@ use super::*;
 use crate::formation::Formation;
 use tautline_core::swarm::row;
 
-const STAR: &str = "M 50 0 L 61 35 L 98 35 L 68 57 L 79 91 L 50 70 L 21 91 L 32 57 L 2 35 L 39 35 Z";
+const STAR: &str = "M50 0 L61 35 L98 35 L68 57 L79 91 L50 70 L21 91 L32 57 L2 35 L39 35 Z";
 const CIRCLE: &str = "M 10 0 A 10 10 0 1 1 -10 0 A 10 10 0 1 1 10 0 Z";
 
 fn slots(drawing: Result<Drawing, DrawingError>, count: usize) -> Formation {
     drawing.and_then(|drawing| drawing.slots(count)).expect("a drawing")
 }
 
-/// Distance of each slot to its nearest one, smallest first.
+/// Returns the distance of each slot to its nearest one, smallest first.
 fn nearest_m(formation: &Formation) -> Vec<f64> {
     let count = formation.count();
     let others = |i: usize| (0..count).filter(move |&j| j != i);
@@ -21,20 +21,20 @@ fn nearest_m(formation: &Formation) -> Vec<f64> {
     nearest
 }
 
-/// Whether all slots are about as far from their nearest one, as no dot of an i is.
+/// Whether all slots have about the same distance to their nearest one.
 fn is_even(formation: &Formation) -> bool {
     let nearest_m = nearest_m(formation);
     let median_m = nearest_m[nearest_m.len() / 2];
     nearest_m[0] > 0.65 * median_m && nearest_m[nearest_m.len() - 1] < 1.6 * median_m
 }
 
-/// Number of slots in a part of the drawing, in parts of its longer side from its middle.
+/// Returns the number of slots in a part of the drawing. Coordinates are relative to its centre and longer side.
 fn within(formation: &Formation, x: std::ops::Range<f64>, y: std::ops::Range<f64>) -> usize {
     let slots_m = &formation.slots_m;
     (0..formation.count()).filter(|&i| x.contains(&slots_m[(i, 0)]) && y.contains(&slots_m[(i, 1)])).count()
 }
 
-/// A picture whose pixels are given by column and row from above.
+/// Returns a PNG file whose pixels are given by column and row from above.
 fn png(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
@@ -94,8 +94,8 @@ fn the_same_drawing_has_the_same_slots_and_neighbours_have_near_numbers() {
 }
 
 #[test]
-fn letters_have_their_forms_side_by_side() {
-    // Upright of L on the left, foot below, nothing at the upper right; T the other way about.
+fn letters_have_their_shapes_and_order() {
+    // The upright of L is on the left and its foot below, with nothing at the upper right. T is the opposite.
     let l = slots(Drawing::text("L"), 30);
     assert_eq!(within(&l, 0.0..1.0, -0.3..1.0), 0);
     assert!(within(&l, -1.0..-0.1, -0.3..1.0) > 12 && within(&l, 0.0..1.0, -1.0..-0.4) > 3);
@@ -112,20 +112,21 @@ fn letters_have_their_forms_side_by_side() {
 fn an_svg_file_is_drawn_as_it_looks() {
     let file =
         |inside: &str| format!(r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">{inside}</svg>"#);
-    let ring = file(
-        r#"<path fill-rule="evenodd" transform="translate(50 50) scale(2)" d="M 20 0 A 20 20 0 1 1 -20 0 A 20 20 0 1 1 20 0 Z M 10 0 A 10 10 0 1 1 -10 0 A 10 10 0 1 1 10 0 Z"/>"#,
-    );
+    let circle = |r: u32| format!("M {r} 0 A {r} {r} 0 1 1 -{r} 0 A {r} {r} 0 1 1 {r} 0 Z");
+    let circles = format!("{} {}", circle(20), circle(10));
+    let ring = file(&format!(r#"<path fill-rule="evenodd" transform="translate(50 50) scale(2)" d="{circles}"/>"#));
     let ring = slots(Drawing::svg(ring.as_bytes(), true), 90);
     assert!((0..90).all(|i| (0.25..0.5).contains(&row(&ring.slots_m, i).norm())));
     let outline = file(
-        "<style>.hidden { display: none }</style><rect x='10' y='10' width='50' height='25'/><circle class='hidden' r='90'/>",
+        "<style>.hidden { display: none }</style><rect x='10' y='10' width='50' height='25'/> \
+         <circle class='hidden' r='90'/>",
     );
     let drawing = Drawing::svg(outline.as_bytes(), false).expect("a drawing");
     assert!((drawing.size()[1] - 0.5).abs() < 1e-6);
     let outline = slots(Ok(drawing), 30);
     let on_it = |x: f64, y: f64| (x.abs() - 0.5).abs() < 1e-6 || (y.abs() - 0.25).abs() < 1e-6;
     assert!((0..30).all(|i| on_it(outline.slots_m[(i, 0)], outline.slots_m[(i, 1)])));
-    // y counts downwards: the tip is above.
+    // y points downwards in SVG, so the tip is above.
     let tip = slots(Drawing::svg(file("<polygon points='50,0 100,100 0,100'/>").as_bytes(), true), 60);
     assert!(within(&tip, -1.0..1.0, 0.0..1.0) < 20);
     for nothing in [
@@ -139,8 +140,8 @@ fn an_svg_file_is_drawn_as_it_looks() {
 }
 
 #[test]
-fn a_picture_is_drawn_where_its_ink_is() {
-    // Dark on the upper left of white, with a frame that is cropped.
+fn slots_lie_on_the_ink_of_a_picture() {
+    // Dark on the upper left of white, with a margin that is cropped.
     let dark =
         png(60, 60, |x, y| if (10..50).contains(&x) && (10..50).contains(&y) && x + y < 60 { BLACK } else { WHITE });
     let corner = slots(Drawing::png(&dark, None), 50);
@@ -156,7 +157,7 @@ fn a_picture_is_drawn_where_its_ink_is() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused() {
+fn invalid_drawings_are_refused() {
     let refusal =
         |drawing: Result<Drawing, DrawingError>, count| drawing.and_then(|drawing| drawing.slots(count)).err();
     assert_eq!(refusal(Drawing::text("A\u{65e5}"), 9), Some(DrawingError::Glyph('\u{65e5}')));
@@ -188,7 +189,7 @@ fn what_cannot_be_drawn_is_refused() {
 }
 
 #[test]
-fn a_picture_that_claims_to_be_huge_is_refused_before_memory_is_taken() {
+fn a_huge_picture_is_refused_by_its_header() {
     let mut bytes = png(8, 8, |_, _| BLACK);
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 2, 0, 0]);
     let crc = !bytes[12..29].iter().fold(!0_u32, |crc, &byte| {
@@ -202,8 +203,10 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn any_text_path_and_file_is_drawn_or_refused(
-        text in "\\PC{0,6}", path in "[MLHVCQSTAZmlhvcqstaz]( ?-?[0-9]{1,3}(\\.[0-9])?(e[0-9]{1,3})?){0,7}( [LCQAZ]( -?[0-9]{1,3}){0,7}){0,3}",
+    fn arbitrary_input_is_drawn_or_refused(
+        text in "\\PC{0,6}",
+        path in "[MLHVCQSTAZmlhvcqstaz]( ?-?[0-9]{1,3}(\\.[0-9])?(e[0-9]{1,3})?){0,7}\
+                 ( [LCQAZ]( -?[0-9]{1,3}){0,7}){0,3}",
         bytes in prop::collection::vec(any::<u8>(), 0..200), place in 0..200_usize, filled in any::<bool>(),
     ) {
         let shown = format!("<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'><path d='{path}'/></svg>");

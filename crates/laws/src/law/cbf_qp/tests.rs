@@ -27,25 +27,25 @@ fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }
 
-/// h of a pair under the default keys: A = 10 m/s^2.
+/// Returns h of a pair under the default keys, where A = 10 m/s^2.
 fn barrier_m_s(apart_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
     (20.0 * (apart_m.norm() - DELTA_M)).sqrt() + apart_m.dot(&relative_m_s) / apart_m.norm()
 }
 
 #[test]
-fn the_bound_of_two_that_meet_is_the_one_found_by_hand() {
+fn the_bound_of_a_closing_pair_matches_a_hand_calculation() {
     // l = 4, n . w = -2: sqrt(2 A (l - delta)) = sqrt 40, h = sqrt 40 - 2.
     let law = law(&Formation::line(2, 3.0));
     let found = law.bound_m_s2(-Vector3::x(), 4.0, Vector3::new(2.0, 0.0, 0.0));
     assert!((found - (80.876_877 - 3.162_278 + 0.4)).abs() < 2e-6, "{found}");
-    // With 3 m/s across the line of sight they part by 9/4 m/s^2 of themselves.
+    // A relative velocity of 3 m/s across the line of sight adds a centrifugal 9/4 m/s^2.
     let turning = law.bound_m_s2(-Vector3::x(), 4.0, Vector3::new(2.0, 3.0, 0.0));
     assert!((turning - found - 2.25).abs() < 1e-12, "{turning}");
 }
 
 proptest! {
     #[test]
-    fn a_pair_at_its_bound_approaches_the_barrier_at_the_rate_that_is_allowed(
+    fn a_pair_at_its_bound_approaches_the_barrier_at_the_allowed_rate(
         direction in vectors(1.0), clearance_m in 0.05..4.0_f64, relative in vectors(3.0), push in vectors(5.0),
     ) {
         const STEP_S: f64 = 1e-6;
@@ -53,7 +53,7 @@ proptest! {
         let normal = direction.normalize();
         let apart_m = normal * (DELTA_M + clearance_m);
         let bound = law(&Formation::line(2, 3.0)).bound_m_s2(normal, apart_m.norm(), relative);
-        // Along the line of sight the two use all that is left to them.
+        // Along the line of sight the two use the whole bound.
         let commanded = push - normal * (normal.dot(&push) + bound);
         let acceleration = commanded + A22_PER_S * relative;
         let at = |time_s: f64| barrier_m_s(apart_m + relative * time_s, relative + acceleration * time_s);
@@ -63,7 +63,7 @@ proptest! {
     }
 
     #[test]
-    fn beyond_the_range_nobody_below_the_highest_speed_is_asked_for_anything(
+    fn beyond_the_range_half_spaces_are_inactive_below_the_highest_speed(
         relative in vectors(1.0), beyond in 1.0..3.0_f64,
     ) {
         let law = law(&Formation::line(2, 3.0));
@@ -73,7 +73,7 @@ proptest! {
     }
 
     #[test]
-    fn a_swarm_in_the_plane_stays_there_and_no_limit_is_exceeded(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
+    fn planar_swarms_get_planar_commands_within_the_limits(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
         let formation = Formation::grid(7, 2.5);
         let stirred = |from: usize, size: f64| {
             Rows::from_fn(7, |i, axis| if axis < 2 { size * numbers[from + 2 * i + axis] } else { 0.0 })
@@ -89,19 +89,19 @@ proptest! {
 }
 
 #[test]
-fn who_is_alone_flies_as_the_nominal_controller_says() {
+fn a_vehicle_out_of_range_follows_the_nominal_controller() {
     let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 60.0, 0.0, 0.0]);
     let formation = Formation::points(Rows::from_row_slice(&[0.5, 0.0, 0.0, 70.0, 0.0, 0.0]));
     let mut swarm = Swarm::at_rest(positions_m);
     swarm.velocities_m_s[(0, 1)] = 0.25;
     let found = command(&mut law(&formation), &swarm, &formation).expect("a command");
-    // k d - c v - a22 v, and for the other c v_max.
+    // k d - c v - a22 v for the first vehicle, c v_max for the second.
     assert!((row(&found, 0) - Vector3::new(0.5, -0.45, 0.0)).norm() < 1e-12, "{found}");
     assert!((row(&found, 1) - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-12, "{found}");
 }
 
 #[test]
-fn how_fast_the_law_is_is_known_of_vehicles_that_are_alone() {
+fn the_fastest_rate_is_known_only_beyond_the_range() {
     let law = law(&Formation::grid(2, 9.0));
     let rate_per_s = |nearest_m: f64| law.rates(&RateQuery::new(0.1, Some(nearest_m))).fastest_per_s;
     assert_eq!(rate_per_s(law.range_m.next_up()), Some(law.keys.c_per_s.max(law.keys.k_per_s2.sqrt())));
@@ -109,7 +109,7 @@ fn how_fast_the_law_is_is_known_of_vehicles_that_are_alone() {
 }
 
 #[test]
-fn two_that_can_brake_no_later_brake_with_all_they_have() {
+fn vehicles_at_the_barrier_brake_with_full_acceleration() {
     // h = 0: closing at sqrt(2 A clearance).
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[-1.5, 0.0, 0.0, 1.5, 0.0, 0.0]));
     let formation = Formation::points(Rows::from_row_slice(&[20.0, 0.0, 0.0, -20.0, 0.0, 0.0]));
@@ -119,10 +119,10 @@ fn two_that_can_brake_no_later_brake_with_all_they_have() {
     law.a22_per_s = 0.0;
     let found = command(&mut law, &swarm, &formation).expect("a command");
     assert!((found[(0, 0)] + 5.0).abs() < 1e-9 && (found[(1, 0)] - 5.0).abs() < 1e-9, "{found}");
-    // Nearer than delta they part, and in the very same place there is no direction.
+    // Below delta the pair parts; at the same position there is no direction.
     let touching = Swarm::at_rest(&swarm.positions_m * 0.5);
     let found = command(&mut law, &touching, &formation).expect("a command");
-    // gamma (2 A 0.5 m)^(3/2) is more than the two have.
+    // gamma (2 A 0.5 m)^(3/2) exceeds the acceleration limits.
     assert!((found[(0, 0)] + 5.0).abs() < 1e-9 && (found[(1, 0)] - 5.0).abs() < 1e-9, "{found}");
     let same = Swarm::at_rest(Rows::zeros(2));
     assert!(matches!(command(&mut law, &same, &formation), Err(LawError::Collision { .. })));

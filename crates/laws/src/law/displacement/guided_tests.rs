@@ -1,4 +1,4 @@
-//! The displacement law behind a reference, and through legs.
+//! Tests of the displacement law with a reference and with several legs.
 
 use proptest::prelude::*;
 
@@ -53,7 +53,7 @@ fn moving() -> Reference {
     guidance(&Pinning::All).motion.at(1.3)
 }
 
-/// Stirred off the slots, some of them near each other; a leader is on the reference.
+/// Swarms displaced from the slots, with some near pairs; a leader is on the reference.
 fn swarms() -> impl Strategy<Value = Swarm> {
     prop::collection::vec(-0.4..0.4_f64, 6 * COUNT).prop_map(|off| {
         let (slots_m, reference) = (Formation::grid(COUNT, 2.0).slots_m, moving());
@@ -71,9 +71,9 @@ fn swarms() -> impl Strategy<Value = Swarm> {
     })
 }
 
-/// Whoever knows the reference, and where each vehicle holds a picture of its own.
+/// Covers all pinnings, with shared and with separate tables.
 #[test]
-fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
+fn a_vehicle_that_is_not_finite_is_reported_with_any_pinning_and_tables() {
     let (formation, links) = (Formation::grid(COUNT, 2.0), Graph::star(COUNT));
     for pinning in pinnings() {
         let guidance = guidance(&pinning);
@@ -97,7 +97,7 @@ fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
             }
         }
     }
-    // One alone, which hears nobody.
+    // A single vehicle without neighbours.
     let (formation, links) = (Formation::grid(1, 2.0), Graph::complete(1));
     let context = LawContext::new(&links, &formation, DELTA_M, A22_PER_S);
     let mut law = DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law");
@@ -114,9 +114,9 @@ fn who_is_not_finite_is_named_behind_a_reference_and_where_pictures_are_held() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// dE/dt as a difference quotient along the motion itself, with the reference moving on.
+    /// Computes dE/dt as a difference quotient along the motion, with a moving reference.
     #[test]
-    fn the_energy_behind_a_moving_reference_falls_at_the_promised_rate(swarm in swarms()) {
+    fn the_energy_with_a_moving_reference_decays_at_the_proved_rate(swarm in swarms()) {
         const STEP_S: f64 = 1e-6;
         let (formation, reference) = (Formation::grid(COUNT, 2.0), moving());
         for links in graphs() {
@@ -141,7 +141,9 @@ proptest! {
     }
 
     #[test]
-    fn jumps_of_the_slots_cost_no_more_than_was_certified(swarm in swarms(), scale in 1.0..2.5_f64, yaw in -3.0..3.0_f64) {
+    fn a_jump_of_the_slots_stays_within_the_certified_energy(
+        swarm in swarms(), scale in 1.0..2.5_f64, yaw in -3.0..3.0_f64,
+    ) {
         let formation = Formation::grid(COUNT, 2.0);
         let next = Leg::first(formation.clone()).placed(scale, yaw, Vector3::new(1.0, -2.0, 0.0));
         for links in graphs() {
@@ -152,7 +154,7 @@ proptest! {
                 let certificate = law.certificate(&before, &[&next.formation]);
                 let after = law.energy(&observation(&swarm, &links, &next.formation, moving())).expect("an energy");
                 let [first, second] = certificate.legs[..] else { panic!("{certificate:?}") };
-                // A leader's own slot is not to move: errors are counted from it.
+                // Errors are relative to a leader's slot.
                 prop_assert!(after <= second.energy * (1.0 + 1e-12), "{known_by:?}: {after} {second:?}");
                 prop_assert_eq!(Some(first.energy), certificate.energy_initial);
                 prop_assert_eq!(certificate.certified_m, second.certified_m);
@@ -163,7 +165,7 @@ proptest! {
 }
 
 #[test]
-fn on_the_reference_everybody_moves_as_it_does_and_only_then() {
+fn vehicles_on_the_reference_get_its_feed_forward() {
     let (formation, reference) = (Formation::grid(COUNT, 2.0), moving());
     let mut swarm = Swarm::at_rest(formation.slots_m.clone());
     for i in 0..COUNT {
@@ -171,7 +173,7 @@ fn on_the_reference_everybody_moves_as_it_does_and_only_then() {
         set_row(&mut swarm.positions_m, i, place_m);
         set_row(&mut swarm.velocities_m_s, i, reference.velocity_m_s);
     }
-    let expected = fed_forward(&reference, A22_PER_S);
+    let expected = feed_forward_acceleration(&reference, A22_PER_S);
     for links in graphs() {
         for known_by in pinnings() {
             let mut law = law(&links, &formation, &[], &guidance(&known_by));
@@ -185,7 +187,7 @@ fn on_the_reference_everybody_moves_as_it_does_and_only_then() {
 }
 
 #[test]
-fn a_leader_is_moved_by_nobody() {
+fn a_leader_is_independent_of_other_vehicles() {
     let formation = Formation::grid(COUNT, 2.0);
     let mut swarm = Swarm::at_rest(formation.slots_m.clone());
     swarm.positions_m[(1, 0)] = 1.3;
@@ -200,7 +202,7 @@ fn a_leader_is_moved_by_nobody() {
 }
 
 #[test]
-fn what_a_leg_to_come_asks_for_holds_from_the_start() {
+fn the_smallest_slot_distance_of_all_legs_holds_from_the_start() {
     let (wide, tight) = (Formation::grid(COUNT, 3.0), Leg::first(Formation::grid(COUNT, 2.0)));
     let links = Graph::complete(COUNT);
     let known = guidance(&Pinning::All);
@@ -219,19 +221,19 @@ fn what_a_leg_to_come_asks_for_holds_from_the_start() {
 }
 
 #[test]
-fn a_reference_that_nobody_is_told_of_certifies_nothing_unless_it_rests() {
+fn a_moving_reference_without_feed_forward_voids_the_certificate() {
     let (formation, links) = (Formation::grid(COUNT, 2.0), Graph::star(COUNT));
     let swarm = Swarm::at_rest(formation.slots_m.clone());
     let at_rest = ReferenceMotion::Rest { position_m: Vector3::zeros() };
     for (motion, holds) in [(at_rest, true), (guidance(&Pinning::All).motion, false)] {
-        let untold = Guidance { motion, feed_forward: false, known_by: Pinning::All };
-        let law = law(&links, &formation, &[], &untold);
-        let certificate = law.certificate(&observation(&swarm, &links, &formation, untold.motion.at(0.0)), &[]);
+        let not_fed = Guidance { motion, feed_forward: false, known_by: Pinning::All };
+        let law = law(&links, &formation, &[], &not_fed);
+        let certificate = law.certificate(&observation(&swarm, &links, &formation, not_fed.motion.at(0.0)), &[]);
         assert_eq!(certificate.certified_m.is_some(), holds);
         assert_eq!(certificate.void.contains(&Void::ReferenceNotFed), !holds);
     }
-    let nobody = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
-    let context = LawContext { guidance: Some(&nobody), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
+    let unknown = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
+    let context = LawContext { guidance: Some(&unknown), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };
     let refused = DisplacementLaw::new(&context, DisplacementKeys::default());
-    assert!(matches!(refused, Err(ParameterError::NobodyKnowsTheReference)));
+    assert!(matches!(refused, Err(ParameterError::ReferenceUnknown)));
 }

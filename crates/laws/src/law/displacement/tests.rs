@@ -24,7 +24,7 @@ fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawE
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
 }
 
-/// Seven vehicles on a grid of 1.6 m, disturbed by less than leaves them clear of delta, with slots 2 m apart.
+/// Swarms of seven vehicles on a grid of 1.6 m with noise that keeps separations above delta; slots are 2 m apart.
 fn swarms() -> impl Strategy<Value = Swarm> {
     prop::collection::vec(-0.25..0.25_f64, 42).prop_map(|noise| Swarm {
         positions_m: Formation::grid(7, 1.6).slots_m + Rows::from_column_slice(&noise[..21]),
@@ -38,8 +38,8 @@ fn graphs() -> [Graph; 5] {
     [Graph::complete(7), Graph::star(7), Graph::ring(7), Graph::path(7), all_but_one]
 }
 
-/// The state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method, with the integral of
-/// the sum of `|w_i|^2` added to `fed`.
+/// Returns the state after `dt_s` seconds of p'' = a22 v + u(p, v) + w(v) by the classical Runge-Kutta method. Adds the
+/// integral of the sum of `|w_i|^2` to `fed`.
 fn pushed(
     swarm: &Swarm,
     dt_s: f64,
@@ -68,10 +68,10 @@ fn pushed(
     }
 }
 
-/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly: the push 2 zeta v~ adds all that the bound allows, one half or
-/// twice as strong less, and one against v~ takes energy away.
+/// On the complete graph dE/dt = -zeta |v~|^2 + v~.w exactly. The push 2 zeta v~ attains the bound. A push of half or
+/// twice that strength adds less, and a push against v~ removes energy.
 #[test]
-fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> {
+fn the_energy_bound_is_attained_by_the_worst_push() -> Result<(), LawError> {
     let (links, formation) = (Graph::complete(7), Formation::grid(7, 2.0));
     for (gain, least, most) in [(2.0, 1.0 - 1e-9, 1.0 + 1e-9), (1.0, -9.0, 0.9), (4.0, -9.0, 0.9), (-2.0, -9.0, -0.9)] {
         let mut law = law(&links, &formation);
@@ -95,9 +95,9 @@ fn the_bound_under_a_push_is_reached_by_the_worst_one() -> Result<(), LawError> 
     Ok(())
 }
 
-/// Also where velocities are not damped at all, and beside a pair that is too near.
+/// Includes vehicles without damping, and a pair at the barrier.
 #[test]
-fn who_is_not_finite_is_named_wherever_the_number_stands() {
+fn a_vehicle_that_is_not_finite_is_reported_on_every_graph() {
     let formation = Formation::grid(7, 2.0);
     for links in graphs() {
         for a22_per_s in [A22_PER_S, -ZETA_PER_S] {
@@ -124,7 +124,7 @@ fn who_is_not_finite_is_named_wherever_the_number_stands() {
 
 proptest! {
     #[test]
-    fn the_command_is_the_fall_of_the_potential_and_damps_velocities_over_links(swarm in swarms()) {
+    fn the_command_is_the_negative_gradient_plus_damping_over_links(swarm in swarms()) {
         const STEP_M: f64 = 1e-6;
         for links in graphs() {
             let formation = Formation::grid(7, 2.0);
@@ -148,7 +148,7 @@ proptest! {
     }
 
     #[test]
-    fn the_energy_falls_at_least_at_the_promised_rate_on_every_graph(swarm in swarms()) {
+    fn the_energy_decays_at_the_proved_rate_on_every_graph(swarm in swarms()) {
         for links in graphs() {
             let formation = Formation::grid(7, 2.0);
             let mut law = law(&links, &formation);
@@ -168,7 +168,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_certified_is_where_one_pair_would_hold_all_the_energy(swarm in swarms()) {
+    fn the_tension_at_the_certified_separation_equals_the_energy(swarm in swarms()) {
         for links in graphs() {
             let formation = Formation::grid(7, 2.0);
             let law = law(&links, &formation);
@@ -191,7 +191,7 @@ proptest! {
 }
 
 #[test]
-fn slots_are_at_rest_wherever_the_swarm_is_and_touch_nothing() {
+fn translated_slots_are_an_equilibrium_without_contact() {
     let formation = Formation::grid(7, 2.0);
     let moved = Swarm::at_rest(Rows::from_fn(7, |i, axis| formation.slots_m[(i, axis)] + 10.0));
     for links in graphs() {
@@ -203,7 +203,7 @@ fn slots_are_at_rest_wherever_the_swarm_is_and_touch_nothing() {
 }
 
 #[test]
-fn what_has_no_law_is_refused() {
+fn invalid_states_and_parameters_are_refused() {
     let (links, formation) = (Graph::complete(2), Formation::line(2, 2.0));
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
     let at = Observation::exact(&touching, &links, &formation);
@@ -222,7 +222,7 @@ fn what_has_no_law_is_refused() {
 }
 
 #[test]
-fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
+fn pairs_at_or_beyond_the_slot_distance_do_not_raise_the_rate() {
     let law = law(&Graph::complete(7), &Formation::grid(7, 2.0));
     let rate = |nearest_m| law.rates(&RateQuery::new(A22_PER_S, Some(nearest_m))).fastest_per_s.expect("a rate");
     let rest_m = law.capabilities().sensing_range_m.expect("a range");
@@ -231,8 +231,8 @@ fn pairs_as_far_as_slots_or_farther_shorten_no_step() {
     assert_eq!(law.rates(&RateQuery::new(A22_PER_S, None)).fastest_per_s, None);
 }
 
-/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, whose energy is `|r'|^2/4 + V(l)`. Gives how far that
-/// rises above its start, as a share of it, where the force is made by `push`.
+/// Two vehicles that meet between ellipsoids, without links: `r'' = 2 F`, with energy `|r'|^2/4 + V(l)`. Returns the
+/// largest relative rise of the energy if `push` gives the force.
 fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> f64 {
     const STEP_S: f64 = 2e-4;
     let potential = |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or(0.0, |(_, of_pair)| of_pair);
@@ -249,7 +249,7 @@ fn highest_rise(law: &DisplacementLaw, angle: f64, push: &dyn Fn(Vector3<f64>) -
 }
 
 #[test]
-fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feeds_energy_in() {
+fn the_push_between_ellipsoids_is_a_gradient() {
     let (links, formation) =
         (Graph::complete(2), Formation::points(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0])));
     let metric = Metric::of_ratio(3.0);
@@ -257,7 +257,7 @@ fn the_push_between_ellipsoids_is_a_gradient_and_with_one_factor_too_few_it_feed
     let law = DisplacementLaw::new(&context, keys()).expect("a law");
     let right =
         |r: Vector3<f64>| law.push(0, 1, r).expect("clear of delta").map_or_else(Vector3::zeros, |(pushed, _)| pushed);
-    // S once: -V' S dp/l.
+    // With S instead of S^2: -V' S dp/l.
     let wrong = |r: Vector3<f64>| {
         let push = right(r);
         Vector3::new(push.x, push.y, push.z * metric.ratio())

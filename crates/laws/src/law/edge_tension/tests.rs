@@ -5,16 +5,16 @@ use nalgebra::Vector3;
 use super::*;
 use tautline_core::swarm::{row, set_row};
 
-/// Places printed for E(0) in the reference cases.
+/// Precision of E(0) in the reference cases.
 const ENERGY_TOLERANCE: f64 = 1e-7;
-/// Places printed for the certified separation \[m\].
+/// Precision of the certified separation in the reference cases \[m\].
 const CERTIFIED_TOLERANCE_M: f64 = 1e-6;
-/// Places printed for the control at the start \[m/s^2\].
+/// Precision of the control at the start in the reference cases \[m/s^2\].
 const CONTROL_TOLERANCE_M_S2: f64 = 1e-9;
 
 const A22_PER_S: f64 = 0.1;
 
-/// The pentagon on a line: left to right vehicles 4, 1, 3, 2, 5 at a spacing of 3 m, a zig-zag of 0.05 m across it.
+/// Returns the pentagon start: from left to right vehicles 4, 1, 3, 2, 5 at a spacing of 3 m, with a zigzag of 0.05 m.
 fn pentagon_start() -> Swarm {
     let mut positions_m = Rows::zeros(5);
     for (place, vehicle) in [3, 0, 2, 1, 4].into_iter().enumerate() {
@@ -24,11 +24,11 @@ fn pentagon_start() -> Swarm {
     Swarm::at_rest(positions_m)
 }
 
-/// Exact knowledge of a swarm: the law asks its own graph and formation.
+/// Returns an exact observation. The law uses its own graph and formation, so those given here are empty.
 fn exact(swarm: &Swarm) -> Observation<'_> {
-    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
-    static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
-    Observation::exact(swarm, &NOBODY, &NOWHERE)
+    static NO_GRAPH: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
+    static NO_FORMATION: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
+    Observation::exact(swarm, &NO_GRAPH, &NO_FORMATION)
 }
 
 fn law(graph: &Graph, formation: &Formation, delta_m: f64) -> EdgeTensionLaw {
@@ -41,7 +41,7 @@ fn pentagon_law() -> EdgeTensionLaw {
 }
 
 #[test]
-fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference() -> Result<(), LawError> {
+fn the_pentagon_start_has_the_reference_energy_certificate_and_control() -> Result<(), LawError> {
     let (mut law, start) = (pentagon_law(), pentagon_start());
     let certificate = law.certificate(&exact(&start), &[]);
     assert_eq!(certificate.void, []);
@@ -56,7 +56,7 @@ fn the_pentagon_starts_with_the_energy_certificate_and_control_of_the_reference(
 }
 
 #[test]
-fn the_circle_starts_with_the_energy_and_certificate_of_the_reference() {
+fn the_circle_start_has_the_reference_energy_and_certificate() {
     let positions_m = Rows::from_fn(6, |i, axis| [2.0 * i as f64, if i == 0 { 0.05 } else { 0.0 }, 0.0][axis]);
     let certificate = law(&Graph::complete(6), &Formation::circle(6, 1.5), 1.0)
         .certificate(&exact(&Swarm::at_rest(positions_m)), &[]);
@@ -82,7 +82,7 @@ fn the_certificate_is_the_smallest_root_over_all_pairs() {
 }
 
 #[test]
-fn the_certificate_says_why_it_is_void() {
+fn a_void_certificate_lists_its_reasons() {
     let (graph, formation) = (Graph::ring(5), Formation::pentagon(3.0));
     let on_ring = law(&graph, &formation, 2.0).certificate(&exact(&pentagon_start()), &[]);
     assert_eq!((on_ring.certified_m, on_ring.void), (None, vec![Void::GraphNotComplete]));
@@ -98,7 +98,7 @@ fn the_certificate_says_why_it_is_void() {
 }
 
 #[test]
-fn at_the_formation_the_law_asks_for_nothing_but_rounding() -> Result<(), LawError> {
+fn at_the_formation_the_command_is_zero_up_to_rounding() -> Result<(), LawError> {
     let formation = Formation::sphere(40, 5.0);
     let mut law = law(&Graph::complete(40), &formation, 0.5);
     let mut control = Rows::zeros(40);
@@ -110,7 +110,7 @@ fn at_the_formation_the_law_asks_for_nothing_but_rounding() -> Result<(), LawErr
 }
 
 #[test]
-fn a_pair_exactly_at_delta_is_a_collision_and_one_step_of_rounding_farther_is_not() {
+fn a_pair_at_delta_collides_and_one_ulp_farther_does_not() {
     let mut law = law(&Graph::complete(2), &Formation::line(2, 3.0), 2.0);
     let mut control = Rows::zeros(2);
     for (distance, collides) in [(2.0_f64.next_down(), true), (2.0, true), (2.0_f64.next_up(), false)] {
@@ -123,7 +123,7 @@ fn a_pair_exactly_at_delta_is_a_collision_and_one_step_of_rounding_farther_is_no
 }
 
 #[test]
-fn of_several_collisions_the_first_in_index_order_is_named() {
+fn the_first_of_several_collisions_is_reported() {
     for count in [8, 40] {
         let formation = Formation::line(count, 3.0);
         let mut swarm = Swarm::at_rest(formation.slots_m.clone());
@@ -198,7 +198,7 @@ fn parameters_without_a_law_are_refused() {
 }
 
 #[test]
-fn a_swarm_without_pairs_is_left_alone() -> Result<(), LawError> {
+fn a_swarm_without_pairs_gets_zero_commands() -> Result<(), LawError> {
     for count in 0..2 {
         let mut law = law(&Graph::complete(count), &Formation::line(count, 3.0), 2.0);
         let mut swarm = Swarm::at_rest(Rows::zeros(count));

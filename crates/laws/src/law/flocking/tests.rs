@@ -23,21 +23,21 @@ fn command(law: &mut FlockingLaw, swarm: &Swarm) -> Result<Rows, LawError> {
 }
 
 #[test]
-fn the_force_between_two_is_the_one_found_by_hand() {
+fn the_pair_force_matches_a_hand_calculation() {
     let law = law(2, FlockingKeys::default());
     assert!((sigma_norm(7.0) - 14.289_916).abs() < 1e-6 && (sigma_norm(8.4) - 18.383_094).abs() < 1e-6);
     let pull = |length_m: f64| law.pull_m_s2(Vector3::new(length_m, 0.0, 0.0), Vector3::zeros()).x;
     assert!(pull(7.0).abs() < 1e-12, "at d");
-    assert!(pull(6.0) < 0.0 && pull(3.0) < 0.0, "away from who is nearer");
-    assert!(pull(7.7) > 0.0, "towards who is farther");
-    assert_eq!((pull(8.4), pull(20.0)), (0.0, 0.0), "and nobody beyond r is felt");
+    assert!(pull(6.0) < 0.0 && pull(3.0) < 0.0, "repulsion below d");
+    assert!(pull(7.7) > 0.0, "attraction above d");
+    assert_eq!((pull(8.4), pull(20.0)), (0.0, 0.0), "no force beyond r");
     // |2|_s = 1.832160: rho = 1, z = -12.457756, phi = -4.983968, n = 1.690309.
     assert!((pull(2.0) + 8.424_445).abs() < 1e-6, "{}", pull(2.0));
 }
 
 proptest! {
     #[test]
-    fn no_force_between_two_is_larger_than_a_over_the_root_of_epsilon(q in prop::array::uniform3(-9.0..9.0_f64)) {
+    fn pair_forces_are_at_most_a_over_root_epsilon(q in prop::array::uniform3(-9.0..9.0_f64)) {
         let law = law(2, FlockingKeys::default());
         prop_assert!(law.pull_m_s2(q.into(), Vector3::zeros()).norm() <= ACTION / EPSILON.sqrt());
     }
@@ -50,13 +50,13 @@ proptest! {
             velocities_m_s: Rows::from_column_slice(&numbers[21..]),
         };
         let found = command(&mut law(7, keys), &swarm)?;
-        // But for a22, which is made up for.
+        // Except for a22, which the law compensates.
         let net = found.row_sum() + 0.1 * swarm.velocities_m_s.row_sum();
         prop_assert!(net.norm() < 1e-12 * (1.0 + found.norm()));
     }
 
     #[test]
-    fn no_limit_is_exceeded_and_the_plane_is_not_left(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
+    fn planar_swarms_get_planar_commands_within_the_limit(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
         let stirred = |from: usize| {
             Rows::from_fn(7, |i, axis| if axis < 2 { 20.0 * numbers[from + 2 * i + axis] } else { 0.0 })
         };
@@ -70,12 +70,12 @@ proptest! {
     }
 
     #[test]
-    fn the_stiffness_of_a_pair_is_within_what_the_fastest_rate_rests_on(length_m in 0.1..8.3_f64) {
+    fn the_fastest_rate_bounds_the_stiffness_of_a_pair(length_m in 0.1..8.3_f64) {
         const STEP_M: f64 = 1e-6;
         let law = law(2, FlockingKeys { c1_gamma_per_s2: 0.0, ..FlockingKeys::default() });
         let pull = |along: Vector3<f64>| law.pull_m_s2(Vector3::new(length_m, 0.0, 0.0) + along, Vector3::zeros());
         let slope = |along: Vector3<f64>| (pull(along * STEP_M) - pull(-along * STEP_M)).norm() / (2.0 * STEP_M);
-        // Two vehicles: the rate is a bound on the roots of x'' + 2 c2 x' + 2 K x.
+        // For two vehicles the rate bounds the roots of x'' + 2 c2 x' + 2 K x.
         let rate = law.rates(&RateQuery::new(0.0, Some(length_m))).fastest_per_s.expect("a rate");
         for stiff in [slope(Vector3::x()), slope(Vector3::y())] {
             prop_assert!(2.0 + (4.0 + 2.0 * stiff).sqrt() <= rate + 1e-6, "{stiff} {rate}");
@@ -84,7 +84,7 @@ proptest! {
 }
 
 #[test]
-fn the_objective_pulls_to_the_centre_of_the_slots_and_brakes() {
+fn the_objective_pulls_to_the_centre_of_the_slots_with_damping() {
     let far = Rows::from_row_slice(&[0.0, 100.0, 0.0, 200.0, 0.0, 0.0]);
     let mut swarm = Swarm::at_rest(far);
     swarm.velocities_m_s[(1, 2)] = 1.0;

@@ -5,9 +5,9 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Clarabel's own tolerance is 1e-8: of a violation, and of the square of a distance.
+/// Tolerance of clarabel is 1e-8, for a violation and for the square of a distance.
 const CLOSE: f64 = 1e-6;
-/// How much wider a set that may have no inside is made, so that clarabel has an answer.
+/// Widening of a set that may have no interior, which clarabel needs.
 const WIDER: f64 = 1e-3;
 
 fn half_space(normal: [f64; 3], offset: f64) -> HalfSpace {
@@ -18,8 +18,8 @@ fn nearest(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Nearest {
     HalfSpaces { given: given.to_vec(), ..HalfSpaces::default() }.nearest(wish, radius)
 }
 
-/// Minimises `1/2 curvature |x|^2 + linear . x` over x, whose first three components are in the ball, with `rows . x <= limits`;
-/// `None` where clarabel does not come to an end, as in one of some thousand sets that are nearly flat.
+/// Minimises `1/2 curvature |x|^2 + linear . x` over x with `rows . x <= limits`, whose first three components are in
+/// the ball. `None` if clarabel does not converge, as in about one of a thousand nearly flat sets.
 fn clarabel<const N: usize>(
     mut rows: Vec<[f64; N]>,
     mut limits: Vec<f64>,
@@ -28,7 +28,7 @@ fn clarabel<const N: usize>(
     linear: [f64; N],
 ) -> Option<Vec<f64>> {
     let cones = [NonnegativeConeT(rows.len()), SecondOrderConeT(4)];
-    // (radius, x).
+    // The second-order cone of (radius, x).
     rows.push([0.0; N]);
     limits.push(radius);
     for axis in 0..3 {
@@ -44,7 +44,7 @@ fn clarabel<const N: usize>(
     (solver.solution.status == SolverStatus::Solved).then(|| solver.solution.x.clone())
 }
 
-/// The least largest violation, by clarabel: a fourth variable t with `normal . x + t >= offset`, t >= 0.
+/// Returns the least largest violation by clarabel: a fourth variable t with `normal . x + t >= offset`, t >= 0.
 fn least_violation(given: &[HalfSpace], radius: f64) -> f64 {
     let rows = given.iter().map(|given| [-given.normal.x, -given.normal.y, -given.normal.z, -1.0]);
     let rows = rows.chain([[0.0, 0.0, 0.0, -1.0]]).collect();
@@ -52,7 +52,7 @@ fn least_violation(given: &[HalfSpace], radius: f64) -> f64 {
     clarabel(rows, limits, radius, 0.0, [0.0, 0.0, 0.0, 1.0]).expect("its set has an inside")[3]
 }
 
-/// The square of the wish's distance to the half-spaces, by clarabel.
+/// Returns the square of the distance of `wish` to the half-spaces by clarabel.
 fn squared_distance(given: &[HalfSpace], wish: Vector3<f64>, radius: f64) -> Option<f64> {
     let rows = given.iter().map(|given| [-given.normal.x, -given.normal.y, -given.normal.z]).collect();
     let limits = given.iter().map(|given| -given.offset).collect();
@@ -64,8 +64,9 @@ fn shifted(given: &[HalfSpace], by: f64) -> Vec<HalfSpace> {
     given.iter().map(|given| HalfSpace { offset: given.offset + by, ..*given }).collect()
 }
 
-/// Whether an answer is clarabel's: in the ball, with the least largest violation, and as near as any such point; where the set
-/// of these has no inside, no nearer than a wider set, in which the answer is clarabel's.
+/// Checks an answer against clarabel: it is in the ball, has the least largest violation, and is the nearest such
+/// point. If the set of these points has no interior, the answer must be no nearer than in a wider set. In the wider
+/// set it must agree with clarabel.
 fn check(given: &[HalfSpace], wish: Vector3<f64>, radius: f64, found: Nearest) -> Result<(), String> {
     let expect = |holds: bool, said: &str| if holds { Ok(()) } else { Err(format!("{said}: {found:?}")) };
     expect(found.point.norm() <= radius * (1.0 + 1e-12), "outside of the ball")?;
@@ -90,12 +91,13 @@ fn normals() -> impl Strategy<Value = [f64; 3]> {
     prop::array::uniform3(-1.0..1.0_f64).prop_filter("a direction", |v| Vector3::from(*v).norm() > 0.1)
 }
 
-/// Half-spaces whose planes are far from parallel, most of whose sets are neither empty nor thin.
+/// Half-spaces with planes far from parallel; most intersections are neither empty nor thin.
 fn general() -> impl Strategy<Value = Vec<HalfSpace>> {
     prop::collection::vec((normals(), -1.0..0.7_f64).prop_map(|(normal, offset)| half_space(normal, offset)), 0..9)
 }
 
-/// Planes along the axes and diagonals: parallel ones, opposite ones, the same one again; turned by up to one of these angles.
+/// Planes along the axes and diagonals, with parallel, opposite and repeated ones, each rotated by up to one of these
+/// angles.
 fn degenerate(turned: &'static [f64]) -> impl Strategy<Value = Vec<HalfSpace>> {
     let whole = prop::array::uniform3(-1..2_i32).prop_filter("a direction", |v| *v != [0; 3]);
     let one = (whole, prop::sample::select(turned), -3..3_i32).prop_map(|(v, by, offset)| {
@@ -115,10 +117,10 @@ proptest! {
     }
 
     #[test]
-    fn among_parallel_opposite_and_repeated_planes_it_is_clarabels_too(
+    fn parallel_opposite_and_repeated_planes_agree_with_clarabel(
         given in degenerate(&[0.0]), wish in wishes(), radius in 0.3..2.0_f64,
     ) {
-        // Where planes leave a point or a line, clarabel's answer is that of a wider set.
+        // If the planes leave a point or a line, clarabel needs a wider set.
         let wider = shifted(&given, -WIDER);
         check(&wider, wish, radius, nearest(&wider, wish, radius)).map_err(TestCaseError::fail)?;
         let (found, least) = (nearest(&given, wish, radius), least_violation(&given, radius));
@@ -126,7 +128,7 @@ proptest! {
     }
 
     #[test]
-    fn among_nearly_parallel_planes_it_violates_as_little_as_clarabels(
+    fn nearly_parallel_planes_give_the_violation_of_clarabel(
         given in degenerate(&[0.0, 1e-3, 1e-6, 1e-9, 1e-10, 1e-12]), wish in wishes(), radius in 0.3..2.0_f64,
     ) {
         let found = nearest(&given, wish, radius);
@@ -136,7 +138,7 @@ proptest! {
     }
 
     #[test]
-    fn a_problem_in_the_plane_is_answered_in_the_plane(
+    fn a_planar_problem_has_a_planar_answer(
         given in prop_oneof![general(), degenerate(&[0.0, 1e-9])], wish in wishes(), radius in 0.3..2.0_f64,
     ) {
         let flat: Vec<HalfSpace> = given
@@ -152,7 +154,7 @@ proptest! {
     }
 
     #[test]
-    fn an_answer_that_leaves_out_a_half_space_is_not_clarabels(mut given in general(), away in normals()) {
+    fn the_check_against_clarabel_notices_an_omitted_half_space(mut given in general(), away in normals()) {
         let wish = 2.0 * Vector3::from(away).normalize();
         let wrong = nearest(&given, wish, 1.0);
         let left_out = HalfSpace { normal: -0.5 * wish, offset: 0.3 };
@@ -177,11 +179,11 @@ fn answers_known_by_hand() {
     is_at(&[left_of_1], 3.0, [1.0, 1.0, 0.0], 0.0);
     is_at(&[left_of_1, below_half], 3.0, [1.0, 0.5, 0.0], 0.0);
     is_at(&[below_half, left_of_1, half_space([0.0, 0.0, 1.0], 0.25)], 3.0, [1.0, 0.5, 0.25], 0.0);
-    // Nobody is right of 2 and left of 1: halfway between, and there as near to the wish as can be.
+    // No point is right of 2 and left of 1. The answer is halfway between, at the point nearest to the wish.
     is_at(&[left_of_1, half_space([1.0, 0.0, 0.0], 2.0)], 3.0, [1.5, 1.0, 0.0], 0.5);
-    // Beyond the ball: its nearest point.
+    // The half-space is beyond the ball, so the answer is the nearest point of the ball.
     is_at(&[half_space([1.0, 0.0, 0.0], 2.0)], 1.0, [1.0, 0.0, 0.0], 1.0);
-    // Three in the plane that leave nothing: the centre of the triangle.
+    // Three half-planes with an empty intersection: the answer is the centre of the triangle.
     let triangle = [0.0, 120.0, 240.0_f64].map(|degrees| {
         let (sin, cos) = libm::sincos(degrees.to_radians());
         half_space([cos, sin, 0.0], 1.0)

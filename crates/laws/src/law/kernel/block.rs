@@ -1,40 +1,40 @@
-//! Edges taken through the edge tension side by side, stage by stage.
+//! Evaluation of the edge tension for a block of edges, stage by stage.
 //!
-//! From the positions of two vehicles to the pull between them leads a chain of some forty operations, each of which waits for
-//! the one before. A stage is a short part of it for all edges of a block, of which a processor has many in flight.
-#![expect(clippy::inline_always, reason = "only what is inlined is compiled for the instructions found at run time")]
+//! The pull between two vehicles takes a chain of some forty dependent operations. A stage is a short part of the chain
+//! for all edges of a block, so the processor overlaps the operations of many edges.
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for the instructions detected at run time")]
 
 use pulp::Simd;
 
 use crate::law::tension::{self, OutOfDomain};
 
-/// Number of partial sums that a long sum is split into, whatever the machine's vectors hold. Edges are taken so many at a time:
-/// whoever holds tables of edges or vehicles leaves room for the rest of the lanes behind the last.
+/// Number of partial sums of a long sum, independent of the machine's vector width. Edges are processed in groups of
+/// this size, so tables of edges or vehicles are padded to a multiple of it.
 pub(super) const LANES: usize = 8;
 
 pub(super) type Lanes = [f64; LANES];
 
-/// A coordinate that no vehicle pulls at: lanes behind the last edge end there.
-pub(super) const NOWHERE_M: f64 = f64::MAX;
+/// Coordinate of padding lanes: so far away that the pull is 0.
+pub(super) const PADDING_M: f64 = f64::MAX;
 
-/// Takes edges from one vehicle to others, at most B at a time, a multiple of the lanes.
+/// Evaluates edges from one vehicle to others, at most B at a time. B is a multiple of the number of lanes.
 pub(super) struct Block<const B: usize> {
     delta_m: f64,
-    /// The edges along each axis \[m\]; at the end their pulls.
+    /// Edge vectors along each axis \[m\]; at the end their pulls.
     edges: [[f64; B]; 3],
     lengths_m: [f64; B],
-    /// s; at the end V/alpha.
+    /// Scaled clearance s; at the end V/alpha.
     scaled: [f64; B],
-    /// The exponent of the one exponential that an edge takes; then that exponential less 1.
+    /// Exponent of the single exponential of an edge; then that exponential less 1.
     decays: [f64; B],
     /// Sum of V/alpha.
     potential: Lanes,
-    /// Whether some edge was not longer than delta.
+    /// Whether some edge is not longer than delta.
     is_inside: bool,
 }
 
-/// The other ends of so many edges. Each slice has whole lanes: behind the last edge any 1/K, [`NOWHERE_M`], which is infinitely
-/// far and pulls with a weight of 0, and sums of nobody.
+/// Other ends of `count` edges. Each slice has whole lanes. Padding lanes have any 1/K, positions at [`PADDING_M`]
+/// (pull with weight 0), and sums that no vehicle reads.
 pub(super) struct Ends<'a> {
     pub(super) count: usize,
     pub(super) inverse_k_per_m: &'a [f64],
@@ -51,8 +51,8 @@ impl<const B: usize> Block<B> {
         Self { delta_m, edges: [zeros; 3], lengths_m: zeros, scaled: zeros, decays: zeros, potential, is_inside: false }
     }
 
-    /// Subtracts the pull of each edge from a vehicle at `own` \[m\] from the sums of its other end: `w_ij/alpha` times the edge,
-    /// with `w_ij = V'/l`. Returns these pulls, in whole lanes, along each axis.
+    /// Subtracts the pull of each edge on a vehicle at `own` \[m\] from the sums of its other end. The pull is
+    /// `w_ij/alpha` times the edge, with `w_ij = V'/l`. Returns the pulls along each axis, in whole lanes.
     #[inline(always)]
     pub(super) fn pull<S: Simd>(&mut self, simd: S, own: [f64; 3], to: Ends<'_>) -> [&[f64]; 3] {
         let lanes = to.inverse_k_per_m.len();
@@ -70,7 +70,8 @@ impl<const B: usize> Block<B> {
         [&x[..lanes], &y[..lanes], &z[..lanes]]
     }
 
-    /// (1/alpha) sum of V. It has no finite value where a position has none, or lies too far away to tell how far.
+    /// Returns (1/alpha) times the sum of V. Fails if an edge is not longer than delta or a position gives no finite
+    /// value.
     #[inline(always)]
     pub(super) fn finish(self) -> Result<f64, OutOfDomain> {
         let potential = total(self.potential);
@@ -78,11 +79,8 @@ impl<const B: usize> Block<B> {
     }
 }
 
-/// The edges, their lengths, s and the exponents; and whether some edge is not longer than delta.
-#[expect(
-    clippy::too_many_arguments,
-    reason = "what arguments point at is known to be apart, which vector instructions need"
-)]
+/// Computes edges, lengths, s and exponents. Returns whether some edge is not longer than delta.
+#[expect(clippy::too_many_arguments, reason = "separate slice arguments do not alias, which vectorisation needs")]
 #[inline(always)]
 fn measure(
     delta_m: f64,
@@ -110,7 +108,7 @@ fn measure(
     inside != 0
 }
 
-/// Turns edges into their pulls, which are subtracted from the sums of the other ends, and s into V/alpha.
+/// Turns edges into pulls, subtracts the pulls from the sums of the other ends, and turns s into V/alpha.
 #[inline(always)]
 fn weigh(
     count: usize,
@@ -139,7 +137,7 @@ fn weigh(
     }
 }
 
-/// Adds each term to the sum of its lane. There are whole lanes of them.
+/// Adds each term to the sum of its lane. `terms` has whole lanes.
 #[inline(always)]
 pub(super) fn add_lanes<S: Simd>(simd: S, sums: &mut Lanes, terms: &[f64]) {
     let (sums, terms) = (S::as_mut_simd_f64s(sums).0, S::as_simd_f64s(terms).0);

@@ -3,11 +3,11 @@ use crate::formation::Formation;
 use crate::law::EdgeTension;
 use tautline_core::swarm::{row, separation, set_row};
 
-/// Relative error of a sum of a hundred pulls, against the sum of their sizes.
+/// Error of a sum of a hundred pulls, relative to the sum of their magnitudes.
 const SUM_ROUNDING: f64 = 1e-14;
 const DELTA_M: f64 = 0.1;
 
-/// A kernel on the distances of a formation, and a swarm that is spread out otherwise.
+/// Returns a kernel for the distances of a formation, and positions with other distances.
 fn fixture(graph: &Graph) -> (Kernel, Rows, Formation) {
     let count = graph.count();
     let wider = if count < BANDED_FROM { 1.0 } else { 10.0 };
@@ -33,7 +33,7 @@ fn graphs() -> Vec<Graph> {
     complete.into_iter().chain([Graph::star(30), Graph::ring(17), Graph::path(10)]).collect()
 }
 
-/// Rows that take more than one block.
+/// Complete graphs whose rows take more than one block.
 fn graphs_of_long_rows() -> Vec<Graph> {
     [ROW_BLOCK + 1, ROW_BLOCK + 2, 2 * ROW_BLOCK + 3].map(Graph::complete).into()
 }
@@ -43,7 +43,7 @@ fn all_graphs() -> impl Iterator<Item = Graph> {
 }
 
 #[test]
-fn the_sums_are_those_of_the_tension_edge_by_edge() {
+fn the_sums_match_the_tension_edge_by_edge() {
     for graph in all_graphs() {
         let (mut kernel, positions_m, formation) = fixture(&graph);
         let (mut expected, mut sizes, mut potential) = (Rows::zeros(graph.count()), vec![0.0; graph.count()], 0.0);
@@ -74,7 +74,7 @@ fn the_bits_do_not_depend_on_the_vector_instructions() {
         let (mut kernel, positions_m, _) = fixture(&graph);
         let (mut dispatched, mut baseline) = (Rows::zeros(graph.count()), Rows::zeros(graph.count()));
         let potential = kernel.add_pulls(&positions_m, &mut dispatched);
-        // The code for the oldest processor of the target.
+        // Without vector instructions.
         kernel.arch = pulp::Arch::Scalar;
         assert_eq!(potential, kernel.add_pulls(&positions_m, &mut baseline));
         assert!(potential.is_ok());
@@ -84,7 +84,7 @@ fn the_bits_do_not_depend_on_the_vector_instructions() {
 
 #[test]
 fn the_bits_are_the_same_in_every_build() {
-    // Of all sums of the graphs; to be changed only with the arithmetic.
+    // Fingerprints of all sums; they change only with the arithmetic.
     for (graphs, expected) in [(graphs(), 0x9e37_5d5d_f36d_abe2), (graphs_of_long_rows(), 0xbf67_46c9_b536_8dfe)] {
         let mut fingerprint = 0_u64;
         for graph in graphs {
@@ -100,7 +100,7 @@ fn the_bits_are_the_same_in_every_build() {
 }
 
 #[test]
-fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
+fn a_pair_out_of_domain_is_noticed_at_every_edge() {
     for graph in [Graph::complete(7), Graph::complete(ROW_BLOCK + 3), Graph::ring(2 * LIST_BLOCK + 3)] {
         let (mut kernel, positions_m, _) = fixture(&graph);
         for (i, j) in graph.edges() {
@@ -122,12 +122,12 @@ fn one_pair_out_of_domain_is_noticed_wherever_it_is() {
 }
 
 #[test]
-fn the_bits_of_bands_do_not_depend_on_the_number_of_threads_and_are_those_of_their_rows() {
+fn the_bits_of_bands_do_not_depend_on_the_number_of_threads() {
     let graph = Graph::complete(BANDED_FROM);
     let (mut kernel, positions_m, _) = fixture(&graph);
     let mut whole = Rows::zeros(graph.count());
     let mut in_one = kernel.clone();
-    in_one.bands = Some(Bands::new(graph.count(), 1, LANES, NOWHERE_M));
+    in_one.bands = Some(Bands::new(graph.count(), 1, LANES, PADDING_M));
     let potential = in_one.add_pulls(&positions_m, &mut whole).expect("far apart");
 
     let mut on = |threads: usize| {
@@ -140,13 +140,13 @@ fn the_bits_of_bands_do_not_depend_on_the_number_of_threads_and_are_those_of_the
     let one = on(1);
     assert!([2, 3, 7].into_iter().all(|threads| on(threads) == one));
     assert!((one.1 - potential).abs() <= SUM_ROUNDING * potential);
-    // Pulls of a row cancel: rounding counts against the sum of their sizes, 640 of up to 1 each.
+    // The pulls of a row cancel, so the rounding is relative to the sum of their magnitudes: 640 of up to 1 each.
     let largest = (&one.0 - &whole).amax();
     assert!(largest > 0.0 && largest < SUM_ROUNDING * BANDED_FROM as f64, "{largest:e}");
 }
 
 #[test]
-fn one_pair_out_of_domain_is_noticed_in_every_band() {
+fn a_pair_out_of_domain_is_noticed_in_every_band() {
     let (mut kernel, positions_m, _) = fixture(&Graph::complete(BANDED_FROM));
     for i in (0..BANDED_FROM).step_by(20) {
         let mut touching = positions_m.clone();
@@ -160,7 +160,7 @@ fn one_pair_out_of_domain_is_noticed_in_every_band() {
 const BANDS: usize = 16;
 
 #[test]
-fn every_row_is_in_one_band_and_bands_have_about_as_many_edges() {
+fn bands_partition_the_rows_with_about_equal_edges() {
     for count in [0, 1, 2, 17, 640, 1000, 12_345] {
         let mut bands = Bands::new(count, BANDS, 3, -1.0);
         let rows: Vec<_> = bands.bands.iter().flat_map(|band| band.rows.clone()).collect();
@@ -185,7 +185,7 @@ fn every_row_is_in_one_band_and_bands_have_about_as_many_edges() {
 }
 
 #[test]
-fn one_band_without_a_potential_leaves_all_without() {
+fn an_error_in_one_band_is_returned() {
     let mut sums = [(); 3].map(|()| vec![0.0; 100]);
     let sums = sums.each_mut().map(Vec::as_mut_slice);
     let evaluate = |rows: Range<usize>, _: [&[f64]; 3], _: [&mut [f64]; 3]| {

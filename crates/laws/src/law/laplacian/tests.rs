@@ -8,10 +8,10 @@ use tautline_core::swarm::{Swarm, row, set_row};
 /// Relative rounding of sums over a few dozen edges.
 const ROUNDING: f64 = 1e-13;
 
-/// Exact knowledge of a swarm on its way to a formation; where it is exact, the law asks its own graph.
+/// Returns an exact observation. The law uses its own graph, so the graph given here is empty.
 fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
-    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
-    Observation::exact(swarm, &NOBODY, formation)
+    static NO_GRAPH: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
+    Observation::exact(swarm, &NO_GRAPH, formation)
 }
 
 fn laplacian(graph: &Graph, formation: &Formation, f1: f64, f2: f64) -> Result<LaplacianLaw, ParameterError> {
@@ -47,7 +47,7 @@ fn the_control_is_the_sum_over_the_neighbours() -> Result<(), Box<dyn std::error
 }
 
 #[test]
-fn at_the_slots_moving_together_nothing_is_asked_for() -> Result<(), Box<dyn std::error::Error>> {
+fn at_the_slots_with_a_common_velocity_the_command_is_zero() -> Result<(), Box<dyn std::error::Error>> {
     let formation = Formation::pentagon(3.0);
     let mut swarm = Swarm::at_rest(formation.slots_m.clone());
     swarm.velocities_m_s.fill(2.5);
@@ -61,7 +61,7 @@ fn at_the_slots_moving_together_nothing_is_asked_for() -> Result<(), Box<dyn std
 }
 
 #[test]
-fn nothing_is_certified_and_an_energy_is_given_only_where_it_is_one() -> Result<(), ParameterError> {
+fn the_certificate_is_void_and_the_energy_exists_on_the_complete_graph() -> Result<(), ParameterError> {
     let (formation, swarm) = (Formation::grid(6, 2.0), swarm(6));
     let law = |graph: &Graph, f1| laplacian(graph, &formation, f1, 1.1);
     let certificate = law(&Graph::complete(6), 1.0)?.certificate(&exact(&swarm, &formation), &[]);

@@ -11,7 +11,7 @@ fn mode(k: f64, c: f64) -> Mode {
 }
 
 #[test]
-fn delay_margins_are_those_measured_by_direct_simulation() {
+fn delay_margins_match_direct_simulation() {
     for ((g, k, c, a22), expected_s) in [
         ((1.0, 1.0, 1.0, 0.0), 0.711),
         ((1.0, 1.0, 1.1, 0.1), 0.674),
@@ -27,7 +27,7 @@ fn delay_margins_are_those_measured_by_direct_simulation() {
     assert_eq!(mode(0.0, 0.1).delay_margin_s(-0.2), f64::INFINITY, "drag alone holds it");
 }
 
-/// Root of the characteristic equation near a guess, by Newton's method with differences.
+/// Returns the root of a characteristic equation near a guess, by Newton's method with difference quotients.
 fn root(f: impl Fn(Complex<f64>) -> Complex<f64>, mut s: Complex<f64>) -> Complex<f64> {
     for _ in 0..60 {
         let h = Complex::new(1e-6, 0.0);
@@ -38,7 +38,7 @@ fn root(f: impl Fn(Complex<f64>) -> Complex<f64>, mut s: Complex<f64>) -> Comple
 }
 
 #[test]
-fn at_its_margin_a_mode_turns_without_growing_and_beyond_it_grows() {
+fn a_mode_becomes_unstable_at_its_delay_margin() {
     for (k, c, a22) in [(1.0, 1.0, 0.0), (2.0, 0.7, -0.3), (0.5, 1.5, 0.2)] {
         let margin_s = mode(k, c).delay_margin_s(a22);
         let difference: f64 = c * c - a22 * a22;
@@ -55,7 +55,7 @@ fn at_its_margin_a_mode_turns_without_growing_and_beyond_it_grows() {
 }
 
 #[test]
-fn sampling_margins_are_the_closed_form_and_where_the_largest_eigenvalue_leaves_the_unit_circle() {
+fn sampling_margins_match_closed_form_and_spectral_radius() {
     for (k, c) in [(1.0, 1.0), (4.0, 1.0), (0.1, 2.0)] {
         let found_s = mode(k, c).sampling_margin_s(0.0);
         assert!((found_s / (2.0_f64 / c).min(2.0 * c / k) - 1.0).abs() < 1e-12, "{k} {c}: {found_s}");
@@ -63,7 +63,7 @@ fn sampling_margins_are_the_closed_form_and_where_the_largest_eigenvalue_leaves_
     for (k, c, a22) in [(1.0, 1.1, 0.1), (2.0, 1.0, -0.5), (1.0, 1.0, 1e-7)] {
         let margin_s = mode(k, c).sampling_margin_s(a22);
         let radius = |period_s: f64| {
-            let (bounded, moved_s, pushed_s2) = held(a22, period_s);
+            let (bounded, moved_s, pushed_s2) = zero_order_hold(a22, period_s);
             let step = Matrix2::new(1.0 - k * pushed_s2, moved_s - c * pushed_s2, -k * moved_s, bounded - c * moved_s);
             step.complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max)
         };
@@ -75,7 +75,7 @@ fn sampling_margins_are_the_closed_form_and_where_the_largest_eigenvalue_leaves_
 }
 
 #[test]
-fn what_a_held_command_does_is_as_exact_where_the_closed_form_cancels() {
+fn the_response_to_a_held_command_is_accurate_for_small_a22() {
     for x in [0.0, 1e-12, 1e-6, 9.9e-4, -9.9e-4, 1.01e-3, -1.01e-3, 0.5, -2.0_f64] {
         // e^x, (e^x - 1)/x and (e^x - 1 - x)/x^2 are sums of x^n/(n + k)!.
         let sum = |k: u32| {
@@ -87,7 +87,7 @@ fn what_a_held_command_does_is_as_exact_where_the_closed_form_cancels() {
             first + terms.sum::<f64>()
         };
         let period_s = 2.5;
-        let (bounded, moved_s, pushed_s2) = held(x / period_s, period_s);
+        let (bounded, moved_s, pushed_s2) = zero_order_hold(x / period_s, period_s);
         for (found, exact) in
             [(bounded, sum(0)), (moved_s, period_s * sum(1)), (pushed_s2, period_s * period_s * sum(2))]
         {
@@ -96,7 +96,7 @@ fn what_a_held_command_does_is_as_exact_where_the_closed_form_cancels() {
     }
 }
 
-/// det of s^2 - a22 s + (k + c s) (D - A e^(-s tau)) over a graph.
+/// Returns the determinant of s^2 - a22 s + (k + c s) (D - A e^(-s tau)) over a graph.
 fn determinant(
     heard: &Heard,
     graph: &Graph,
@@ -114,8 +114,8 @@ fn determinant(
     .determinant()
 }
 
-/// Whether some root is to the right of the imaginary axis, but for those at the origin: turns of the determinant along the
-/// edge of a large half disc, a little off the axis (the principle of the argument).
+/// Whether some root is to the right of the imaginary axis, except at the origin. Counts the turns of the determinant
+/// along a large half disc whose straight edge is slightly off the axis (argument principle).
 fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> bool {
     const PARTS: u32 = 60_000;
     const RADIUS: f64 = 60.0;
@@ -123,7 +123,7 @@ fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> b
     let along = |k: u32| {
         let share = f64::from(k) / f64::from(PARTS);
         if share < 0.5 {
-            // Up the axis in the middle finer than at its ends.
+            // Steps along the straight edge are finer near its middle.
             let up = (share - 0.25) * 4.0;
             Complex::new(OFF, RADIUS * up * up * up)
         } else {
@@ -145,7 +145,7 @@ fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> b
 }
 
 #[test]
-fn margins_of_what_is_heard_are_where_a_root_of_the_whole_swarm_crosses() {
+fn delay_margins_of_received_states_match_the_roots_of_the_swarm() {
     for (graph, pinning, a22) in [
         (Graph::complete(5), Pinning::Nobody, 0.0),
         (Graph::complete(4), Pinning::Nobody, -0.2),
@@ -158,7 +158,7 @@ fn margins_of_what_is_heard_are_where_a_root_of_the_whole_swarm_crosses() {
         let links = crate::law::pinned::PinnedConsensus::new(&graph, pinning.clone());
         let gain = mode(1.0, 1.0 + a22).times(1.0 / graph.pinned_connectivity(&pinning));
         let heard = links.linear(gain, gain).heard.expect("a graph of the list");
-        let margin_s = heard.delay_margin_s(a22).expect("told apart");
+        let margin_s = heard.delay_margin_s(a22).expect("a margin");
         if margin_s.is_infinite() {
             assert!(!grows(&heard, &graph, &pinning, (a22, 30.0)), "{graph:?}");
             continue;
@@ -169,16 +169,17 @@ fn margins_of_what_is_heard_are_where_a_root_of_the_whole_swarm_crosses() {
 }
 
 #[test]
-fn followers_of_a_hub_hear_nobody_in_a_loop_and_bear_any_delay() {
+fn followers_of_a_leader_on_a_star_are_stable_with_any_delay() {
     let graph = Graph::star(5);
     let links = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Leader(0));
     let gain = mode(1.0, 1.0);
     let linear = links.linear(gain, gain);
     assert_eq!(linear.heard.and_then(|heard| heard.delay_margin_s(0.1)), Some(f64::INFINITY));
-    // On a path neither own nor others' parts have the modes of the sum.
+    // On a path own and received terms do not have the modes of their sum.
     let path = crate::law::pinned::PinnedConsensus::new(&Graph::path(4), Pinning::Nobody);
     assert_eq!(path.linear(gain, gain).heard, None);
-    // What grows by itself without a reference cannot be told apart on a star, and can where D is the same for all.
+    // Without a reference, unstable common motion cannot be separated on a star, but can if D is a multiple of the
+    // identity.
     let star = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Nobody).linear(gain, gain).heard;
     assert_eq!(star.expect("a star").delay_margin_s(0.1), None);
     let ring = crate::law::pinned::PinnedConsensus::new(&Graph::ring(5), Pinning::Nobody).linear(gain, gain).heard;
@@ -203,12 +204,12 @@ fn the_pentagon_in_contact_is_far_stiffer_than_free() {
     let led = LawContext { guidance: Some(&guidance), ..context };
     let law = LawSpec::Displacement(DisplacementKeys::default()).build(&led).expect("a law");
     let linear = law.linear(&slots).expect("modes");
-    // Followers hear four others, one of them the leader, and the leader is drawn to the reference by itself.
+    // Each follower has four neighbours, one of them the leader. The leader follows the reference independently.
     assert_eq!((linear.free.len(), linear.stiffest_contact_mode), (3, None));
 }
 
 #[test]
-fn modes_of_the_edge_tension_are_those_of_its_command_near_the_formation() {
+fn edge_tension_modes_match_differences_of_its_command() {
     let (graph, slots) = (Graph::complete(5), Formation::pentagon(4.0));
     let context = LawContext::new(&graph, &slots, 2.0, 0.1);
     let law = LawSpec::EdgeTension(EdgeTensionKeys::default()).build(&context).expect("a law");

@@ -23,7 +23,7 @@ fn law(formation: &Formation, keys: OrcaKeys) -> OrcaLaw {
     OrcaLaw::new(&context, keys).expect("finite keys")
 }
 
-/// The velocities that are chosen, and the accelerations that are commanded.
+/// Returns the chosen velocities and the commanded accelerations.
 fn answer(law: &mut OrcaLaw, swarm: &Swarm, formation: &Formation) -> Result<(Rows, Rows), LawError> {
     let (links, mut near) = (Graph::complete(swarm.count()), NearPairs::default());
     near.update(&swarm.positions_m, law.range_m);
@@ -38,7 +38,7 @@ fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }
 
-/// How near the two come within the horizon, less delta.
+/// Returns the least clearance of the two within the horizon.
 fn clearance_m(towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
     let speed_squared = relative_m_s.norm_squared();
     let closest_s = if speed_squared > 0.0 { towards_m.dot(&relative_m_s) / speed_squared } else { 0.0 };
@@ -46,31 +46,31 @@ fn clearance_m(towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
 }
 
 #[test]
-fn the_way_out_is_the_one_found_by_hand() {
+fn the_way_out_matches_a_hand_calculation() {
     let towards = obstacle(Vector3::new(4.0, 0.0, 0.0));
     let is = |relative: [f64; 3], normal: [f64; 3], depth_m_s: f64| {
         let (found, depth) = towards.way_out(relative.into());
         assert!((found - Vector3::from(normal)).norm() < 1e-12 && (depth - depth_m_s).abs() < 1e-12, "{found} {depth}");
     };
-    // The tip: the ball of radius 1 about (2, 0), met from this side.
+    // The tip: the ball of radius 1 about (2, 0), approached from the near side.
     is([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.0);
     is([1.5, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.5);
     is([0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], -1.0);
-    // The mantle, at 30 degrees from the line of sight.
+    // The lateral surface, at 30 degrees from the line of sight.
     let (sine, cosine) = (0.5, 0.75_f64.sqrt());
     is([3.0, 1.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine - cosine);
     is([3.0, 0.0, -1.0], [-sine, 0.0, -cosine], 3.0 * sine - cosine);
     is([-0.5, 5.0, 0.0], [-sine, cosine, 0.0], -0.5 * sine - 5.0 * cosine);
-    // Straight at the other, to the left.
+    // Directly towards the other vehicle: turns left.
     is([3.0, 0.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine);
-    // Too near already: out of the ball of radius 8 about (4, 0), within a quarter of a second.
+    // Already too near: out of the ball of radius 8 about (4, 0), within a quarter of a second.
     let (normal, depth_m_s) = obstacle(Vector3::new(1.0, 0.0, 0.0)).way_out(Vector3::zeros());
     assert_eq!((normal, depth_m_s), (-Vector3::x(), 4.0));
 }
 
 proptest! {
     #[test]
-    fn a_velocity_is_inside_while_it_brings_the_two_too_near_and_no_shorter_way_leads_out(
+    fn the_velocity_obstacle_is_the_set_of_too_near_passes_and_its_exit_is_shortest(
         towards_m in vectors(5.0), relative in vectors(4.0), turn in vectors(1.0),
     ) {
         prop_assume!(towards_m.norm() > DELTA_M + 0.01 && turn.norm() > 0.01);
@@ -85,7 +85,9 @@ proptest! {
     }
 
     #[test]
-    fn the_two_of_a_pair_take_opposite_halves(towards_m in vectors(4.0), relative in vectors(4.0), straight in any::<bool>()) {
+    fn the_half_spaces_of_a_pair_are_opposite(
+        towards_m in vectors(4.0), relative in vectors(4.0), straight in any::<bool>(),
+    ) {
         prop_assume!(towards_m.norm() > 0.1);
         let relative = if straight { towards_m * relative.x } else { relative };
         let (normal, depth_m_s) = obstacle(towards_m).way_out(relative);
@@ -94,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn a_swarm_in_the_plane_stays_there_and_no_limit_is_exceeded(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
+    fn planar_swarms_get_planar_commands_within_the_limits(numbers in prop::collection::vec(-1.0..1.0_f64, 28)) {
         let formation = Formation::grid(7, 2.5);
         let stirred = |from: usize, size: f64| {
             Rows::from_fn(7, |i, axis| if axis < 2 { size * numbers[from + 2 * i + axis] } else { 0.0 })
@@ -110,7 +112,7 @@ proptest! {
     }
 }
 
-/// Two on the x axis, 4 m apart, on their way to each other's place.
+/// Two vehicles on the x axis, 4 m apart, flying towards each other's position.
 fn head_on(speed_m_s: f64) -> (Swarm, Formation) {
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[-2.0, 0.0, 0.0, 2.0, 0.0, 0.0]));
     (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
@@ -118,10 +120,10 @@ fn head_on(speed_m_s: f64) -> (Swarm, Formation) {
 }
 
 #[test]
-fn two_that_meet_each_give_way_by_half() {
+fn each_vehicle_of_a_closing_pair_gives_way_by_half() {
     let (swarm, formation) = head_on(0.75);
     let (velocities, command) = answer(&mut law(&formation, keys()), &swarm, &formation).expect("answers");
-    // 2 m of clearance in 2 s: at most 0.5 m/s each, where 1 m/s is preferred.
+    // 2 m of clearance in 2 s allow at most 0.5 m/s each; 1 m/s is preferred.
     assert!((velocities[(0, 0)] - 0.5).abs() < 1e-12 && (velocities[(1, 0)] + 0.5).abs() < 1e-12, "{velocities}");
     assert!((command[(0, 0)] - (5.0 * (0.5 - 0.75) - 0.3 * 0.75)).abs() < 1e-12, "{command}");
     let (swarm, formation) = head_on(1.9);
@@ -130,8 +132,8 @@ fn two_that_meet_each_give_way_by_half() {
 }
 
 #[test]
-fn only_so_many_of_the_nearest_are_minded() {
-    // Vehicle 1 stands in the way of vehicle 0, and vehicle 2 is nearer behind it.
+fn only_the_nearest_neighbours_are_considered() {
+    // Vehicle 1 blocks vehicle 0; vehicle 2 is nearer, behind vehicle 0.
     let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.0, 0.0, 0.0, -2.5, 0.0, 0.0]);
     let formation =
         Formation::points(&positions_m * 4.0 + Rows::from_fn(3, |_, axis| if axis == 0 { 9.0 } else { 0.0 }));
@@ -144,7 +146,7 @@ fn only_so_many_of_the_nearest_are_minded() {
 }
 
 #[test]
-fn nobody_is_commanded_out_of_the_very_place_of_another() {
+fn vehicles_at_the_same_position_collide() {
     let formation = Formation::line(2, 3.0);
     let found = answer(&mut law(&formation, keys()), &Swarm::at_rest(Rows::zeros(2)), &formation);
     assert_eq!(found, Err(LawError::Collision { pair: Pair::new(0, 1), separation_m: 0.0, delta_m: DELTA_M }));

@@ -21,7 +21,7 @@ fn command(law: &mut PotentialLaw, at: &Observation<'_>) -> Result<Rows, LawErro
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
 }
 
-/// Seven vehicles on a grid of 1.6 m, disturbed by less than leaves them clear of delta, with slots 2 m apart.
+/// Swarms of seven vehicles on a grid of 1.6 m with noise that keeps separations above delta; slots are 2 m apart.
 fn swarms() -> impl Strategy<Value = Swarm> {
     prop::collection::vec(-0.25..0.25_f64, 42).prop_map(|noise| Swarm {
         positions_m: Formation::grid(7, 1.6).slots_m + Rows::from_column_slice(&noise[..21]),
@@ -31,7 +31,7 @@ fn swarms() -> impl Strategy<Value = Swarm> {
 
 proptest! {
     #[test]
-    fn the_command_is_the_fall_of_the_energy_and_the_braking(swarm in swarms()) {
+    fn the_command_is_the_negative_gradient_plus_damping(swarm in swarms()) {
         const STEP_M: f64 = 1e-6;
         for links in [Graph::complete(7), Graph::star(7), Graph::path(7)] {
             let formation = Formation::grid(7, 2.0);
@@ -53,11 +53,12 @@ proptest! {
     }
 
     #[test]
-    fn nobody_nearer_than_certified_has_more_repulsion_than_there_is_energy(swarm in swarms()) {
+    fn repulsion_at_the_certified_separation_equals_the_energy(swarm in swarms()) {
         let (links, formation) = (Graph::star(7), Formation::grid(7, 2.0));
         let law = law(&links, &formation);
         let certificate = law.certificate(&Observation::exact(&swarm, &links, &formation), &[]);
-        let (certified_m, energy) = (certificate.certified_m.expect("certified"), certificate.energy_initial.expect("energy"));
+        let certified_m = certificate.certified_m.expect("certified");
+        let energy = certificate.energy_initial.expect("energy");
         let (steep, _) = law.steepness(Pair::new(0, 1), certified_m).expect("above delta");
         prop_assert!((0.5 * 0.4 * steep * steep - energy).abs() < 1e-9 * energy);
         prop_assert!(certified_m > DELTA_M && certified_m <= 2.0);
@@ -65,7 +66,7 @@ proptest! {
 }
 
 #[test]
-fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_nothing() {
+fn collisions_and_void_certificates_are_reported() {
     let (links, formation) = (Graph::complete(2), Formation::line(2, 2.0));
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
     let at = Observation::exact(&touching, &links, &formation);
@@ -88,7 +89,7 @@ fn who_is_too_near_collides_and_who_feeds_in_more_than_is_braked_is_promised_not
 }
 
 #[test]
-fn rates_are_those_of_the_potential_s_second_derivative_and_of_the_braking() {
+fn rates_match_the_curvature_of_the_potential_and_the_damping() {
     const STEP_M: f64 = 1e-4;
     let law = law(&Graph::complete(2), &Formation::line(2, 2.0));
     let potential = |l_m: f64| 0.5 * 0.4 * law.steepness(Pair::new(0, 1), l_m).expect("above delta").0.powi(2);
@@ -106,12 +107,12 @@ fn rates_are_those_of_the_potential_s_second_derivative_and_of_the_braking() {
 }
 
 #[test]
-fn no_more_push_a_vehicle_than_balls_fit_around_it() {
+fn the_number_of_near_vehicles_is_bounded_by_packing() {
     let rate_per_s = |count: usize| {
         let law = law(&Graph::star(count), &Formation::grid(count, 2.0));
         law.rates(&RateQuery::new(A22_PER_S, Some(0.75 * law.range_m))).fastest_per_s.expect("a rate")
     };
-    // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by their volume, one of them
+    // Balls of three quarters of the range, within the range and half a ball: (1 + 8/3)^3 = 49.3 by volume, one of them
     // the vehicle's own.
     assert!(rate_per_s(49) < rate_per_s(50));
     assert_eq!(rate_per_s(50), rate_per_s(300));

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Relative error allowed to V, V' and V'': a dozen roundings, doubled by the exponent of V''.
+/// Relative error allowed for V, V' and V'': a dozen roundings, doubled by the exponent of V''.
 const ROUNDING: f64 = 1e-14;
 
 /// alpha, delta, d, l, V, V', V'' from (5) and (6) as printed, evaluated with 80 digits.
@@ -28,10 +28,10 @@ fn clearances() -> impl Iterator<Item = f64> {
 }
 
 #[test]
-fn the_tension_and_its_derivatives_have_the_digits_of_an_80_digit_evaluation() {
+fn the_tension_and_its_derivatives_match_an_80_digit_evaluation() {
     for (alpha, delta_m, rest_m, l, value, derivative, second) in REFERENCES {
         let tension = tension(alpha, delta_m, rest_m);
-        // Beside its own digits V loses those of alpha h, because h is the difference of rounded distances.
+        // V also loses the digits of alpha h, because h is the difference of rounded distances.
         let allowed = ROUNDING * (value + alpha * ((l - rest_m) / tension.k_m()).abs());
         assert!((tension.value(l) - value).abs() <= allowed, "V({l}) = {:e}, not {value:e}", tension.value(l));
         let error = tension.derivative(l) / derivative - 1.0;
@@ -43,8 +43,8 @@ fn the_tension_and_its_derivatives_have_the_digits_of_an_80_digit_evaluation() {
 
 #[test]
 fn the_derivatives_agree_with_finite_differences_over_fifteen_decades() {
-    /// Fourth-order differences at a thousandth of the scale err by 1e-12 of the fifth derivative's scale, and by
-    /// the rounding of the differenced function over the step.
+    /// Fourth-order differences at a thousandth of the scale have an error of 1e-12 of the fifth derivative's scale,
+    /// plus the rounding of the function divided by the step.
     const TRUNCATION: f64 = 1e-9;
     const DIFFERENCE_ROUNDING: f64 = 1e-15;
     let tension = tension(1.5, 0.0, 2.0 * REST);
@@ -59,7 +59,7 @@ fn the_derivatives_agree_with_finite_differences_over_fifteen_decades() {
             (&|l| tension.derivative(l), tension.second_derivative(l)),
         ] {
             let found = difference(f, l, step);
-            // The rounding of l itself moves f by f' times an ulp of l.
+            // The rounding of l moves f by f' times an ulp of l.
             let size = f(l).abs() + tension.alpha() + l * derivative.abs();
             let allowed = TRUNCATION * derivative.abs() + 4.0 * DIFFERENCE_ROUNDING * size / step;
             assert!((found - derivative).abs() <= allowed, "s = {s:e}: {found:e} and {derivative:e}");
@@ -132,8 +132,8 @@ fn parameters_without_a_tension_are_refused() {
 
 #[test]
 fn the_push_side_root_inverts_the_tension_over_forty_decades() {
-    /// The root is found to a few units in the last place of s, and V amplifies that by at most s V'/V, which is 1 at
-    /// the barrier; at the minimum V is as good as h.
+    /// The root is accurate to a few units in the last place of s. V amplifies this by at most s V'/V, which is 1 at
+    /// the barrier. At the minimum V is as accurate as h.
     const ROOT_ROUNDING: f64 = 1e-14;
     for decade in -80..=80 {
         let target = 10.0_f64.powf(f64::from(decade) / 4.0);
@@ -166,7 +166,7 @@ fn the_push_side_root_lies_between_barrier_and_rest_length() {
 
 #[test]
 fn the_exponential_is_within_two_units_in_the_last_place() {
-    /// Half a unit of the reference (libm's expm1 is good to one) on top of ours.
+    /// Half a unit of the reference (libm's expm1 has an error of at most one) in addition to the two units.
     const UNITS: f64 = 2.5;
     let ulp = |x: f64| x.abs().next_up() - x.abs();
     for step in -70_000..=1_000 {

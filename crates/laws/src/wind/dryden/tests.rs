@@ -1,16 +1,16 @@
-//! Turbulence has the variance and the correlations of its formulas, whatever the step.
+//! Tests that turbulence has the variance and the correlations of its formulas for every time step.
 
 use super::*;
 
 const DRYDEN: Dryden = Dryden { speed_20ft_m_s: 15.0, height_m: 30.0 };
 const MEAN_M_S: Vector3<f64> = Vector3::new(8.0, 0.0, 0.0);
 
-/// Seconds in which the air is carried over a share d of the scale of w.
+/// Returns the time in which the air moves by d length scales of w \[s\].
 fn seconds(d: f64) -> f64 {
     d * DRYDEN.height_m / MEAN_M_S.norm()
 }
 
-/// u, v, w at `count` steps.
+/// Returns u, v, w at `count` steps.
 fn drawn(step: &Step, seed: u64, count: usize) -> Vec<Vector3<f64>> {
     let mut eddy = Eddy::new(Normals::new(seed, 0));
     let mut next = || {
@@ -24,9 +24,9 @@ fn mean_square(air: &[Vector3<f64>]) -> Vector3<f64> {
     air.iter().map(|air| air.component_mul(air)).sum::<Vector3<f64>>() / air.len() as f64
 }
 
-/// Each of 10^6 samples at three steps; short steps are many eddies, or neighbours would be one sample.
+/// Uses 10^6 samples at each of three steps. Short steps use many independent filters, since neighbours are correlated.
 #[test]
-fn the_variance_is_that_of_the_formula_and_does_not_depend_on_the_step() {
+fn the_variance_matches_the_formula_for_every_step() {
     let samples = 1_000_000;
     for (d, eddies) in [(5e-4, 20_000), (0.05, 100), (5.0, 1)] {
         let step = DRYDEN.step(MEAN_M_S, seconds(d));
@@ -38,9 +38,9 @@ fn the_variance_is_that_of_the_formula_and_does_not_depend_on_the_step() {
     }
 }
 
-/// Lags that are not multiples of an eddy: u falls as e^-x, v and w as e^-x (1 - x/2).
+/// Lags are not multiples of a length scale: u decays as e^-x, v and w as e^-x (1 - x/2).
 #[test]
-fn correlations_are_those_of_the_formula() {
+fn correlations_match_the_formula() {
     let d = 0.1;
     let step = DRYDEN.step(MEAN_M_S, seconds(d));
     let air = drawn(&step, 3, 400_000);
@@ -55,10 +55,10 @@ fn correlations_are_those_of_the_formula() {
     }
 }
 
-/// A published way to make the same turbulence: the filter's differential equation under white noise of variance 1 a step,
-/// which is not scaled by the step. It has another variance at every step.
+/// A published method integrates the filter's differential equation with white noise of variance 1 per step, not scaled
+/// by the step. Its variance depends on the step.
 #[test]
-fn white_noise_that_is_not_scaled_by_the_step_has_another_variance() {
+fn unscaled_white_noise_has_a_step_dependent_variance() {
     let naive = |d: f64| {
         let (mut normals, mut u, mut sum) = (Normals::new(1, 0), 0.0, 0.0);
         let samples = 200_000_u32;
@@ -72,9 +72,9 @@ fn white_noise_that_is_not_scaled_by_the_step_has_another_variance() {
     assert!(naive(0.01) < 0.2 * naive(0.1));
 }
 
-/// Worked by hand from the formulas at 100 feet.
+/// Computed by hand from the formulas at 100 feet.
 #[test]
-fn scales_are_those_of_the_standard() {
+fn scales_match_the_standard() {
     let at_100ft = Dryden { speed_20ft_m_s: 10.0, height_m: 30.48 };
     // 0.177 + 0.0823 = 0.2593; 0.2593^0.4 = 0.582802, 0.2593^1.2 = 0.197953.
     assert!((at_100ft.intensity_m_s() - Vector3::new(1.715_849, 1.715_849, 1.0)).amax() < 1e-5);
@@ -84,14 +84,14 @@ fn scales_are_those_of_the_standard() {
     assert_eq!(Dryden::frame(Vector3::zeros())[0], Vector3::x());
 }
 
-/// Over the short step below which a factor is taken from its leading term, and the one above.
+/// Compares both sides of the step below which a factor is replaced by its leading term.
 #[test]
-fn what_a_step_adds_is_continuous_where_the_formula_changes() {
+fn the_noise_of_a_step_is_continuous_at_the_change_of_formula() {
     let [below, above] = [Across::new(SHORT * (1.0 - 1e-9)), Across::new(SHORT)];
     assert!((below.l22 / above.l22 - 1.0).abs() < 2e-3, "{} {}", below.l22, above.l22);
     for d in [1e-9, 1e-6, 0.3, 40.0] {
         let Across { p, l11, l21, l22, .. } = Across::new(d);
-        // Stationary: the covariance of x, 1/2, and of y, 1/4, are what a step leaves.
+        // Stationarity: a step preserves the covariance of x, 1/2, and of y, 1/4.
         assert!((p * p * 0.5 + l11 * l11 - 0.5).abs() < 1e-15);
         let y = p * p * (0.25 + 2.0 * d * 0.25 + d * d * 0.5) + l21 * l21 + l22 * l22;
         assert!((y - 0.25).abs() < 1e-12, "{d}: {y}");
