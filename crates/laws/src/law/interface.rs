@@ -106,7 +106,7 @@ pub struct Capabilities {
     /// Whether the law runs on the calling thread alone. The law of a large swarm runs beside the audit otherwise.
     pub requires_calling_thread: bool,
     /// How errors of position settle where nothing stands in their way, for a law that can follow slots that are spread for
-    /// a while ([`crate::target::Breathing`]) and certifies anew then.
+    /// a while ([`crate::target::DeadlockOptions`]) and certifies anew then.
     pub settling: Option<Settling>,
     /// The assumptions of the certified distance, a sentence.
     pub assumptions: &'static str,

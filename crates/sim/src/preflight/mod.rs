@@ -77,7 +77,7 @@ pub struct Preflight {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegPromise>,
     /// Whether slots may be spread where the swarm is stalled, which renews what is certified.
-    pub breathes: bool,
+    pub recovers_from_deadlock: bool,
     /// Whether interchangeable vehicles may be given other slots before that, which renews it too.
     pub reassigns: bool,
     /// What the law needs beside the links, such as a sensor, in a few words each.
@@ -193,9 +193,9 @@ impl Preflight {
                 .iter()
                 .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
                 .collect(),
-            breathes: capabilities.settling.is_some() && scenario.breathing.is_on(),
+            recovers_from_deadlock: capabilities.settling.is_some() && scenario.deadlock.is_on(),
             reassigns: capabilities.settling.is_some()
-                && scenario.breathing.is_on()
+                && scenario.deadlock.is_on()
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: capabilities.needs.to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),

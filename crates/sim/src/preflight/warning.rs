@@ -124,7 +124,7 @@ impl Preflight {
                     "certified never closer than {} m in continuous time (delta {} m){}",
                     at_least(certified_m, 6),
                     self.delta_m,
-                    match (self.breathes, self.reassigns) {
+                    match (self.recovers_from_deadlock, self.reassigns) {
                         (true, true) => " unless slots are spread or assigned anew",
                         (true, false) => " unless slots are spread",
                         _ => "",
@@ -182,13 +182,13 @@ impl Preflight {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => {
-                let breath = match (self.breathes, self.reassigns) {
-                    (true, true) => ", renewed where slots are spread or assigned anew (breathing.mode)",
-                    (true, false) => ", renewed where slots are spread (breathing.mode)",
+                let renewal = match (self.recovers_from_deadlock, self.reassigns) {
+                    (true, true) => ", renewed where slots are spread or assigned anew (deadlock.mode)",
+                    (true, false) => ", renewed where slots are spread (deadlock.mode)",
                     _ => "",
                 };
                 let until = self.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
-                format!("{} m{}, from {energy}{breath}", at_least(certified_m, 6), until.unwrap_or_default())
+                format!("{} m{}, from {energy}{renewal}", at_least(certified_m, 6), until.unwrap_or_default())
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }

@@ -74,7 +74,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         actuation: document.actuation,
         failures: document.failure,
         arrival: document.arrival,
-        breathing: document.breathing,
+        deadlock: document.deadlock,
         noise_seed: document.noise.seed,
         name: document.name.unwrap_or_default(),
         airframe,

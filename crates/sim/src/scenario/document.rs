@@ -19,7 +19,7 @@ use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use tautline_core::swarm::{Rows, set_row};
 use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;
-use tautline_laws::target::{Arrival, Begins, Breathing};
+use tautline_laws::target::{Arrival, Begins, DeadlockOptions};
 use tautline_laws::wind::WindSpec;
 
 /// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
@@ -77,7 +77,7 @@ pub(super) struct Document {
     /// When slots are spread for a while, so that vehicles that stand in each other's way get past; under the displacement
     /// law.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub(super) breathing: Breathing,
+    pub(super) deadlock: DeadlockOptions,
     /// What vehicles measure of themselves and of whoever is near.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) sensing: SensingSpec,

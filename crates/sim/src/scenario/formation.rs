@@ -64,24 +64,24 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
 }
 
 /// Whether a leg's vehicles may be given other slots where they are stalled. Nobody tells whether they are under a law that
-/// is not given spread slots then either, or where breathing is off.
+/// is not given spread slots then either, or where deadlock recovery is off.
 fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> Result<bool, ScenarioError> {
     if assignment == Assignment::Given {
         return Ok(false);
     }
     let Ok(law) = scenario.law() else { return Ok(false) };
-    let why = match (law.capabilities().settling, scenario.breathing.is_on()) {
+    let why = match (law.capabilities().settling, scenario.deadlock.is_on()) {
         (Some(_), true) => return Ok(true),
         (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
-        (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),
+        (Some(_), false) => "with deadlock recovery off nobody is assigned anew where the swarm is stalled".to_owned(),
     };
     if assignment != Assignment::WhenStalled {
         return Ok(false);
     }
     Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
-        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
+        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"")
         .at_leg(leg, "formation.assignment")
-        .at_keys(["law.kind", "breathing.mode"]))
+        .at_keys(["law.kind", "deadlock.mode"]))
 }
 
 /// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.

@@ -7,7 +7,7 @@ use super::spec::{PlantSpec, Scenario};
 use crate::link::ImperfectionSpec;
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::law::{Certificate, Law, Void, certificate_through};
-use tautline_laws::target::BreathingMode;
+use tautline_laws::target::DeadlockMode;
 
 /// How far the swarm as a whole is carried.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,15 +66,15 @@ impl Scenario {
             .void_where(is_uncounted, Void::Windblown)
     }
 
-    /// Of every leg, with the breath that it begins with where it does.
+    /// Certificate of all legs, with the spread slots that a leg begins with under `deadlock.mode = "start"`.
     fn promised(&self, law: &dyn Law) -> Certificate {
         let start = self.observation(&self.start);
-        if self.breathing.mode != BreathingMode::Start || law.capabilities().settling.is_none() {
+        if self.deadlock.mode != DeadlockMode::Start || law.capabilities().settling.is_none() {
             let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
             return certificate_through(law, &start, &ahead);
         }
         let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
+        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.deadlock.scale, leader)).collect();
         let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
         let mut promised = certificate_through(law, &start, &ahead);
         // What holds on a leg is what holds once its slots have come together.

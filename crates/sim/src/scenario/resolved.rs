@@ -108,7 +108,7 @@ impl From<&Scenario> for Document {
             plant: PlantTable { kind: scenario.plant },
             time: scenario.time,
             arrival: scenario.arrival,
-            breathing: scenario.breathing,
+            deadlock: scenario.deadlock,
             sensing: scenario.sensing,
             network: scenario.network.clone(),
             actuation: scenario.actuation,

@@ -14,7 +14,7 @@ use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, Law, LawContext, LawSpec, ParameterError, WindExposure};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::{Metric, Obstacle};
-use tautline_laws::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
+use tautline_laws::target::{Arrival, DeadlockOptions, Guidance, Leg, Reference, Target};
 use tautline_laws::wind::{Wind, WindSpec};
 
 /// Default mass of a vehicle \[kg\].
@@ -66,7 +66,7 @@ pub struct Scenario {
     /// What counts as reached.
     pub arrival: Arrival,
     /// When slots are spread to let vehicles past each other, under laws that allow it.
-    pub breathing: Breathing,
+    pub deadlock: DeadlockOptions,
     /// What vehicles measure.
     pub sensing: SensingSpec,
     /// What they hear of each other.
@@ -150,7 +150,7 @@ impl Scenario {
             plant: PlantSpec::Rapier,
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
-            breathing: Breathing::default(),
+            deadlock: DeadlockOptions::default(),
             sensing: SensingSpec::default(),
             network: NetworkSpec::default(),
             actuation: ActuationSpec::default(),

@@ -14,7 +14,7 @@ use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
-use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg};
+use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg};
 use tautline_laws::wind::Gust;
 
 /// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
@@ -67,7 +67,7 @@ impl Scenario {
         self.check_time()?;
         self.check_wind()?;
         self.check_arrival()?;
-        self.check_breathing()?;
+        self.check_deadlock()?;
         self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))
     }
 
@@ -404,25 +404,25 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
 }
 
 impl Scenario {
-    pub(super) fn check_breathing(&self) -> Result<(), ScenarioError> {
-        let hold_s = self.breathing.hold_s;
+    pub(super) fn check_deadlock(&self) -> Result<(), ScenarioError> {
+        let hold_s = self.deadlock.hold_s;
         if hold_s >= self.time.duration_s {
             let duration_s = self.time.duration_s;
             return Err(ScenarioError::new(format!(
                 "spread slots are held for {hold_s} s of a flight of {duration_s} s"
             ))
             .coded("scenario/outside-flight")
-            .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
-            .at_keys(["breathing.hold_s", "time.duration_s"]));
+            .with_help("shorten deadlock.hold_s or lengthen time.duration_s: slots must come together again")
+            .at_keys(["deadlock.hold_s", "time.duration_s"]));
         }
-        if self.breathing.mode == BreathingMode::Start
+        if self.deadlock.mode == DeadlockMode::Start
             && let Ok(law) = self.law()
             && law.capabilities().settling.is_none()
         {
             return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
                 .coded("scenario/unsupported-by-law")
-                .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
-                .at_keys(["breathing.mode", "law.kind"]));
+                .with_help("leave out deadlock.mode, or set law.kind to \"displacement\"")
+                .at_keys(["deadlock.mode", "law.kind"]));
         }
         Ok(())
     }

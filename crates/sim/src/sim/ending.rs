@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::link::Traffic;
 use tautline_audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
-use tautline_core::record::{Breath, EnergyRise, Reassignment, RecordError};
+use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordError};
 use tautline_core::swarm::{Bounce, Pair, Swarm};
 use tautline_laws::law::{Certificate, LawError, ParameterError};
 
@@ -47,7 +47,7 @@ pub struct Flight {
     /// explains least; none for a law without energy.
     pub energy_rise: Option<EnergyRise>,
     /// Every time that slots were spread, in the order of time.
-    pub breaths: Vec<Breath>,
+    pub deadlock_recoveries: Vec<DeadlockRecovery>,
     /// Every time that vehicles were given other slots, in the order of time.
     pub assignments: Vec<Reassignment>,
     /// What was sent over its network, where messages were sent one by one.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::controller::Controller;
 use super::ending::Breakdown;
 use crate::scenario::Scenario;
-use tautline_core::record::{Breath, EnergyRise, Event, Reassignment};
+use tautline_core::record::{DeadlockRecovery, EnergyRise, Event, Reassignment};
 use tautline_core::swarm::{Rows, Swarm, mean_row};
 use tautline_laws::law::Certificate;
 use tautline_laws::target::Change;
@@ -135,7 +135,7 @@ pub(super) struct EnergyMonitor {
     /// The rise that integration explains least. What rounding explains is the same for all of them.
     worst: Option<EnergyRise>,
     leg: usize,
-    pub(super) breaths: Vec<Breath>,
+    pub(super) deadlock_recoveries: Vec<DeadlockRecovery>,
     pub(super) assignments: Vec<Reassignment>,
 }
 
@@ -157,8 +157,8 @@ impl EnergyMonitor {
         let certified_m = certificate.certified_m;
         events.push(match change {
             Change::Spread { scale } => {
-                self.breaths.push(Breath { time_s, scale, certified_m });
-                Event::Breath { time_s, scale }
+                self.deadlock_recoveries.push(DeadlockRecovery { time_s, scale, certified_m });
+                Event::DeadlockRecovery { time_s, scale }
             }
             Change::Assigned { slots } => {
                 let vehicles = slots.iter().enumerate().filter(|&(i, &slot)| i != slot).count();

@@ -318,7 +318,7 @@ impl Simulation {
             engine_contacts,
             bounces,
             energy_rise: self.energy_monitor.worst(),
-            breaths: self.energy_monitor.breaths,
+            deadlock_recoveries: self.energy_monitor.deadlock_recoveries,
             assignments: self.energy_monitor.assignments,
             traffic: self.controller.link.traffic(),
             last: self.state,
@@ -357,7 +357,7 @@ impl Parts {
         let supervisor = match law.capabilities().settling {
             Some(settling) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-                supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())
+                supervisor.deadlock_recovery(scenario.deadlock, settling, leader).blown(!scenario.wind.is_still())
             }
             None => supervisor,
         };

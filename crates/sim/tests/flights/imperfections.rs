@@ -196,7 +196,7 @@ fn disturbed(graph: &str, sets: &str) -> Scenario {
     read(&format!(
         "name = \"late\"\nstart = {{ positions_m = [{}] }}\nformation = {{ shape = \"points\", points_m = [{}] }}\n\
          law = {{ kind = \"displacement\", delta_m = 2.0, alpha = 1e-8 }}\ngraph = {{ kind = \"{graph}\" }}\n\
-         plant = {{ kind = \"ideal\" }}\nbreathing = {{ mode = \"off\" }}\n{sets}",
+         plant = {{ kind = \"ideal\" }}\ndeadlock = {{ mode = \"off\" }}\n{sets}",
         list(&start),
         list(&slots)
     ))

@@ -11,7 +11,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
 use tautline_laws::space::{Obstacle, Shape, least_room};
-use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg, ReferenceMotion};
 use tautline_sim::plant;
 use tautline_sim::scenario::{PlantSpec, Scenario, Source};
 use tautline_sim::sim::{Ending, Flight, Simulation};
@@ -75,7 +75,7 @@ fn among(seed: u64) -> Scenario {
     scenario.law = LawSpec::Displacement(DisplacementKeys { alpha: delta_m * delta_m, ..DisplacementKeys::default() });
     scenario.a22_per_s = numbers.between(-0.5, 0.2);
     scenario.plant = PlantSpec::Ideal;
-    scenario.breathing.mode = BreathingMode::Off;
+    scenario.deadlock.mode = DeadlockMode::Off;
     scenario.hull_radius_m.fill((0.4 * delta_m).min(0.5 * delta_m - 0.021).max(1e-3));
     scenario.legs = legs.to_vec();
     let known_by = if numbers.unit() < 0.5 { Pinning::All } else { Pinning::Listed(vec![0]) };

@@ -1,4 +1,4 @@
-//! Given slots are reached under the displacement law: on any connected graph, with breaths where vehicles stand in each
+//! Given slots are reached under the displacement law: on any connected graph, with deadlock recovery where vehicles stand in each
 //! other's way, without a violation and with no more energy than was promised.
 //!
 //! 2 random starts of each case, 6 of the 60 orderings of the pentagon, and 16 or 27 vehicles where the case is of 100 or 500,
@@ -10,7 +10,7 @@ use tautline_audit::Status;
 use tautline_core::record::Sink as _;
 use tautline_laws::formation::{Formation, Freedom};
 use tautline_laws::law::{EdgeTension, Void};
-use tautline_laws::target::BreathingMode;
+use tautline_laws::target::DeadlockMode;
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::Simulation;
@@ -116,7 +116,7 @@ fn random_edges(count: usize, seed: u64) -> Vec<[usize; 2]> {
 /// What a flight came to.
 struct Flown {
     reached_at_s: Option<f64>,
-    breaths: usize,
+    recoveries: usize,
     assignments: usize,
     separation_m: f64,
     /// What was broken, in words.
@@ -158,8 +158,8 @@ fn fly(scenario: &Scenario) -> Flown {
         // So much energy that the promise is not told from delta.
         None => (flight.certificate.void != [Void::Unresolved]).then(|| "no promise".to_owned()),
     };
-    let (breaths, assignments) = (flight.breaths.len(), flight.assignments.len());
-    Flown { reached_at_s, breaths, assignments, separation_m, broken }
+    let (recoveries, assignments) = (flight.deadlock_recoveries.len(), flight.assignments.len());
+    Flown { reached_at_s, recoveries, assignments, separation_m, broken }
 }
 
 /// Flies a case, prints its row of the table, and tells what did not come out as it must.
@@ -177,12 +177,13 @@ fn judge(name: &str, scenarios: impl Iterator<Item = Scenario>) -> Vec<String> {
         flown.len(),
         times_s.get(times_s.len() / 2).unwrap_or(&f64::NAN),
         times_s.last().unwrap_or(&f64::NAN),
-        counted(|flown| flown.breaths),
+        counted(|flown| flown.recoveries),
         counted(|flown| flown.assignments),
         flown.iter().map(|flown| flown.separation_m).fold(f64::INFINITY, f64::min),
     );
     let wrong = |(start, flown): (usize, &Flown)| {
-        let late = flown.reached_at_s.is_none().then(|| format!("not reached, {} breaths", flown.breaths));
+        let late =
+            flown.reached_at_s.is_none().then(|| format!("not reached, {} deadlock recoveries", flown.recoveries));
         Some(format!("{name}, start {start}: {}", flown.broken.clone().or(late)?))
     };
     flown.iter().enumerate().filter_map(wrong).collect()
@@ -261,7 +262,7 @@ fn a_grid_of_100_is_reached_by_interchangeable_vehicles() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What is left over: on a path of 100 vehicles stand in each other's way through eight breaths. Nothing is broken there
+/// What is left over: on a path of 100 vehicles stand in each other's way through eight deadlock recoveries. Nothing is broken there
 /// either. Steps are up to 34 times shorter, so two starts are enough.
 #[test]
 fn a_grid_of_100_is_reached_on_a_ring_and_on_a_path_nothing_is_broken() {
@@ -282,17 +283,17 @@ fn a_cube_of_500_is_reached() {
     reach(Slots::Cube(vehicles(27, 500)), "in a cube", &DENSE_GRAPHS[..2], starts_asked_for().unwrap_or(2));
 }
 
-/// Negative twin: some do not arrive without a breath.
+/// Negative twin: some do not arrive without deadlock recovery.
 #[test]
-fn who_breathes_arrives_and_who_does_not_may_be_stuck() {
-    let reached = |mode: BreathingMode| {
+fn stalled_flights_arrive_only_with_deadlock_recovery() {
+    let reached = |mode: DeadlockMode| {
         let flown = (0..3).map(|seed| {
             let mut scenario = Slots::Circle(12).scenario("path", "given", seed);
-            scenario.breathing.mode = mode;
+            scenario.deadlock.mode = mode;
             fly(&scenario)
         });
         flown.filter(|flown| flown.reached_at_s.is_some()).count()
     };
-    assert_eq!(reached(BreathingMode::Auto), 3);
-    assert!(reached(BreathingMode::Off) < 3);
+    assert_eq!(reached(DeadlockMode::Auto), 3);
+    assert!(reached(DeadlockMode::Off) < 3);
 }

@@ -62,14 +62,14 @@ fn a_law_that_follows_no_such_reference_is_refused() {
         ("orca", "leader = 2\n"),
         ("cbf-qp", "known_by = [1, 2]\n"),
         ("flocking", "known_by = [3]\n"),
-        ("orca", "[breathing]\nmode = \"start\"\n"),
+        ("orca", "[deadlock]\nmode = \"start\"\n"),
     ] {
         let error = read(&format!("{rest}{keys}"), "", law).expect_err(law);
         assert_eq!(error.code(), "scenario/unsupported-by-law", "{law}: {error}");
         assert!(error.help().is_some() && error.place().is_some(), "{law}: {error}");
     }
     for law in ["orca", "cbf-qp", "flocking"] {
-        for known in ["", "known_by = \"all\"\n", "known_by = [1, 2, 3]\n[breathing]\nmode = \"auto\"\n"] {
+        for known in ["", "known_by = \"all\"\n", "known_by = [1, 2, 3]\n[deadlock]\nmode = \"auto\"\n"] {
             assert!(read(&format!("{rest}{known}"), "", law).is_ok(), "{law} {known}");
         }
     }

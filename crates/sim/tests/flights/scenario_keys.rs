@@ -28,7 +28,7 @@ start_s = "reached"
 kind = "way-points"
 points_m = [[0, 0], [5, 0]]
 times_s = [0, 10]
-[breathing]
+[deadlock]
 mode = "start"
 hold_s = 3
 [time]

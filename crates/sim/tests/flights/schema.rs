@@ -38,7 +38,7 @@ fn a_number_beyond_a_bound_of_the_schema_is_refused_at_its_key() {
         ("swarm.dimensions", "4"),
         ("start.jitter_m", "-1"),
         ("formation.scale", "0"),
-        ("breathing.scale", "0.5"),
+        ("deadlock.scale", "0.5"),
         ("arrival.edge_error_m", "0"),
         ("network.loss", "1.5"),
         ("sensing.rate_hz", "0"),

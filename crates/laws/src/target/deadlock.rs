@@ -1,5 +1,4 @@
-//! Breathing: slots that are spread for a while, so that vehicles that stand in each other's way get past; and before that,
-//! where vehicles are interchangeable, other slots for them.
+//! Deadlock recovery: a stalled swarm first reassigns the slots of interchangeable vehicles, then spreads its slots for a time.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -12,7 +11,7 @@ use tautline_core::swarm::{Rows, Swarm, mean_row, row};
 /// When slots are spread, or interchangeable vehicles get others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum BreathingMode {
+pub enum DeadlockMode {
     /// When the swarm is stalled, under a law whose promise is renewed then.
     #[default]
     Auto,
@@ -25,9 +24,9 @@ pub enum BreathingMode {
 /// How slots are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Breathing {
+pub struct DeadlockOptions {
     /// When.
-    pub mode: BreathingMode,
+    pub mode: DeadlockMode,
     /// By how much the first time, about their centre; each time by one more.
     #[schemars(extend("minimum" = 1))]
     pub scale: f64,
@@ -44,17 +43,17 @@ fn is_zero(hold_s: &f64) -> bool {
     *hold_s == 0.0
 }
 
-impl Default for Breathing {
+impl Default for DeadlockOptions {
     fn default() -> Self {
-        Self { mode: BreathingMode::Auto, scale: 2.0, most: 8, hold_s: 0.0 }
+        Self { mode: DeadlockMode::Auto, scale: 2.0, most: 8, hold_s: 0.0 }
     }
 }
 
-impl Breathing {
+impl DeadlockOptions {
     /// Whether slots are spread at all.
     #[must_use]
     pub fn is_on(&self) -> bool {
-        self.mode != BreathingMode::Off && self.most > 0
+        self.mode != DeadlockMode::Off && self.most > 0
     }
 }
 
@@ -70,7 +69,7 @@ pub struct Settling {
 /// What a [supervisor](super::Supervisor) changed within a leg.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
-    /// A breath began: slots are spread.
+    /// A deadlock recovery began: the slots are spread.
     Spread {
         /// They are scaled by this about their centre, or about a leader's slot.
         scale: f64,
@@ -87,7 +86,7 @@ const SLOW: f64 = 0.2;
 /// No progress for this long is a stall \[s\]; for twice as long as a law takes to bring vehicles from rest to that speed, where
 /// that is longer.
 const STALLED_S: f64 = 2.0;
-/// Errors of so many times what counts as reached are worth a breath.
+/// Smallest error that starts a deadlock recovery, in multiples of the limit of arrival.
 const WORTH: f64 = 2.0;
 /// After so long without progress spread slots are given up \[s\].
 const GIVEN_UP_S: f64 = 10.0;
@@ -98,7 +97,7 @@ const FOLDING_S: f64 = 2.0;
 /// Spread by less than this they are those of the leg again.
 const CLOSED: f64 = 0.01;
 
-/// Where a breath is.
+/// Phase of a deadlock recovery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     /// Slots are those of the leg; no progress has been made since this time \[s\].
@@ -119,14 +118,14 @@ enum Phase {
 /// Where vehicles are interchangeable, they are first given the slots with the shortest ways from where they are; slots are
 /// spread where they have them already, or have been given others `most` times on the leg.
 #[derive(Clone, Debug)]
-pub(super) struct Breather {
-    breathing: Breathing,
+pub(super) struct DeadlockResolver {
+    deadlock: DeadlockOptions,
     settling: Settling,
     tolerance_m: f64,
     freedom: Freedom,
     leader: Option<usize>,
     phase: Phase,
-    breaths: u32,
+    recoveries: u32,
     assignments: u32,
     /// Until it is taken.
     change: Option<Change>,
@@ -158,9 +157,9 @@ impl Errors {
     }
 }
 
-impl Breather {
+impl DeadlockResolver {
     pub(super) fn new(
-        breathing: Breathing,
+        deadlock: DeadlockOptions,
         settling: Settling,
         leader: Option<usize>,
         arrival: Arrival,
@@ -168,7 +167,7 @@ impl Breather {
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
         let tolerance_m = WORTH * arrival.edge_error_m;
-        Self { breathing, settling, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
+        Self { deadlock, settling, tolerance_m, freedom, leader, phase, recoveries: 0, assignments: 0, change: None }
     }
 
     /// Looks at errors apart from what all have in common.
@@ -179,7 +178,7 @@ impl Breather {
     /// A leg has begun with its slots as they are given.
     pub(super) fn begin_leg(&mut self) {
         self.phase = Phase::Flying { idle_since_s: None };
-        (self.breaths, self.assignments) = (0, 0);
+        (self.recoveries, self.assignments) = (0, 0);
     }
 
     /// Whether slots are those of the leg.
@@ -202,12 +201,12 @@ impl Breather {
     }
 
     /// Spreads the slots of a leg, once more.
-    fn breathe(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
-        if self.breaths >= self.breathing.most {
+    fn spread(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
+        if self.recoveries >= self.deadlock.most {
             return;
         }
-        let scale = self.breathing.scale + f64::from(self.breaths);
-        self.breaths += 1;
+        let scale = self.deadlock.scale + f64::from(self.recoveries);
+        self.recoveries += 1;
         self.change = Some(Change::Spread { scale });
         self.phase = Phase::Spread { scale, since_s, idle_since_s: None };
         target.spread_formation(&leg.formation, scale, self.leader);
@@ -215,7 +214,7 @@ impl Breather {
 
     /// Gives interchangeable vehicles slots with shorter ways. Whether there are any.
     fn assign(&mut self, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) -> bool {
-        if !leg.interchangeable || self.assignments >= self.breathing.most {
+        if !leg.interchangeable || self.assignments >= self.deadlock.most {
             return false;
         }
         let Some(slots) = shorter_ways(&sensed.positions_m, &leg.formation, self.leader) else { return false };
@@ -231,12 +230,12 @@ impl Breather {
         let errors = Errors::of(sensed, &target.view(), self.freedom);
         match self.phase {
             Phase::Flying { idle_since_s } => {
-                let first = self.breathing.mode == BreathingMode::Start && self.breaths == 0;
+                let first = self.deadlock.mode == DeadlockMode::Start && self.recoveries == 0;
                 let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Flying { idle_since_s: since_s };
                 let stalled = since_s.is_some_and(|since_s| time_s - since_s >= self.stalled_s());
                 if first || (stalled && !self.assign(sensed, leg, target)) {
-                    self.breathe(time_s, leg, target);
+                    self.spread(time_s, leg, target);
                 }
             }
             Phase::Spread { scale, since_s, idle_since_s } => {
@@ -245,7 +244,7 @@ impl Breather {
                 self.phase = Phase::Spread { scale, since_s, idle_since_s };
                 // Those who come no nearer to spread slots either are not in each other's way.
                 let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S.max(self.stalled_s()));
-                let is_held = time_s - since_s >= self.breathing.hold_s;
+                let is_held = time_s - since_s >= self.deadlock.hold_s;
                 if is_held && (errors.max_m < SETTLED * slots_m || gives_up) {
                     self.phase = Phase::Closing { scale, since_s: time_s };
                 }
@@ -299,24 +298,24 @@ mod tests {
     const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
 
     /// The spread of the target at times 0, 0.5, 1, ... while vehicle 2 is `off(time)` m from its slot of the leg.
-    fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
+    fn spreads(deadlock: DeadlockOptions, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Fixed);
+        let mut resolver = DeadlockResolver::new(deadlock, SETTLING, None, ARRIVAL, Freedom::Fixed);
         (0..steps)
             .map(|k| {
                 let time_s = 0.5 * f64::from(k);
                 let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
                 swarm.positions_m[(1, 1)] = off_m(time_s);
-                breather.supervise(time_s, &swarm, &leg, &mut target);
+                resolver.supervise(time_s, &swarm, &leg, &mut target);
                 target.view().spread
             })
             .collect()
     }
 
     #[test]
-    fn a_swarm_that_stands_elsewhere_breathes_once_it_has_for_long_enough() {
-        let found = spreads(Breathing::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
+    fn a_stalled_swarm_spreads_its_slots_after_the_stall_time() {
+        let found = spreads(DeadlockOptions::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
         assert_eq!(found[..13], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
         // Settled at 6 s: from then on 1 + exp(-t/2), until that is 1.01.
         assert!((found[14] - (1.0 + libm::exp(-0.5))).abs() < 1e-15, "{found:?}");
@@ -325,37 +324,37 @@ mod tests {
 
     #[test]
     fn spread_slots_are_held_as_long_as_is_asked_for() {
-        let breathing = Breathing { hold_s: 9.0, ..Breathing::default() };
-        let found = spreads(breathing, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
+        let deadlock = DeadlockOptions { hold_s: 9.0, ..DeadlockOptions::default() };
+        let found = spreads(deadlock, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
         // Spread at 2 s, settled at 6 s, held to 11 s.
         assert!(found[4..=22].iter().all(|&spread| spread == 2.0), "{found:?}");
         assert!((found[23] - (1.0 + libm::exp(-0.25))).abs() < 1e-15, "{found:?}");
     }
 
     #[test]
-    fn the_next_breath_is_deeper_and_after_the_last_there_is_none() {
-        let breathing = Breathing { most: 2, ..Breathing::default() };
+    fn each_recovery_spreads_further_up_to_the_largest_number() {
+        let deadlock = DeadlockOptions { most: 2, ..DeadlockOptions::default() };
         // Settles whenever slots are spread, and is off again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Translation);
+        let mut resolver = DeadlockResolver::new(deadlock, SETTLING, None, ARRIVAL, Freedom::Translation);
         let mut begun = Vec::new();
         for k in 0..400 {
             let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
-            swarm.positions_m[(1, 1)] += if breather.is_closed() { 0.5 } else { 0.0 };
-            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
-            begun.extend(breather.take_change());
+            swarm.positions_m[(1, 1)] += if resolver.is_closed() { 0.5 } else { 0.0 };
+            resolver.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            begun.extend(resolver.take_change());
         }
         assert_eq!(begun, [2.0, 3.0].map(|scale| Change::Spread { scale }));
         assert_eq!(target.view().spread, 1.0);
     }
 
     #[test]
-    fn who_arrives_or_moves_or_is_not_to_breathe_does_not_and_who_begins_so_does() {
-        assert!(spreads(Breathing::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
-        let off = Breathing { mode: BreathingMode::Off, most: 0, ..Breathing::default() };
+    fn slots_are_spread_only_if_the_mode_and_the_errors_require_it() {
+        assert!(spreads(DeadlockOptions::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
+        let off = DeadlockOptions { mode: DeadlockMode::Off, most: 0, ..DeadlockOptions::default() };
         assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
-        let start = Breathing { mode: BreathingMode::Start, ..Breathing::default() };
+        let start = DeadlockOptions { mode: DeadlockMode::Start, ..DeadlockOptions::default() };
         assert_eq!(spreads(start, |_| 0.0, 1), [2.0]);
     }
 
@@ -363,13 +362,13 @@ mod tests {
     fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
         let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
         let mut leg = leg.clone();
-        let mut breather = Breather::new(Breathing::default(), SETTLING, leader, ARRIVAL, Freedom::Fixed);
+        let mut resolver = DeadlockResolver::new(DeadlockOptions::default(), SETTLING, leader, ARRIVAL, Freedom::Fixed);
         let mut swarm = Swarm::at_rest(leg.formation.slots_m.clone());
         (0..3).for_each(|i| swarm.positions_m[(i, 0)] = at_m[i]);
         let mut found = Vec::new();
         for k in 0..20 {
-            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
-            if let Some(change) = breather.take_change() {
+            resolver.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            if let Some(change) = resolver.take_change() {
                 if let Change::Assigned { slots } = &change {
                     super::super::assign_anew(std::slice::from_mut(&mut leg), 0, slots);
                     assert_eq!(target.view().formation, &leg.formation);
@@ -381,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn interchangeable_vehicles_get_the_nearest_slots_and_breathe_only_where_they_have_them() {
+    fn interchangeable_vehicles_are_reassigned_before_slots_are_spread() {
         let given = Leg::first(Formation::line(3, 2.0));
         let leg = Leg { interchangeable: true, ..given.clone() };
         let assigned = |slots: [usize; 3]| Change::Assigned { slots: slots.to_vec() };
