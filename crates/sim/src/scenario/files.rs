@@ -92,7 +92,7 @@ impl Columns {
                 }
             }
             if !is_named && fields.len() > columns.len() {
-                let said = format!("the first line has {1} columns, this line has {0}", fields.len(), columns.len());
+                let said = format!("the line has {} columns, but the first line has {}", fields.len(), columns.len());
                 return Err(refused(line, &said));
             }
             let numbers = numbers(&fields, &columns).map_err(|said| refused(line, &said))?;

@@ -110,7 +110,7 @@ impl Scenario {
     }
 
     /// Returns the smallest reliable distance from delta \[m\].
-    pub(super) fn told_apart_m(&self) -> f64 {
+    pub(super) fn smallest_resolved_m(&self) -> f64 {
         2.0 * self.resolution_m()
     }
 

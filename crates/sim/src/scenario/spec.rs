@@ -193,7 +193,7 @@ impl Scenario {
             wind: &self.wind,
             drag_per_s: self.drag_per_s,
             until_s: self.time.duration_s,
-            resolution_m: self.told_apart_m(),
+            resolution_m: self.smallest_resolved_m(),
         });
         self.law.build(&LawContext {
             later,
