@@ -189,7 +189,7 @@ impl Continuous {
     /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end, and the bend of the
     /// way into `path`.
     ///
-    /// The bend follows from the Green's function of the second derivative, which is at most T/4: a path of duration T
+    /// The bend follows from the Green's function of the second derivative, which is at most T/4. A path of duration T
     /// deviates from its chord by at most T/4 times the integral of |p''|. The integral is the sum of the velocity
     /// changes over the solver steps.
     ///

@@ -131,8 +131,9 @@ impl Plan {
         tension.clamp(-1.0, 1.0) as f32
     }
 
-    /// Returns the acceleration of a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, positive
-    /// for a pull, negative for a push, minus infinity at or within delta. `None` under a law without an edge tension.
+    /// Returns the acceleration of a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N. It is
+    /// positive for a pull, negative for a push, and minus infinity at or within delta. `None` under a law without an
+    /// edge tension.
     #[must_use]
     pub fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
         let vehicles = self.graph.count() as f64;

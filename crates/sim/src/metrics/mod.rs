@@ -244,9 +244,10 @@ impl<'a> Metrics<'a> {
 
     /// Returns the metrics.
     ///
-    /// The formation is reached at the end of the first step from which on all steps to the last are within the limits
-    /// of edges, positions and disagreement, if that is at least `hold_s` before the last one. Without steps, samples
-    /// are used. A formation that was held and lost again is not reached; if it was regained, the time of that counts.
+    /// The formation is reached at the end of the first step of the last sequence of steps within the limits of edges,
+    /// positions and disagreement. The sequence must last at least `hold_s` and end with the last step. Without steps,
+    /// samples are used. A formation that was held and lost again is not reached; if it was regained, the time of that
+    /// counts.
     #[must_use]
     pub fn finish(&self) -> Summary {
         let held_s = self.good_since_s.map(|since| self.last_s - since);

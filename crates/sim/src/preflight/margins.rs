@@ -87,12 +87,12 @@ pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option
             Bound::AtLeast => (given < value, "lower"),
         };
         is_beyond.then(|| {
-            let what = if margin.key == HEARD_LATE { "of the swarm, its common motion included," } else { "about the formation" };
+            let common = if margin.key == HEARD_LATE { " of the swarm, common motion included," } else { "" };
             format!(
-                "{} = {given} is beyond the {limit} limit {}: a small disturbance {what} grows, even without other \
+                "{} = {given} is beyond the {limit} limit {}: a small disturbance{common} grows, even without other \
                  imperfections.",
                 margin.key,
-                significant(value)
+                significant(value),
             )
         })
     })

@@ -310,8 +310,8 @@ impl Preflight {
     }
 
     fn flat_formation_in_space(&self) -> Option<String> {
-        let said = "The formation is flat but the swarm has three dimensions. Near the goal no force resists motion out of the \
-                    flat to first order, so this part of the error decays as t^(-1/2), not exponentially. Set \
+        let said = "The formation is flat but the swarm has three dimensions. Near the goal no force resists motion \
+                    out of the flat to first order, so this part of the error decays as t^(-1/2). Set \
                     swarm.dimensions to 2 if the swarm may stay in the plane.";
         (self.controls_distances() && self.is_flat_in_space()).then(|| said.to_owned())
     }
@@ -340,7 +340,7 @@ fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let needed_s = scenario.links_step_s(law)?;
     (shortest_s > needed_s).then(|| {
         format!(
-            "The law's links require steps of {} s, but the shortest substep of time.dt_s and time.max_halvings is {} s: the \
+            "The law's links require steps of {} s, but time.dt_s and time.max_halvings allow at least {} s: the \
              flight would not follow the law. Reduce time.dt_s, add links, or reduce the law's gains.",
             warning::significant(needed_s),
             warning::significant(shortest_s)
@@ -348,8 +348,8 @@ fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     })
 }
 
-/// Returns the dimension of the affine subspace, moving with the mean velocity, that forces along the lines between
-/// vehicles never leave: that of the positions and relative velocities together, each scaled by its extent.
+/// Returns the dimension of the affine subspace that forces along the lines between vehicles never leave. It moves with
+/// the mean velocity and contains positions and relative velocities, each scaled by its extent.
 fn motion_dimension(start: &Swarm) -> usize {
     let count = start.count();
     let mut directions = Rows::zeros(2 * count);

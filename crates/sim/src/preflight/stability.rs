@@ -18,8 +18,8 @@ impl Preflight {
         let drift = scenario.drift(self.common_mode_rate_per_s);
         let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
         format!(
-            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the whole \
-             swarm {} m away",
+            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the \
+             whole swarm {} m away",
             self.common_mode_rate_per_s,
             scenario.time.duration_s,
             warning::significant(drift.speed_m_s),
@@ -30,10 +30,7 @@ impl Preflight {
     pub(super) fn drift_unresolved(&self, scenario: &Scenario) -> Option<String> {
         let (needed_m, spacing_m) = (scenario.arrival.edge_error_m, self.spacing_m);
         let unresolved = if spacing_m > needed_m {
-            format!(
-                "where the position resolution is {} m; {needed_m} m is required",
-                warning::significant(spacing_m)
-            )
+            format!("where the position resolution is {} m; {needed_m} m is required", warning::significant(spacing_m))
         } else if self.drift_rounding_m(scenario) > needed_m {
             let rounding_m = warning::significant(self.drift_rounding_m(scenario));
             format!("where the rounding of all steps adds up to {rounding_m} m; {needed_m} m is required")
@@ -47,14 +44,14 @@ impl Preflight {
         } else {
             format!("The mean velocity carries the whole swarm {} m away", warning::significant(self.drift_m))
         };
-        Some(format!("{said}, {unresolved}. Shorten time.duration_s, or reduce what drives the mean velocity."))
+        Some(format!("{said}, {unresolved}. Reduce time.duration_s, or the cause of the mean velocity."))
     }
 
-    /// Bound of the rounding errors of all steps of the drift \[m\].
+    /// Returns a bound of the rounding errors of all steps of the drift \[m\].
     ///
-    /// A step rounds the position x to eps |x|/2 and the velocity to 3 eps |v|/2. The error of the velocity moves the vehicle
-    /// in all later steps. With x growing as exp(r t) the sum over steps of dt is 4 (eps/2) x/(r dt). With a constant velocity
-    /// it is 2 (eps/2) x T/dt.
+    /// A step rounds the position x to eps |x|/2 and the velocity to 3 eps |v|/2. The error of the velocity moves the
+    /// vehicle in all later steps. With x growing as exp(r t), the sum over steps of dt is 4 (eps/2) x/(r dt). With a
+    /// constant velocity it is 2 (eps/2) x T/dt.
     fn drift_rounding_m(&self, scenario: &Scenario) -> f64 {
         let time = &scenario.time;
         let uniform = 2.0 * time.duration_s / time.dt_s;
@@ -78,9 +75,7 @@ impl Preflight {
             ". This changes no separation.".to_owned()
         } else {
             let spacing = warning::significant(self.spacing_m);
-            format!(
-                ", where the position resolution is {spacing} m. Reduce time.duration_s or swarm.a22_per_s."
-            )
+            format!(", where the position resolution is {spacing} m. Reduce time.duration_s or swarm.a22_per_s.")
         };
         Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &effect)
     }
@@ -100,10 +95,10 @@ pub const RANK_TOLERANCE: f64 = 1e-11;
 /// Infinitesimal rigidity of a formation on its graph.
 ///
 /// Row (i, j) of the rigidity matrix R is the unit vector along the edge in the columns of i and its opposite in those
-/// of j, so R times the velocities of the slots is the rate of the edge lengths. The formation is rigid if only rigid
+/// of j. R times the velocities of the slots is the rate of the edge lengths. The formation is rigid if only rigid
 /// motions keep all lengths, that is if R has the rank of the complete graph. Then the law's stiffness matrix R^T
-/// diag(V'') R / N at the formation has no other zero modes, and convergence is exponential; otherwise it is algebraic
-/// at best.
+/// diag(V'') R / N at the formation has no other zero modes, and convergence is exponential. Otherwise convergence is
+/// algebraic at best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Rigidity {
     /// Rank of R, the same in the plane and in space; null for an incomplete graph of more than [`MOST_RANKED`]

@@ -351,11 +351,9 @@ fn the_text_matches_the_numbers() {
         "READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 1 warning"
     );
     let text = pentagon.text();
-    for said in [
-        "margin of relative velocities 1.000000 1/s",
-        "0.00417 s, divided down to ",
-        "rank 7: in the plane rigid",
-    ] {
+    for said in
+        ["margin of relative velocities 1.000000 1/s", "0.00417 s, divided down to ", "rank 7: in the plane rigid"]
+    {
         assert!(text.contains(said), "{said:?} in\n{text}");
     }
     let line = check(&scenario("pentagon-collinear", &[]));

@@ -204,8 +204,7 @@ impl Preflight {
     }
 
     fn needs_line(&self) -> String {
-        let links =
-            if self.links_all { "links between all pairs" } else { "links along the edges of the graph" };
+        let links = if self.links_all { "links between all pairs" } else { "links along the edges of the graph" };
         std::iter::once(links).chain(self.needs.iter().copied()).collect::<Vec<_>>().join("; ")
     }
 
@@ -221,7 +220,7 @@ impl Preflight {
                 let down = significant(dt_max_s.max(self.dt_shortest_s));
                 let least = if dt_max_s < self.dt_shortest_s {
                     format!(
-                        " (time.max_halvings; at the certified separation the law requires {} s, and a flight that gets there fails)",
+                        " (time.max_halvings; the law requires {} s at the certified separation, where a flight fails)",
                         significant(dt_max_s)
                     )
                 } else {
@@ -291,8 +290,8 @@ impl Preflight {
 fn vehicle_line(quadrotor: &Quadrotor) -> String {
     let model = &quadrotor.model;
     format!(
-        "{}, {} kg, hull {} m, thrust to weight {:.2}, attitude at {} Hz; swarm.mass_kg, hull_radius_m and a22_per_s describe \
-         points and are not used",
+        "{}, {} kg, hull {} m, thrust to weight {:.2}, attitude at {} Hz; swarm.mass_kg, hull_radius_m and \
+         a22_per_s describe points and are not used",
         model.name,
         model.mass_kg,
         model.hull_radius_m,

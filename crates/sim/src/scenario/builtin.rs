@@ -39,7 +39,7 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "leader-lossy",
-        summary: "a moving leader over a radio that loses one message in ten, with extrapolated messages: clear and reached",
+        summary: "a moving leader over a radio that loses one message in ten, extrapolated: clear and reached",
         toml: include_str!("../../../../assets/leader-lossy.toml"),
     },
     Builtin {
@@ -54,12 +54,12 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "obstacles",
-        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of vehicles and obstacles, reached",
+        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of all of them, reached",
         toml: include_str!("../../../../assets/obstacles.toml"),
     },
     Builtin {
         name: "crazyflies",
-        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear and reached, nothing certified",
+        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear, reached, not certified",
         toml: include_str!("../../../../assets/crazyflies.toml"),
     },
     Builtin {

@@ -21,8 +21,8 @@ pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioE
     let shown = path.display();
     let refused = |said: String, help: &str| ScenarioError::new(said).coded("scenario/file").with_help(help).at(key);
     let unreadable = |error: std::io::Error| {
-        let help = "give the path of a file that can be read; it counts from the folder of the scenario file, or from the \
-                    working directory where there is none";
+        let help = "give the path of a readable file, relative to the folder of the scenario file or to the working \
+                    directory";
         refused(format!("cannot read {shown}: {error}"), help)
     };
     let file = File::open(path).map_err(unreadable)?;
@@ -33,10 +33,7 @@ pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioE
     // The size of a device or a pipe is unknown in advance.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(refused(
-            format!("{shown} has more than {} MiB", MAX_BYTES >> 20),
-            "name a smaller file",
-        ));
+        return Err(refused(format!("{shown} has more than {} MiB", MAX_BYTES >> 20), "name a smaller file"));
     }
     Ok(bytes)
 }
@@ -65,7 +62,8 @@ impl Columns {
     pub(super) fn read(&self, path: &Path) -> Result<Vec<(u64, Vec<f64>)>, ScenarioError> {
         let refused = |line: u64, said: &str| self.refused(path, line, said);
         let bytes = bytes(path, self.key)?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| refused(1, &format!("the file is not UTF-8 text: {error}")))?;
+        let text =
+            std::str::from_utf8(&bytes).map_err(|error| refused(1, &format!("the file is not UTF-8: {error}")))?;
         let text = text.trim_start_matches('\u{feff}');
         let delimiter = delimiter(text);
         let mut reader = ReaderBuilder::new()
@@ -178,7 +176,7 @@ const SLOTS: Columns = Columns {
     names: &[&["x"], &["y"], &["z"]],
     needed: 2,
     row: "a slot has x, y and optionally z",
-    help: "a line has the coordinates of a slot in m, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the columns x, y, z",
+    help: "write a slot in m per line, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the columns x, y, z",
 };
 
 const PLACES: Columns = Columns {
@@ -186,8 +184,8 @@ const PLACES: Columns = Columns {
     names: &[&["t", "time"], &["x"], &["y"], &["z"]],
     needed: 3,
     row: "a point has t, x, y and optionally z",
-    help: "a line has a time in s, later than that of the line before, and the place there in m, such as 0.5,1.0,2.0 or \
-           0.5,1.0,2.0,3.0; a first line may name the columns t, x, y, z",
+    help: "write a time in s and a position in m per line, in order of time, such as 0.5,1.0,2.0. A first line may name \
+           the columns t, x, y, z",
 };
 
 /// Reads slots from a file with the columns x, y and optionally z in m.

@@ -55,10 +55,13 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     let freedom = if leads { Freedom::Translation } else { law.capabilities().controls.freedom() };
     let most = most_assigned(freedom);
     if scenario.count() > most {
-        return Err(ScenarioError::new(format!("an assignment needs at most {most} vehicles, got {}", scenario.count()))
-            .coded("scenario/out-of-range")
-            .with_help(format!("set assignment to \"given\", or reduce swarm.count"))
-            .at_keys(["formation.assignment", "swarm.count"]));
+        return Err(ScenarioError::new(format!(
+            "an assignment needs at most {most} vehicles, got {}",
+            scenario.count()
+        ))
+        .coded("scenario/out-of-range")
+        .with_help(format!("set assignment to \"given\", or reduce swarm.count"))
+        .at_keys(["formation.assignment", "swarm.count"]));
     }
     Ok(Some(freedom))
 }
@@ -78,8 +81,11 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     if assignment != Assignment::WhenStalled {
         return Ok(false);
     }
-    Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
-        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"")
+    Err(ScenarioError::new(why)
+        .coded("scenario/unsupported-by-law")
+        .with_help(
+            "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"",
+        )
         .at_leg(leg, "formation.assignment")
         .at_keys(["law.kind", "deadlock.mode"]))
 }
@@ -365,10 +371,12 @@ impl Dimension {
         let Self { key, name, axis } = self;
         let drawn = drawing.size()[axis];
         if drawn == 0.0 {
-            return Err(ScenarioError::new(format!("the drawing is a straight line, which cannot be {asked_m} m {name}"))
-                .coded("scenario/shape")
-                .with_help("give its other dimension, or spacing_m")
-                .at(key));
+            return Err(ScenarioError::new(format!(
+                "the drawing is a straight line, which cannot be {asked_m} m {name}"
+            ))
+            .coded("scenario/shape")
+            .with_help("give its other dimension, or spacing_m")
+            .at(key));
         }
         let scale = asked_m / drawn;
         let nearest_m = scale * nearest;

@@ -32,8 +32,9 @@ use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::space::{Obstacle, Shape, least_room};
 
 /// Remedy for a wrong obstacle: the format of the table.
-pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and a place \
-                                        at_m = [x, y, z] or, in a file for an audit, a path = [[t, x, y, z], ...]";
+pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and at_m = [x, y, \
+ z]. In \
+                                        a file for an audit, path = [[t, x, y, z], ...] may replace at_m";
 
 /// Obstacle: a name, one shape, and a position.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -160,9 +161,8 @@ impl ObstacleTable {
         let Solid { shape, path, clearance_m: own_m } =
             self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
-            return Err(wrong(format!("obstacle `{}` moves", self.name)).with_help(
-                "give at_m = [x, y, z]; only `tautline audit --obstacles` takes obstacles that move",
-            ));
+            return Err(wrong(format!("obstacle `{}` moves", self.name))
+                .with_help("give at_m = [x, y, z]; only `tautline audit --obstacles` takes obstacles that move"));
         };
         Ok(Obstacle { name: self.name.clone(), place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
     }
@@ -263,8 +263,8 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hull of vehicle {} touches obstacle `{}` at {radius_m} m, less than {CONTACT_PREDICTION_M} m before its \
-             clearance of {} m",
+            "the hull of vehicle {} touches obstacle `{}` at {radius_m} m, less than {CONTACT_PREDICTION_M} m before \
+             its clearance of {} m",
             vehicle + 1,
             obstacle.name,
             obstacle.clearance_m

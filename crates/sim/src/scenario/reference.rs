@@ -179,7 +179,8 @@ impl ReferenceKind {
             },
             &Self::Circle { centre_m, radius_m, period_s } => {
                 if period_s.abs() < SMALLEST {
-                    return Err(ScenarioError::new(format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s"))
+                    let message = format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s");
+                    return Err(ScenarioError::new(message)
                         .coded("scenario/out-of-range")
                         .with_help("give a longer period; a negative one turns clockwise")
                         .at("reference.period_s"));
@@ -293,11 +294,13 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
     };
     let Some(k) = (0..speeds_m_s.len()).find(is_jump) else { return Ok(()) };
     Err(ScenarioError::new(format!(
-        "the reference jumps between {} and {} s: its speed of {:.3e} m/s is more than {JUMP} times the speeds before and after",
+        "the reference jumps between {} and {} s: its speed of {:.3e} m/s is more than {JUMP} times the speeds before \
+         and after",
         points[k].0,
         points[k + 1].0,
         speeds_m_s[k]
-    )).coded("scenario/reference")
+    ))
+    .coded("scenario/reference")
     .with_help("add points in between, or set reference.kind to \"way-points\", which rests at each point")
     .at_entry("reference.points_m", k + 1))
 }

@@ -96,8 +96,8 @@ impl Scenario {
     /// a name may not contain.
     ///
     /// # Errors
-    /// [`ScenarioError`] with its place in the text or in an override: if the source cannot be read, is not TOML, has a
-    /// key that is unknown, missing or of the wrong type, or is invalid (see [`Scenario::validate`]).
+    /// [`ScenarioError`] with its place in the text or in an override. Causes: the source cannot be read or is not
+    /// TOML; a key is unknown, missing or of the wrong type; the scenario is invalid (see [`Scenario::validate`]).
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };

@@ -131,10 +131,7 @@ impl Template {
         let Some(law) = listed.or_else(own).or_else(default) else {
             let known = self.law_names();
             let known: Vec<_> = known.iter().map(String::as_str).collect();
-            let help = format!(
-                "{}; give other names in tables [laws.NAME] of the scenario",
-                suggest(name, &known)
-            );
+            let help = format!("{}; give other names in tables [laws.NAME] of the scenario", suggest(name, &known));
             return Err(ScenarioError::new(format!("no law has the name `{name}`"))
                 .coded("scenario/unknown-choice")
                 .with_help(help));

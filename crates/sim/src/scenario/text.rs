@@ -135,8 +135,8 @@ fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
     root.get_ref().get("laws")?.get_ref().as_table()
 }
 
-/// Returns the span of the value of a field: of its entry in a list; of its origin if the key is missing; of its table
-/// if that is missing too. An overridden part, with a span from `overridden` on, replaces the whole.
+/// Returns the span of the value of a field, or of its entry in a list. A missing key has the span of its origin, or
+/// else of its table. An overridden part, with a span from `overridden` on, replaces the whole.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
     let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {

@@ -19,7 +19,7 @@ pub struct TimeSpec {
     pub duration_s: f64,
     /// Time step in s, with one evaluation of the law. Steps that are too long for the law are divided. Default: 1/240,
     /// or 1/500 for quadrotors. The default is halved until `max_halvings` reaches the step that the law's links
-    /// require, if the law is evaluated at every step and the flight then has at most 1e9 substeps.
+    /// require. It stays if the law is evaluated less often, or if the flight would have more than 1e9 substeps.
     #[serde(default = "default_dt_s")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub dt_s: f64,
@@ -187,10 +187,10 @@ impl Scenario {
         }
     }
 
-    /// Raises the number of halvings until the shortest substep resolves the potential field at the certified distance.
+    /// Raises `max_halvings` until the shortest substep resolves the potential field at the certified distance.
     ///
-    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to the
-    /// certified distance.
+    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to
+    /// the certified distance.
     pub(super) fn choose_halvings(&mut self) {
         let LawSpec::Potential(_) = self.law else { return };
         let Ok(law) = self.law() else { return };

@@ -304,8 +304,8 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hulls of vehicles {} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety distance \
-             delta = {} m, and would disturb the flight",
+            "the hulls of vehicles {} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety \
+             distance delta = {} m",
             Pair::new(i, j),
             self.delta_m
         ))
@@ -340,7 +340,7 @@ impl Scenario {
         let steps = duration_s / dt_s;
         if steps > MAX_STEPS {
             return Err(ScenarioError::new(format!(
-                "the flight must have at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
+                "a flight has at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
             ))
             .coded("scenario/too-many-steps")
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
@@ -483,14 +483,10 @@ impl Scenario {
                 .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
         }
         if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
-            return Err(ScenarioError::new(
-                "the wind has no effect on points without drag",
-            )
-            .coded("scenario/unsupported-by-vehicle")
-            .with_help(
-                "set vehicle.drag_per_s, for example to 0.3",
-            )
-            .at_keys(["wind", "vehicle.drag_per_s"]));
+            return Err(ScenarioError::new("the wind has no effect on points without drag")
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("set vehicle.drag_per_s, for example to 0.3")
+                .at_keys(["wind", "vehicle.drag_per_s"]));
         }
         self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
         self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))

@@ -21,9 +21,9 @@ const UNICYCLE: &str = "unicycle";
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleTable {
-    /// Model: `point` (executes accelerations exactly), `unicycle` (moves along its heading and cannot stop), or a
-    /// quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, the path of a TOML file with a model, or a table
-    /// with the keys of a model. `point` unless given.
+    /// Model of the vehicles; `point` unless given. `point` executes accelerations exactly; `unicycle` moves along its
+    /// heading and cannot stop. A quadrotor is `crazyflie`, `crazyflie-brushless`, `hummingbird`, the path of a TOML
+    /// file with a model, or a table with the keys of a model.
     model: ModelKey,
     /// Rate of the attitude loop of quadrotors in Hz, at most once per step; 500 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,8 +60,8 @@ pub(super) struct VehicleTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     max_accel_m_s2: Option<f64>,
-    /// Drag coefficient of points over mass in 1/s, linear in the velocity relative to the air W: p'' = a22 v + u +
-    /// drag (W - v). 0 unless given; the drag of quadrotors is part of their model.
+    /// Drag of points over mass in 1/s, linear in the velocity relative to the air; 0 unless given. In a wind W,
+    /// p'' = a22 v + u + drag (W - v). The drag of quadrotors is part of their model.
     #[serde(skip_serializing_if = "is_none")]
     #[schemars(extend("minimum" = 0))]
     pub(super) drag_per_s: f64,
@@ -367,7 +367,8 @@ impl Scenario {
                 return Err(ScenarioError::new(format!(
                     "the start speed of vehicle {} must be {min_speed_m_s} to {max_speed_m_s} m/s, got {speed_m_s} m/s",
                     i + 1
-                )).coded("scenario/out-of-range")
+                ))
+                .coded("scenario/out-of-range")
                 .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
                 .at_entry("start.velocities_m_s", i)
                 .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));

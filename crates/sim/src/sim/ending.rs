@@ -33,8 +33,9 @@ pub struct Flight {
     pub overlong_steps: u64,
     /// Certificate before the first step; void if steps were too long for it.
     pub certificate: Certificate,
-    /// Result of the audit. Its status is undecided if integration errors may explain all violations: steps were too
-    /// long for the law, and no violation is deeper than the error bound or began before the first such step.
+    /// Result of the audit. Its status is undecided if integration errors may explain all violations. This is so if
+    /// steps were too long for the law, no violation is deeper than the error bound, and none began before the first
+    /// such step.
     pub audit: AuditOutcome,
     /// Result of the audit in metres, by the widest hulls, if the audit uses scaled separations
     /// ([`tautline_laws::space::Metric`]).
@@ -154,9 +155,7 @@ pub enum Breakdown {
         step: u64,
     },
     /// A path bends too far from the swept straight line even in the shortest substep.
-    #[error(
-        "step {step}: a path bends by {bend_m:.1e} m from the audited straight line; at most {MAX_BEND_M:e} m are allowed"
-    )]
+    #[error("step {step}: a path bends by {bend_m:.1e} m from the audited line; at most {MAX_BEND_M:e} m are allowed")]
     Bent {
         /// The step, from 1.
         step: u64,

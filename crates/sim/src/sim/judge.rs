@@ -203,7 +203,7 @@ impl Judge {
     }
 
     /// Returns whether the move from `start` to `end` takes more than half of the clearance of some pair above the
-    /// law's barrier, or of a vehicle above an obstacle's clearance if the law avoids obstacles.
+    /// law's barrier. For a law that avoids obstacles, clearances of vehicles from obstacles count as well.
     pub(super) fn refuses(
         &mut self,
         (law, links): (&dyn Law, &Graph),
@@ -248,8 +248,9 @@ impl Judge {
         links.edges().map(apart).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the smallest separation of a pair that the law acts on over the move from `start` to `end`, with moves
-    /// of at most `moved_m`, in the auditor's metric; or a lower bound of it that is at least `enough`.
+    /// Returns the smallest separation of a pair that the law acts on over the move from `start` to `end`, in the
+    /// auditor's metric. No vehicle moves farther than `moved_m`. A lower bound that is at least `enough` may replace
+    /// the exact value.
     pub(super) fn nearest_over(
         &mut self,
         (law, links): (&dyn Law, &Graph),

@@ -13,8 +13,8 @@ use tautline_laws::target::Change;
 /// Bound of the integration error of a separation, from the first overlong substep on.
 ///
 /// While the fastest rate of the law is `omega` and no vehicle moves farther than `s`, the acceleration of a vehicle
-/// changes by at most `omega^2 s`, and by at most `2 a` with a limit `a` of accelerations. The error of a substep of
-/// length h with accelerations from its ends is at most that of a constant error of this size:
+/// changes by at most `omega^2 s`. With a limit `a` of accelerations it changes by at most `2 a`. The error of a
+/// substep of length h with accelerations from its ends is at most that of a constant error of this size:
 ///
 /// ```text
 /// c = min(omega^2 s, 2 a)
@@ -131,7 +131,7 @@ fn largest_coordinate(rows: &Rows, origin: Vector3<f64>) -> f64 {
 /// Energy since the last change of the target, the worst rise, and the changes of the target.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EnergyMonitor {
-    /// That of the target \[m^2/s^2\], by its revision.
+    /// Revision of the target, and its first energy \[m^2/s^2\].
     since: Option<(u64, f64)>,
     /// Worst rise: the one that integration explains least. Rounding is the same for all rises.
     worst: Option<EnergyRise>,

@@ -4,7 +4,7 @@ mod step;
 
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
-use super::judge::{Judge, AuditResults};
+use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
 use super::monitors::{IntegrationError, Resolution};
 use crate::link::{self, Imperfections};
@@ -98,7 +98,7 @@ impl Simulation {
         let certificate =
             scenario.certificate(law.as_ref()).void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges);
         // The scenario's own imperfections already void the certificate.
-        let is_void =  !scenario.is_exact() && !certificate.void.is_empty();
+        let is_void = !scenario.is_exact() && !certificate.void.is_empty();
         let certificate = certificate.void_where(!link.is_exact() && !is_void, Void::InexactLink);
         let mut state = scenario.start.clone();
         plant.observe(&mut state);

@@ -276,8 +276,8 @@ impl Dynamics {
     }
 }
 
-/// Rotates an attitude by an angular velocity in the world frame \[rad/s\] for a time \[s\], as the engine does: by 2
-/// atan(|w| t/2), which is |w| t to second order.
+/// Rotates an attitude by an angular velocity in the world frame \[rad/s\] for a time \[s\], as the engine does. The
+/// angle is 2 atan(|w| t/2), which is |w| t to second order.
 fn turned(attitude: &UnitQuaternion<f64>, turn_rad_s: Vector3<f64>, dt_s: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * dt_s * turn_rad_s;
     UnitQuaternion::new_normalize(Quaternion::new(1.0, half.x, half.y, half.z) * attitude.into_inner())
@@ -328,8 +328,8 @@ impl Attitude {
         aside_n * share + Vector3::z() * lift_n
     }
 
-    /// Returns thrust \[N\] and torque about the body axes \[N m\] that turn the body towards a force \[N\], for its
-    /// attitude and its rates about the body axes \[rad/s\].
+    /// Returns the thrust \[N\] and the torque about the body axes \[N m\] that turn the body towards a force \[N\].
+    /// `rates_rad_s` are about the body axes.
     #[must_use]
     pub fn wrench(
         &self,

@@ -36,24 +36,25 @@ pub struct Model {
     pub thrust_n_per_rpm: f64,
     /// Largest thrust of a rotor in N.
     pub max_thrust_n: f64,
-    /// Torque that turning a rotor takes, over its thrust, in m.
+    /// Reaction torque of a rotor over its thrust, in m.
     pub torque_per_thrust_m: f64,
-    /// Time constant of a rotor's speed where it grows, in s.
+    /// Time constant of a rotor's speed when it increases, in s.
     pub lag_up_s: f64,
-    /// Where it falls, in s.
+    /// Time constant of a rotor's speed when it decreases, in s.
     pub lag_down_s: f64,
-    /// Drag of all rotors in hover along the body's axes in N s/m; a rotor's grows with its speed.
+    /// Drag coefficient of all rotors in hover along the body axes in N s/m; that of a rotor is proportional to its
+    /// speed.
     #[serde(default)]
     pub rotor_drag_n_s_m: [f64; 3],
-    /// Drag of the body along its axes in N s^2/m^2, times the square of the speed.
+    /// Drag coefficient of the body along its axes in N s^2/m^2, for the square of the speed.
     #[serde(default)]
     pub parasitic_drag_n_s2_m2: [f64; 3],
-    /// k of the thrust's factor 1 + k (r/4h)^2 at a height h above a ground.
+    /// Coefficient k of the ground effect: the thrust has the factor 1 + k (r/4h)^2 at a height h above a ground.
     #[serde(default)]
     pub ground_effect: f64,
-    /// Frequency that the attitude loop asks for, in rad/s.
+    /// Natural frequency of the attitude loop in rad/s.
     pub attitude_rad_s: f64,
-    /// Damping ratio that it asks for.
+    /// Damping ratio of the attitude loop.
     pub attitude_damping: f64,
 }
 
@@ -174,18 +175,18 @@ impl Model {
             return Err(refuse(
                 "max_thrust_n",
                 format!(
-                    "the most thrust of four rotors is {} N, not more than the weight of {:.6} N",
+                    "the largest thrust of four rotors is {} N, not more than the weight of {:.6} N",
                     self.most_thrust_n(),
                     self.weight_n()
                 ),
-                format!("it must lift the vehicle: more than {:.6} N a rotor", 0.25 * self.weight_n()),
+                format!("give more than {:.6} N per rotor", 0.25 * self.weight_n()),
             ));
         }
         if Mixer::new(self).is_none() {
             return Err(refuse(
                 "rotor_positions_m",
-                "the rotors cannot lift, roll, pitch and yaw the vehicle each by itself".to_owned(),
-                "stand them around the centre of mass, two of the four turning each way".to_owned(),
+                "the rotors cannot lift, roll, pitch and yaw the vehicle independently".to_owned(),
+                "place them around the centre of mass, two of the four turning each way".to_owned(),
             ));
         }
         self.check_attitude(0.0)
@@ -204,8 +205,8 @@ impl Model {
         Err(refuse(
             "attitude_rad_s",
             format!(
-                "the attitude loop is unstable: 2 zeta > omega tau is needed, and 2 * {zeta} <= {omega} rad/s * {lag_s} s, \
-                 the lag of the rotors and half of a period of the loop"
+                "the attitude loop is unstable. It needs 2 zeta > omega tau, got 2 * {zeta} <= {omega} rad/s * {lag_s} \
+                 s (lag of the rotors and half a period of the loop)"
             ),
             format!("set attitude_rad_s to about {:.3}, which is 0.4/tau, and attitude_damping to 1", 0.4 / lag_s),
         ))
@@ -213,7 +214,7 @@ impl Model {
 
     fn check_numbers(&self) -> Result<(), ModelError> {
         if self.name.trim().is_empty() {
-            return Err(refuse("name", "the model has no name".to_owned(), "give it one".to_owned()));
+            return Err(refuse("name", "the name is empty".to_owned(), "name the model".to_owned()));
         }
         let [jx, jy, jz] = self.inertia_kg_m2;
         let positive = [
@@ -260,7 +261,7 @@ impl Model {
         Err(refuse(
             "inertia_kg_m2",
             format!("a moment of inertia of {largest:e} kg m^2 is more than the other two together, {rest:e} kg m^2"),
-            "no body is so: each is at most the sum of the other two".to_owned(),
+            "reduce it: each is at most the sum of the other two".to_owned(),
         ))
     }
 }
@@ -274,14 +275,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_built_in_model_is_right_and_has_its_name() {
+    fn every_built_in_model_is_valid_and_has_its_name() {
         for (name, text) in MODELS {
             assert_eq!(read(text).expect("a model").name, name);
         }
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn errors_of_a_model_have_their_place() {
         let (_, text) = MODELS[0];
         for (before, after, said) in [
             ("mass_kg = 0.0328", "mass_kg = -1.0", "mass_kg is -1"),
@@ -289,7 +290,7 @@ mod tests {
             ("16.8e-6, 16.8e-6, 29.8e-6", "16.8e-6, 16.8e-6, 39.8e-6", "more than the other two together"),
             ("max_thrust_n = 0.12", "max_thrust_n = 0.08", "not more than the weight of 0.321658 N"),
             ("attitude_rad_s = 6.0", "attitude_rad_s = 31.0", "2 zeta > omega tau"),
-            ("\"ccw\", \"cw\", \"ccw\", \"cw\"", "\"cw\", \"cw\", \"cw\", \"cw\"", "each by itself"),
+            ("\"ccw\", \"cw\", \"ccw\", \"cw\"", "\"cw\", \"cw\", \"cw\", \"cw\"", "independently"),
             ("lag_up_s = 0.065", "lag_up_s = nan", "lag_up_s is NaN"),
             ("ground_effect = 11", "ground_effects = 11", "unknown field `ground_effects`"),
         ] {

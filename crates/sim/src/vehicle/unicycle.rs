@@ -40,8 +40,8 @@ pub struct Steering {
 }
 
 impl Unicycle {
-    /// Returns the steering for a commanded acceleration u \[m/s^2\]: a = u . e and omega = u . n/s within the limits,
-    /// with e along the heading and n to its left. The speed stays within its limits over `dt_s` seconds.
+    /// Returns the steering for a commanded acceleration u \[m/s^2\]: a = u . e and omega = u . n/s within the limits.
+    /// Unit vector e is along the heading, n to its left. The speed stays within its limits over `dt_s` seconds.
     #[must_use]
     pub fn steering(&self, of: Heading, command_m_s2: Vector3<f64>, dt_s: f64) -> Steering {
         let (sin, cos) = libm::sincos(of.psi_rad);

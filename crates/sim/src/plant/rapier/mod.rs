@@ -31,9 +31,9 @@
 //!
 //! # Quadrotors
 //! A quadrotor is a rotating body with the model's mass, inertia and hull. Gravity, rotors and drag are added around
-//! the engine's step as above: half the kick of the state before, the drift, and half the kick of the state after,
-//! whose velocities are predicted first. For rotation, the kick changes the angular momentum, which is constant without
-//! torque:
+//! the engine's step as above: half the kick of the state before, the drift, and half the kick of the state after. The
+//! velocities of that state are predicted first. For rotation, the kick changes the angular momentum, which is constant
+//! without torque:
 //!
 //! ```text
 //! l  = R J W + (dt/2) R M              the engine turns by the angular velocity of l in the middle of the step

@@ -161,8 +161,8 @@ impl Simulation {
     }
 
     /// Returns whether the last move must be halved: it comes too close to the barrier, or to states in which the law
-    /// is too fast for a substep of this length \[s\]. The second result is the fastest rate of the law on the way
-    /// \[1/s\]; that at the start if the law has no barrier or is not evaluated.
+    /// is too fast for this length \[s\]. The second result is the fastest rate of the law on the way \[1/s\]. It is
+    /// that at the start if the law has no barrier or is not evaluated.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self {
             controller: Controller { law, links, link, .. },
