@@ -33,7 +33,7 @@ schema completes and checks keys as you type.
 
 # Order of the tables on the page; other tables of the schema come last.
 ORDER = (
-    "name swarm start formation leg law laws graph reference breathing arrival obstacle safety vehicle wind sensing "
+    "name swarm start formation leg law laws graph reference deadlock arrival obstacle safety vehicle wind sensing "
     "network actuation failure noise time plant"
 ).split()
 

@@ -59,7 +59,7 @@ fn a_swarm_that_leans_into_a_wind_spreads_no_slots_and_is_promised_no_arrival() 
     std::fs::write(folder.path().join("leaning.toml"), LEANING).expect("a file");
     let ran = ran_by(TAUTLINE, folder.path(), &["run", "leaning.toml", "--json", "--no-snapshots"]);
     let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
-    assert!(report.get("breaths").is_none(), "{}", report["breaths"]);
+    assert!(report.get("deadlock_recoveries").is_none(), "{}", report["deadlock_recoveries"]);
     let formation = &report["formation"];
     assert_eq!((&formation["reached"], &formation["at_rest"]), (&false.into(), &serde_json::Value::Null));
     assert!(formation["max_edge_error_m"].as_f64().expect("a number") < 0.01, "they lean alike");

@@ -90,7 +90,7 @@ fn every_key_of_the_report_is_on_its_page() {
         [&["run", "pentagon-laplacian", "--set", "law.f1_per_s2=30", "--set", "law.f2_per_s=1"], &quick[..]].concat();
     let passed_through = [&hit[..], &["--plant", "ideal", "--force"]].concat();
     let mission =
-        [&["run", "pentagon-leader", "--set", "leg=[{scale=1.2}]", "--set", "breathing.mode=start"], &quick[..]]
+        [&["run", "pentagon-leader", "--set", "leg=[{scale=1.2}]", "--set", "deadlock.mode=start"], &quick[..]]
             .concat();
     let tilting = [&["run", "crazyflies", "--plant", "ideal"], &quick[..], &["--set", "time.duration_s=1.5"]].concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";

@@ -95,9 +95,9 @@ fn a_law_that_does_not_follow_is_refused_with_place_and_remedy() {
 #[test]
 fn vehicles_are_assigned_anew_where_they_are_stalled_under_a_law_that_tells() {
     for sets in [
-        ["law.kind=orca", "breathing.mode=auto"],
-        ["law.kind=displacement", "breathing.mode=off"],
-        ["law.kind=displacement", "breathing.most=0"],
+        ["law.kind=orca", "deadlock.mode=auto"],
+        ["law.kind=displacement", "deadlock.mode=off"],
+        ["law.kind=displacement", "deadlock.most=0"],
     ] {
         let there = folder("kind = \"rest\"\n", "");
         let check = |by: &str| {

@@ -149,7 +149,7 @@ class Scenarios(Case):
             ("TOML:1:1: unknown key `x`", lambda: tl.Scenario.from_toml("x = 3")),
             ("neither a built-in scenario nor a file", lambda: tl.Scenario("-")),
             ("neither a built-in scenario nor a file", lambda: tl.Scenario("")),
-            ("there is no law named `nope`", lambda: tl.compare("pentagon", ["nope"])),
+            ("no law has the name `nope`", lambda: tl.compare("pentagon", ["nope"])),
             ("--from and --to", lambda: tl.margin("pentagon", "time.control_hz", 5, 5)),
         ):
             self.refuses(tl.Error, message, do)

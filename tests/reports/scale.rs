@@ -98,7 +98,7 @@ fn the_steps_that_a_star_asks_for_are_told_and_a_leader_in_its_middle_asks_for_n
     let told = |more: &str| Preflight::of(&read(&grid(1000, more))).expect("a law").text();
     let said = told(&star);
     // 0.5/(sigma c mu): sigma = 1, c = 1/s, mu = N.
-    assert!(said.contains("the links ask for 0.000500 s at most"), "{said}");
+    assert!(said.contains("the links require at most 0.000500 s"), "{said}");
     for more in [ALL, LED] {
         let said = told(more);
         assert!(!said.contains("the links ask"), "{said}");

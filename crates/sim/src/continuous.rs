@@ -1,18 +1,18 @@
-//! Continuous time: p'' = a22 v + u(p, v) (equation (1)) solved with the law inside the right-hand side. Nothing is sampled
-//! or held.
+//! Continuous time: solves p'' = a22 v + u(p, v) (equation (1)) with the law inside the right-hand side, without
+//! sampling.
 //!
-//! [`solve`] is the oracle that every physics run is measured against; [`Continuous`] flies the same solution step by
-//! step, in the place of a law that is asked once a step and a plant that holds its command.
+//! [`solve`] is the reference for the physics engine. [`Continuous`] is the same solution as a plant: it advances step
+//! by step and evaluates the law all the way along.
 //!
 //! # Method
-//! Dormand and Prince's explicit Runge-Kutta method of order 8 with error control (Hairer, Norsett and Wanner,
-//! *Solving Ordinary Differential Equations I*, II.5), from the crate `differential-equations`. Nothing is interpolated:
-//! solver steps end at the times asked for, and a closest approach within a step is found by solving anew from the
-//! step's beginning. (The crate's own dense output was measured to be off by 2e-8 m where its steps are by 1e-13 m.)
+//! Dormand and Prince's explicit Runge-Kutta method of order 8 with error control (Hairer, Norsett and Wanner, *Solving
+//! Ordinary Differential Equations I*, II.5), from the crate `differential-equations`. Solver steps end at the output
+//! times. A closest approach within a step is found by solving again from the beginning of the step. (The dense output
+//! of the crate has an error of 2e-8 m where its steps have 1e-13 m.)
 //!
-//! # At the edge of the law
-//! A trial step may ask the law about states that it has no answer for, such as a pair inside delta. Such a step is
-//! refused and tried again shorter. Where no step is short enough, the solution ends with the law's reason.
+//! # States outside the domain of the law
+//! A trial step may evaluate the law at states where it is undefined, such as a pair within delta. Such a step is
+//! refused and tried again with a shorter length. If no step is short enough, the solution ends with the law's error.
 
 mod flow;
 mod quadrotors;
@@ -33,7 +33,7 @@ use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::NearPairs;
 
-/// A law that knows the present state.
+/// Law with exact knowledge of the present state.
 struct Exact<'a> {
     law: &'a mut dyn Law,
     scenario: &'a Scenario,
@@ -50,53 +50,53 @@ impl Feedback for Exact<'_> {
     }
 }
 
-/// First step that is tried \[s\]: the error control lengthens it tenfold a step, or shortens it.
+/// First step that is tried \[s\]; the error control lengthens it up to tenfold per step, or shortens it.
 const FIRST_STEP_S: f64 = 1e-3;
-/// A step, or what is left to the time asked for, that is shorter than this part of that time is rounding.
+/// Step, or rest of an interval, relative to the output time, below which it is rounding.
 const RESOLUTION: f64 = 1e-14;
-/// Most steps of the solver that are tried for one physics step. Flights of stiff laws need some hundreds.
+/// Limit of solver steps per physics step; flights of stiff laws need hundreds.
 const MOST_TRIALS: u32 = 100_000;
-/// Time to which a closest approach is found \[s\]. The distance is flat there: it is off by (1e-7 s)^2/2 times its second
-/// derivative, less than 1e-12 m up to 200 m/s^2.
+/// Resolution of the time of a closest approach \[s\]. The distance is stationary there: its error is (1e-7 s)^2/2
+/// times its second derivative, less than 1e-12 m up to 200 m/s^2.
 const CLOSEST_RESOLUTION_S: f64 = 1e-7;
 
-/// Error allowed per solver step in each coordinate: `absolute + relative * |value|`.
+/// Allowed error per solver step in each coordinate: `absolute + relative * |value|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// Part of the coordinate.
+    /// Relative tolerance.
     pub relative: f64,
-    /// In m for positions, in m/s for velocities.
+    /// Absolute tolerance, in m for positions and m/s for velocities.
     pub absolute: f64,
 }
 
 impl Default for Tolerances {
-    /// 1e-12 of either kind: the reference flights change by less than 1e-11 m when it is 1e-13.
+    /// Returns 1e-12 for both; with 1e-13 the reference flights change by less than 1e-11 m.
     fn default() -> Self {
         Self { relative: 1e-12, absolute: 1e-12 }
     }
 }
 
-/// Why there is no solution.
+/// Error of a solution.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum IdealError {
-    /// The law has no answer from some time on.
+    /// The law is undefined from some time on.
     #[error("the solution ends at {time_s} s: {source}")]
     Law {
-        /// The last time that was reached \[s\].
+        /// Last time that was reached \[s\].
         time_s: f64,
-        /// Why.
+        /// Error of the law.
         source: LawError,
     },
     /// No step is short enough for the tolerances, more than 100,000 steps are needed, or numbers overflow.
     #[error("the solution cannot be continued at {time_s} s: its tolerances need steps that are too short")]
     Stalled {
-        /// The last time that was reached \[s\].
+        /// Last time that was reached \[s\].
         time_s: f64,
     },
-    /// The times do not ascend from 0, or are not finite.
+    /// The output times do not increase from 0, or are not finite.
     #[error("time {} is out of order: times ascend from 0 and are finite", entry + 1)]
     Times {
-        /// The first such entry, from 0.
+        /// First wrong entry, from 0.
         entry: usize,
     },
     /// A tolerance is not a positive finite number.
@@ -104,26 +104,26 @@ pub enum IdealError {
     Tolerances,
 }
 
-/// A solution at the times asked for.
+/// Solution at the output times.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
-    /// The state at each time.
+    /// State at each output time.
     pub states: Vec<Swarm>,
-    /// The closest that any pair came from time 0 to the last time: over the whole of it, not at the times asked for
-    /// only. None for fewer than two vehicles.
+    /// Closest approach of any pair from time 0 to the last output time, also between output times. `None` for fewer
+    /// than two vehicles.
     pub closest: Option<ClosestApproach>,
 }
 
-/// Solves p'' = a22 v + u(p, v) from the scenario's start at time 0, under `law` with exact knowledge of the present
-/// state, and hands out the states at `times_s` \[s\], ascending from 0.
+/// Solves p'' = a22 v + u(p, v) from the scenario's start at time 0 under `law`, which knows the exact present state.
+/// Returns the states at `times_s` \[s\], which increase from 0.
 ///
 /// # Accuracy
-/// The error per solver step is at most that of the tolerances, and stable motion forgets it: on the reference flights
-/// positions and the closest approach are good to 1e-11 m. A pair is taken to turn from closing to opening at most once
-/// a solver step.
+/// The error per solver step is within the tolerances, and stable motion damps it: positions and the closest approach
+/// of the reference flights are accurate to 1e-11 m. The search assumes that the distance of a pair has at most one
+/// minimum per solver step.
 ///
 /// # Errors
-/// [`IdealError`]: the law has no answer on the way, the times do not ascend, or the tolerances cannot be met.
+/// [`IdealError`] if the law is undefined on the way, the times do not increase, or the tolerances cannot be met.
 pub fn solve(
     scenario: &Scenario,
     law: &mut dyn Law,
@@ -158,22 +158,22 @@ pub fn solve(
     Ok(Solution { states, closest })
 }
 
-/// A swarm that moves as equation (1) says, in continuous time.
+/// Swarm that moves by equation (1) in continuous time.
 #[derive(Clone, Debug)]
 pub struct Continuous {
     swarm: Swarm,
-    /// Drag of the air included.
+    /// Velocity coefficient, drag of the air included.
     a22_per_s: f64,
-    /// The wind, if any.
+    /// Wind, if any.
     air: Option<Air>,
-    /// Accelerations that are held where no law is asked, N x 3 \[m/s^2\].
+    /// Held accelerations without a law, N x 3 \[m/s^2\].
     held: Rows,
-    /// Solver step that the error control came to last.
+    /// Last solver step of the error control.
     step_s: f64,
 }
 
 impl Continuous {
-    /// At the scenario's start.
+    /// Creates the swarm at the scenario's start.
     #[must_use]
     pub fn new(scenario: &Scenario) -> Self {
         let (a22_per_s, air) = (scenario.velocity_coefficient_per_s(), Air::of(scenario));
@@ -186,19 +186,19 @@ impl Continuous {
         }
     }
 
-    /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end; `path` gets how far the
-    /// way there bends.
+    /// Moves from `from_s` over `dt_s` seconds under `feedback` and writes the state at the end, and the bend of the
+    /// way into `path`.
     ///
-    /// The bend is from the Green's function of a second derivative, which is at most T/4: a path of duration T stays
-    /// within T/4 times the integral of |p''| of its chord. The integral is taken from the change of velocity in each
-    /// solver step.
+    /// The bend follows from the Green's function of the second derivative, which is at most T/4. A path of duration T
+    /// deviates from its chord by at most T/4 times the integral of |p''|. The integral is the sum of the velocity
+    /// changes over the solver steps.
     ///
-    /// Where vehicles come to the barrier of a law, as they do under limited accelerations, the law has no answer beyond. They then
-    /// keep the accelerations that they have there to the end, so that their way past the barrier is judged, and the law's
-    /// reason is the result.
+    /// Under limited accelerations, vehicles may reach the barrier of a law, where it is undefined. They then keep
+    /// their accelerations to the end of the step, so that the audit sees the way past the barrier; the result is the
+    /// law's error.
     ///
     /// # Errors
-    /// [`IdealError`]; the state is then not to be observed.
+    /// [`IdealError`]; the state is then undefined.
     pub fn solve(
         &mut self,
         (from_s, dt_s): (f64, f64),
@@ -245,7 +245,7 @@ impl Continuous {
     }
 }
 
-/// Accelerations that do not change over a step.
+/// Constant accelerations over a step.
 struct Held<'a>(&'a Rows);
 
 impl Feedback for Held<'_> {
@@ -322,14 +322,14 @@ impl Plant for Continuous {
     }
 }
 
-/// Order 8, 12 stages and 4 that go unused. A state is all positions, then all velocities, each an axis after the other.
+/// Method of order 8 with 12 stages, 4 more unused. A state holds all positions, then all velocities, axis by axis.
 type Method = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Vec<f64>, 8, 12, 16>;
 
 struct Solver<'a, 'law> {
     method: Method,
     flow: &'a Flow<'law>,
     tolerances: Tolerances,
-    /// Largest number of solver steps for one output time; unlimited where `None`.
+    /// Limit of solver steps for one output time; unlimited if `None`.
     most_trials: Option<u32>,
 }
 
@@ -348,7 +348,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         let longest_step_s = flow.longest_step_s();
         let method = Method::dop853().rtol(relative).atol(absolute).h_max(longest_step_s).max_steps(usize::MAX);
         let mut method = method.h0(step_s.min(longest_step_s));
-        // The end of the interval only tells the direction of time.
+        // The end of the interval only gives the direction of time.
         method.init(flow, time_s, f64::INFINITY, &state.to_vec()).map_err(|_| IdealError::Stalled { time_s })?;
         match flow.take_failure() {
             Some(source) => Err(IdealError::Law { time_s, source }),
@@ -356,7 +356,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         }
     }
 
-    /// Solves up to `until_s`, showing itself to `observe` after every accepted step.
+    /// Solves up to `until_s`, and calls `observe` after every accepted step.
     fn advance(
         &mut self,
         until_s: f64,
@@ -387,13 +387,13 @@ impl<'a, 'law> Solver<'a, 'law> {
                 continue;
             }
             if undefined.is_some() {
-                // Accepted by its error alone, on stages that the law has no answer for.
+                // The error control accepted stages at which the law is undefined.
                 let before = self.method.y_prev().clone();
                 *self = Self::begin(self.flow, time_s, &before, self.tolerances, step_s / 4.0)?;
                 continue;
             }
             if step_s < free_step_s {
-                // Shortened to end at the time asked for, not by the error control.
+                // The step was shortened to end at the output time, not by the error control.
                 self.method.set_h(self.method.h().max(free_step_s));
             }
             observe(self)?;
@@ -401,14 +401,14 @@ impl<'a, 'law> Solver<'a, 'law> {
         Ok(())
     }
 
-    /// Whether no vehicle moves by more than coordinates resolve in a step \[s\].
+    /// Returns whether no vehicle moves by more than the resolution of its coordinates in a step \[s\].
     fn moves_nothing(&self, step_s: f64) -> bool {
         let (positions_m, velocities_m_s) = self.method.y().split_at(self.method.y().len() / 2);
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, number| most.max(number.abs()));
         largest(velocities_m_s) * step_s <= 4.0 * f64::EPSILON * largest(positions_m)
     }
 
-    /// The state at a time within the last step, solved anew from the beginning of that step.
+    /// Solves again from the beginning of the last step to a time within it.
     fn within_last_step(&self, time_s: f64) -> Result<Vec<f64>, IdealError> {
         let (from_s, before) = (self.method.t_prev(), self.method.y_prev());
         let mut again = Self::begin(self.flow, from_s, before, self.tolerances, time_s - from_s)?;
@@ -416,13 +416,13 @@ impl<'a, 'law> Solver<'a, 'law> {
         Ok(again.method.y().clone())
     }
 
-    /// Looks for a closer approach in the last step: at its end, and where the distance of a pair stops falling.
+    /// Updates the closest approach over the last step: its end, and minima of distances within it.
     fn search_last_step(&self, closest: &mut Option<ClosestApproach>) -> Result<(), IdealError> {
         let (from_s, to_s) = (self.method.t_prev(), self.method.t());
         for (pair, after) in pairs(self.method.y()) {
             offer(closest, pair, after.separation_m, to_s);
             let before = Approach::of(self.method.y_prev(), pair);
-            // A pair that stays away even at twice its speed is not looked at closely.
+            // Skips pairs that cannot be closest even at twice their speed.
             let reach_m = 2.0 * before.speed_m_s.max(after.speed_m_s) * (to_s - from_s);
             let nearest_m = before.separation_m.min(after.separation_m) - reach_m;
             let may_be_closest = closest.is_none_or(|closest| nearest_m < closest.separation_m);
@@ -434,7 +434,8 @@ impl<'a, 'law> Solver<'a, 'law> {
         Ok(())
     }
 
-    /// When a pair turns that closes at the beginning of the last step and opens at its end, and its distance then.
+    /// Returns the time of the minimum of the distance of a pair in the last step \[s\], and the distance \[m\]. The
+    /// pair must close at the beginning of the step and open at its end.
     fn turn(&self, pair: Pair) -> Result<(f64, f64), IdealError> {
         let (mut low_s, mut high_s) = (self.method.t_prev(), self.method.t());
         loop {
@@ -451,7 +452,7 @@ impl<'a, 'law> Solver<'a, 'law> {
         }
     }
 
-    /// Adds to each vehicle's entry by how much its velocity changed in the last step \[m/s\].
+    /// Adds the change of velocity of each vehicle in the last step \[m/s\].
     fn add_turns(&self, turned_m_s: &mut [f64]) {
         let (before, after, count) = (self.method.y_prev(), self.method.y(), turned_m_s.len());
         for (i, turned) in turned_m_s.iter_mut().enumerate() {
@@ -465,7 +466,7 @@ impl<'a, 'law> Solver<'a, 'law> {
     }
 }
 
-/// How a pair moves.
+/// Relative motion of a pair.
 struct Approach {
     separation_m: f64,
     speed_m_s: f64,
@@ -499,7 +500,7 @@ mod tests {
     use super::*;
     use tautline_laws::formation::Formation;
 
-    /// A command of 1 m/s^2 along every axis that changes its sign at this rate \[Hz\].
+    /// Command of 1 m/s^2 along every axis that changes its sign at this rate \[Hz\].
     struct Switching(f64);
 
     impl Feedback for Switching {

@@ -1,8 +1,8 @@
 //! Scenarios, and the simulation of vehicles in a rigid-body engine under a control law.
 //!
-//! [`Scenario`] is a validated flight, read from TOML or made in code; [`Simulation`] is stepped, saved and loaded. A law of
-//! your own implements [`Law`], a vehicle [`Plant`], an imperfection between the world and the law
-//! [`Imperfections`]. Data flows one way:
+//! [`Scenario`] is a validated flight, read from TOML or built in code; [`Simulation`] flies it step by step. Control
+//! laws implement [`Law`], vehicles [`Plant`], imperfections between the true state and the law [`Imperfections`]. Data
+//! flows one way:
 //!
 //! ```text
 //! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples and events
@@ -10,14 +10,14 @@
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`scenario`] | the validated flight; `document` holds the keys of its file |
-//! | [`preflight`] | checks before a flight: stability, certificate, step, traps, rigidity |
-//! | [`sim`] | the loop |
-//! | [`plant`] | vehicles that hold a command over a step; `rapier` is the physics engine |
-//! | [`vehicle`] | bodies that are more than points: models, forces, rotors, the attitude loop |
-//! | [`link`] | imperfections between truth and law: radio, sensing, actuation |
-//! | [`continuous`] | the equations of motion solved, for points with the law inside |
-//! | [`metrics`] | numbers folded from recorded samples |
+//! | [`scenario`] | the validated flight and the keys of its file |
+//! | [`preflight`] | checks before a flight: stability, certificate, step, equilibria, rigidity |
+//! | [`sim`] | the simulation loop |
+//! | [`plant`] | equations of motion under a held command; `rapier` is the physics engine |
+//! | [`vehicle`] | models of quadrotors and unicycles: forces, rotors, attitude loop |
+//! | [`link`] | imperfections between true state and law: radio, sensing, actuation |
+//! | [`continuous`] | solution of the equations of motion in continuous time |
+//! | [`metrics`] | running metrics of recorded samples |
 //! | [`plan`] | formations of a flight, their placement over the swarm, and edge tensions |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]

@@ -1,4 +1,4 @@
-//! What a flight is after: its formations, where they are to be, and how hard an edge of its graph pulls.
+//! [`Plan`]: formations of a flight, their placement over the swarm, and edge tensions, for pictures and reports.
 
 use std::sync::LazyLock;
 
@@ -15,22 +15,22 @@ use tautline_laws::law::{EdgeTension, EdgeTensionKeys};
 use tautline_laws::space::Obstacle;
 use tautline_laws::target::{Course, Guidance};
 
-/// Formations, graph and how hard an edge pulls.
+/// Formations, graph and edge tensions of a flight.
 #[derive(Clone, Debug)]
 pub struct Plan {
     course: Course,
     guidance: Option<Guidance>,
     freedom: Freedom,
-    /// Who senses whom.
+    /// Pairs that sense each other.
     pub graph: Graph,
     law: LawSpec,
     delta_m: f64,
-    /// What is in the way.
+    /// Obstacles.
     pub obstacles: Vec<Obstacle>,
 }
 
 impl Plan {
-    /// Formations, graph and law of a scenario.
+    /// Creates the plan of a scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self {
@@ -44,38 +44,38 @@ impl Plan {
         }
     }
 
-    /// Takes note of what happened.
+    /// Updates the plan with an event.
     pub fn note(&mut self, event: &Event) {
         self.course.note(event);
     }
 
-    /// The leg that is under way at a time \[s\], from 0, and how many there are.
+    /// Returns the leg in progress at a time \[s\], from 0, and the number of legs.
     #[must_use]
     pub fn leg_at(&self, time_s: f64) -> (usize, usize) {
         (self.course.leg_at(time_s), self.course.count())
     }
 
-    /// The slots that are to be reached at a time \[s\].
+    /// Returns the target slots at a time \[s\].
     #[must_use]
     pub fn formation_at(&self, time_s: f64) -> &Formation {
         static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
         self.course.formation_at(time_s).unwrap_or(&NOWHERE)
     }
 
-    /// Where the reference is at a time \[s\], where there is one \[m\].
+    /// Returns the position of the reference at a time \[s\] \[m\]; `None` without a reference.
     #[must_use]
     pub fn reference_at(&self, time_s: f64) -> Option<Vector3<f64>> {
         self.guidance.as_ref().map(|guidance| guidance.motion.at(time_s).position_m)
     }
 
-    /// The vehicle that listens to nobody, from 0.
+    /// Returns the vehicle that follows only the reference, from 0.
     #[must_use]
     pub fn leader(&self) -> Option<usize> {
         self.guidance.as_ref()?.known_by.leader()
     }
 
-    /// What lays the slots of a time \[s\] over the vehicles as well as the law leaves them free to be moved; none where
-    /// positions are not known.
+    /// Returns the rigid motion, among those that the law leaves free, that best fits the slots at a time \[s\] to the
+    /// vehicles; `None` if positions are unknown.
     #[must_use]
     pub fn laid_at(&self, time_s: f64, positions_m: &Rows) -> Option<RigidMotion> {
         let formation = self.formation_at(time_s);
@@ -92,36 +92,35 @@ impl Plan {
         }
     }
 
-    /// Where the slots are at a time \[s\], laid over the vehicles \[m\]; none where positions are not known.
+    /// Returns the slots at a time \[s\], fitted to the vehicles \[m\]; `None` if positions are unknown.
     #[must_use]
     pub fn slots_at(&self, time_s: f64, positions_m: &Rows) -> Option<Vec<Vector3<f64>>> {
         let (laid, slots_m) = (self.laid_at(time_s, positions_m)?, &self.formation_at(time_s).slots_m);
         Some((0..slots_m.nrows()).map(|k| laid.apply(row(slots_m, k))).collect())
     }
 
-    /// From when on each of the formations is under way \[s\], in order of time; the first from the start.
+    /// Returns the formations with the times at which they begin \[s\], in order; the first begins at the start.
     #[must_use]
     pub fn formations(&self) -> Vec<(f64, &Formation)> {
         self.course.formations()
     }
 
-    /// Safety distance \[m\].
+    /// Returns the safety distance \[m\].
     #[must_use]
     pub fn delta_m(&self) -> f64 {
         self.delta_m
     }
 
-    /// Whether edges have a tension, and are no springs.
+    /// Returns whether edges have a tension; otherwise they are drawn as springs.
     #[must_use]
     pub fn has_tension(&self) -> bool {
         matches!(self.law, LawSpec::EdgeTension(_))
     }
 
-    /// How hard the edge between two vehicles pulls (above 0) or pushes (below 0) at a distance \[m\] and a time \[s\], from
-    /// -1 to 1.
+    /// Returns the tension of an edge at a distance \[m\] and a time \[s\], from -1 (push) to 1 (pull).
     ///
-    /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and reaches -1 at
-    /// `l = delta + K asinh(1/sqrt 2)`. Any other law is taken for a spring: its elongation over the desired distance.
+    /// For an edge tension it is V'(l) over its limit alpha/K, which is 1 far away and -1 at `l = delta + K
+    /// asinh(1/sqrt 2)`. For any other law it is the elongation relative to the desired distance.
     #[expect(clippy::cast_possible_truncation, reason = "the share of a colour")]
     #[must_use]
     pub fn tension(&self, pair: Pair, distance_m: f64, time_s: f64) -> f32 {
@@ -132,22 +131,23 @@ impl Plan {
         tension.clamp(-1.0, 1.0) as f32
     }
 
-    /// How hard the law accelerates a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N, above 0
-    /// where it pulls, below 0 where it pushes, minus infinity at or inside delta. None under a law without an edge tension.
+    /// Returns the acceleration of a vehicle along its edge to another at a distance \[m\], in m/s^2: V'(l)/N. It is
+    /// positive for a pull, negative for a push, and minus infinity at or within delta. `None` under a law without an
+    /// edge tension.
     #[must_use]
     pub fn pull_m_s2(&self, pair: Pair, distance_m: f64, time_s: f64) -> Option<f64> {
         let vehicles = self.graph.count() as f64;
         self.edge_tension(pair, time_s).map(|(_, edge)| edge.derivative(distance_m) / vehicles)
     }
 
-    /// How much longer a distance \[m\] is than the desired one, over that one.
+    /// Returns the excess of a distance \[m\] over the desired one, relative to the desired one.
     #[must_use]
     pub fn elongation(&self, pair: Pair, distance_m: f64, time_s: f64) -> f64 {
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());
         (distance_m - rest_m) / rest_m
     }
 
-    /// Alpha \[m^2/s^2\] and the tension of an edge, where the law has one.
+    /// Returns alpha \[m^2/s^2\] and the tension of an edge, if the law has one.
     fn edge_tension(&self, pair: Pair, time_s: f64) -> Option<(f64, EdgeTension)> {
         let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = self.law else { return None };
         let rest_m = self.formation_at(time_s).desired_distance(pair.first(), pair.second());

@@ -1,4 +1,4 @@
-//! Debug and release builds fly the same bits.
+//! Debug and release builds compute the same bits.
 
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -9,14 +9,14 @@ use tautline_laws::formation::Formation;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Parts};
 
-/// The states, and separations and energies in words that read back to the same bits.
+/// Hash of the states, and separations and energies as text that keeps all bits.
 #[derive(Default)]
-struct Everything {
+struct Record {
     states: StateHash,
     others: String,
 }
 
-impl Sink for Everything {
+impl Sink for Record {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         let closest = sample.separation.map(|closest| (closest.separation_m, closest.time_s));
         // Writing to a string cannot fail.
@@ -29,16 +29,16 @@ impl Sink for Everything {
     }
 }
 
-/// Hashes of the states, and of separations and energies.
+/// Returns the hashes of the states, and of separations and energies.
 fn hashes(scenario: &Scenario) -> [String; 2] {
-    scenario.validate().expect("a scenario that can be flown");
-    let mut everything = Everything::default();
+    scenario.validate().expect("a valid scenario");
+    let mut record = Record::default();
     let parts = Parts::of(scenario).expect("a law");
-    sim::fly(scenario, parts, &mut everything, &mut |_| ControlFlow::Continue(())).expect("a flight");
-    [everything.states.finish(), sha256_hex(&everything.others)]
+    sim::fly(scenario, parts, &mut record, &mut |_| ControlFlow::Continue(())).expect("a flight");
+    [record.states.finish(), sha256_hex(&record.others)]
 }
 
-/// `pentagon` as it is built in.
+/// The built-in scenario `pentagon`.
 #[test]
 fn the_pentagon_has_its_golden_bits() {
     let start = [[3.0, -0.05, 0.0], [9.0, -0.05, 0.0], [6.0, 0.05, 0.0], [0.0, 0.05, 0.0], [12.0, 0.05, 0.0]];
@@ -52,7 +52,7 @@ fn the_pentagon_has_its_golden_bits() {
     assert_eq!(hashes(&pentagon), golden);
 }
 
-/// As many vehicles as it takes for law and audit to run side by side where there are two threads.
+/// Enough vehicles for law and audit to run concurrently if there are two threads.
 #[test]
 fn a_crowd_has_its_golden_bits() {
     let count = 520;

@@ -90,7 +90,7 @@ fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, Untried> {
     scenario.time.duration_s = SHORT_S;
     (scenario.time.dt_s, scenario.time.record_hz) = (1.0 / LOOKS_HZ, LOOKS_HZ);
     scenario.arrival.hold_s = 0.0;
-    scenario.breathing.mode = tautline_laws::target::BreathingMode::Off;
+    scenario.deadlock.mode = tautline_laws::target::DeadlockMode::Off;
     Ok(scenario)
 }
 

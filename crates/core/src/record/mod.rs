@@ -251,7 +251,7 @@ pub enum Event {
         time_s: f64,
     },
     /// Slots were spread, since vehicles stood in each other's way; what the law promised is renewed.
-    Breath {
+    DeadlockRecovery {
         /// When \[s\].
         time_s: f64,
         /// They are scaled by this about their centre.
@@ -299,7 +299,7 @@ pub enum Event {
 
 /// A time at which slots were spread.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Breath {
+pub struct DeadlockRecovery {
     /// When \[s\].
     pub time_s: f64,
     /// They were scaled by this about their centre.
@@ -352,7 +352,7 @@ impl Event {
             | Self::ObstacleApproach { time_s, .. }
             | Self::OtherLaw { time_s, .. }
             | Self::LegBegan { time_s, .. }
-            | Self::Breath { time_s, .. }
+            | Self::DeadlockRecovery { time_s, .. }
             | Self::Assigned { time_s, .. }
             | Self::EngineContact { time_s, .. }
             | Self::HullsHit { time_s, .. }

@@ -112,7 +112,7 @@ pub struct Capabilities {
     /// audit.
     pub requires_calling_thread: bool,
     /// Settling of position errors of an undisturbed swarm. Set for a law that can follow slots that are spread for a
-    /// while ([`crate::target::Breathing`]) and certifies again then.
+    /// while ([`crate::target::DeadlockOptions`]) and certifies again then.
     pub settling: Option<Settling>,
     /// Assumptions of the certified separation, as a sentence.
     pub assumptions: &'static str,

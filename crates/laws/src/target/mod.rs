@@ -4,14 +4,14 @@
 //! [`Supervisor`] reads the sensed states and may change the target; [`Schedule`] is the one that goes from leg to leg.
 
 mod arrival;
-mod breathing;
 mod course;
+mod deadlock;
 mod reference;
 mod supervisor;
 
 pub use arrival::{Arrival, Distance};
-pub use breathing::{Breathing, BreathingMode, Change, Settling};
 pub use course::{Course, assign_anew};
+pub use deadlock::{Change, DeadlockMode, DeadlockOptions, Settling};
 pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};
 

@@ -2,7 +2,7 @@
 
 use dyn_clone::DynClone;
 
-use super::breathing::{Breather, Breathing, Change, Settling};
+use super::deadlock::{Change, DeadlockOptions, DeadlockResolver, Settling};
 use super::{Arrival, Begins, CurrentTarget, Leg, Target, assign_anew};
 use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
@@ -44,7 +44,7 @@ pub trait Supervisor: DynClone + Send {
 dyn_clone::clone_trait_object!(Supervisor);
 
 /// Goes from leg to leg by time, or when the previous leg has been reached and held. If the swarm is stalled, may
-/// reassign interchangeable vehicles or spread the slots of a leg ([`Breathing`]).
+/// reassign interchangeable vehicles or spread the slots of a leg ([`DeadlockOptions`]).
 #[derive(Clone, Debug)]
 pub struct Schedule {
     legs: Vec<Leg>,
@@ -53,7 +53,7 @@ pub struct Schedule {
     freedom: Freedom,
     /// Time since which the present leg has been within the limits \[s\].
     within_since_s: Option<f64>,
-    breather: Option<Breather>,
+    resolver: Option<DeadlockResolver>,
     /// Last change, until it is taken.
     change: Option<Change>,
 }
@@ -68,7 +68,7 @@ impl Schedule {
             arrival,
             freedom: Freedom::RigidMotion,
             within_since_s: None,
-            breather: None,
+            resolver: None,
             change: None,
         }
     }
@@ -83,18 +83,18 @@ impl Schedule {
     /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled.
     /// `settling` describes the law. Call after [`Schedule::free_by`].
     #[must_use]
-    pub fn breathing(mut self, breathing: Breathing, settling: Settling, leader: Option<usize>) -> Self {
-        self.breather =
-            breathing.is_on().then(|| Breather::new(breathing, settling, leader, self.arrival, self.freedom));
+    pub fn deadlock_recovery(mut self, deadlock: DeadlockOptions, settling: Settling, leader: Option<usize>) -> Self {
+        self.resolver =
+            deadlock.is_on().then(|| DeadlockResolver::new(deadlock, settling, leader, self.arrival, self.freedom));
         self
     }
 
     /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps
-    /// all vehicles off their slots. Call after [`Schedule::breathing`].
+    /// all vehicles off their slots. Call after [`Schedule::deadlock_recovery`].
     #[must_use]
     pub fn blown(mut self, is_blown: bool) -> Self {
-        if let Some(breather) = self.breather.as_mut().filter(|_| is_blown) {
-            breather.ignore_common_errors();
+        if let Some(resolver) = self.resolver.as_mut().filter(|_| is_blown) {
+            resolver.ignore_common_errors();
         }
         self
     }
@@ -102,7 +102,7 @@ impl Schedule {
     fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
         match begins {
             Begins::At(from_s) => time_s >= from_s,
-            Begins::Reached if self.breather.as_ref().is_some_and(|breather| !breather.is_closed()) => false,
+            Begins::Reached if self.resolver.as_ref().is_some_and(|resolver| !resolver.is_closed()) => false,
             Begins::Reached => {
                 let Target { formation, ref reference, .. } = target.view();
                 let within = self.arrival.holds(sensed, formation, reference, &self.links, self.freedom);
@@ -123,13 +123,13 @@ impl Supervisor for Schedule {
             let leg = target.view().leg + 1;
             target.begin(leg, &self.legs[leg].formation);
             self.within_since_s = None;
-            if let Some(breather) = &mut self.breather {
-                breather.begin_leg();
+            if let Some(resolver) = &mut self.resolver {
+                resolver.begin_leg();
             }
         }
-        if let (Some(breather), Some(leg)) = (&mut self.breather, self.legs.get(target.view().leg)) {
-            breather.supervise(time_s, sensed, leg, target);
-            if let Some(change) = breather.take_change() {
+        if let (Some(resolver), Some(leg)) = (&mut self.resolver, self.legs.get(target.view().leg)) {
+            resolver.supervise(time_s, sensed, leg, target);
+            if let Some(change) = resolver.take_change() {
                 if let Change::Assigned { slots } = &change {
                     assign_anew(&mut self.legs, target.view().leg, slots);
                 }
@@ -139,7 +139,7 @@ impl Supervisor for Schedule {
     }
 
     fn is_idle(&self) -> bool {
-        self.legs.len() < 2 && self.breather.is_none()
+        self.legs.len() < 2 && self.resolver.is_none()
     }
 
     fn keeps_to(&self, legs: &[Leg]) -> bool {

@@ -266,9 +266,12 @@ impl From<&Event> for EventMessage<&'static str> {
             Event::LegBegan { leg, .. } => {
                 ("leg-began", NO_PAIR, (leg + 1) as f64, format!("leg {} of the flight began", leg + 1))
             }
-            Event::Breath { scale, .. } => {
-                ("breath", NO_PAIR, *scale, format!("slots were scaled by {scale} to let vehicles past each other"))
-            }
+            Event::DeadlockRecovery { scale, .. } => (
+                "deadlock-recovery",
+                NO_PAIR,
+                *scale,
+                format!("slots were scaled by {scale} to let vehicles past each other"),
+            ),
             Event::Assigned { slots, .. } => {
                 let slots: Vec<_> = slots.iter().map(|slot| (slot + 1).to_string()).collect();
                 ("assigned", NO_PAIR, f64::NAN, format!("{ASSIGNED}{}", slots.join(" ")))
@@ -318,7 +321,7 @@ impl EventMessage<String> {
             "hulls-hit" => Event::HullsHit { pair: pair()?, time_s, closing_m_s: self.value },
             "other-law" => Event::OtherLaw { time_s, name: self.text },
             "leg-began" => Event::LegBegan { leg: self.leg()?, time_s },
-            "breath" => Event::Breath { time_s, scale: self.value },
+            "deadlock-recovery" => Event::DeadlockRecovery { time_s, scale: self.value },
             "assigned" => Event::Assigned { time_s, slots: self.slots()? },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },

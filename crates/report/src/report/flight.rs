@@ -10,7 +10,7 @@ use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
 use super::verdict::{Fails, Verdict, at_rest, rises};
 use tautline_audit::{self as audit, Status};
-use tautline_core::record::{Breath, Reassignment};
+use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_laws::law::{Certificate, Void};
 use tautline_sim::link::Traffic;
@@ -59,7 +59,7 @@ pub struct Report {
     pub legs: Vec<LegNumbers>,
     /// Every time that slots were spread to let vehicles past each other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub breaths: Vec<Breath>,
+    pub deadlock_recoveries: Vec<DeadlockRecovery>,
     /// Every time that interchangeable vehicles were given other slots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assignments: Vec<Reassignment>,
@@ -539,7 +539,7 @@ impl Report {
                 max_position_error_m: finite(summary.max_position_error_m),
             },
             legs: LegNumbers::of(result),
-            breaths: flight.breaths.clone(),
+            deadlock_recoveries: flight.deadlock_recoveries.clone(),
             assignments: flight.assignments.clone(),
             energy: Energy {
                 initial: summary.energy_initial.and_then(finite),

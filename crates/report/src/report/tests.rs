@@ -123,7 +123,7 @@ impl Case {
             engine_contacts: Vec::new(),
             bounces: Vec::new(),
             energy_rise: self.energy_rise,
-            breaths: Vec::new(),
+            deadlock_recoveries: Vec::new(),
             assignments: Vec::new(),
             traffic: None,
             last: scenario.start.clone(),

@@ -42,8 +42,10 @@ impl Report {
 
     /// How often slots were spread, and vehicles given others; none where neither was.
     pub(super) fn changes(&self) -> Option<String> {
-        let counts =
-            [(self.breaths.len(), "breath", "breaths"), (self.assignments.len(), "new assignment", "new assignments")];
+        let counts = [
+            (self.deadlock_recoveries.len(), "deadlock recovery", "deadlock recoveries"),
+            (self.assignments.len(), "new assignment", "new assignments"),
+        ];
         let some = counts.into_iter().filter(|&(n, ..)| n > 0);
         let said: Vec<_> = some.map(|(n, one, many)| counted(n as u64, one, many)).collect();
         (!said.is_empty()).then(|| said.join(" and "))

@@ -1,4 +1,4 @@
-//! References, leaders, legs and breaths under the displacement law.
+//! References, leaders, legs and deadlock recoveries under the displacement law.
 //!
 //! 20 random missions of three legs in continuous time; `TAUTLINE_RANDOM_MISSIONS=1000 cargo test --release --test reported
 //! missions -- --nocapture` flies 1,000 and prints what docs/validation.md says of them.
@@ -10,7 +10,7 @@ use tautline_core::swarm::{Swarm, row, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
-use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg, ReferenceMotion};
 use tautline_report::run::run;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::Simulation;
@@ -50,7 +50,7 @@ fn mission(seed: u64) -> Scenario {
     scenario.law = LawSpec::Displacement(DisplacementKeys { alpha: delta_m * delta_m, ..DisplacementKeys::default() });
     scenario.a22_per_s = numbers.between(-0.5, 0.2);
     scenario.plant = PlantSpec::Ideal;
-    scenario.breathing.mode = BreathingMode::Off;
+    scenario.deadlock.mode = DeadlockMode::Off;
     scenario.hull_radius_m.fill(0.2 * delta_m);
     scenario.hull_radius_m.iter_mut().for_each(|radius_m| *radius_m = radius_m.min(0.5 * delta_m - 0.011).max(1e-3));
     scenario.legs = legs;
@@ -177,7 +177,7 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
             &format!("reference={{kind=\"velocity\", velocity_m_s=[0.5, 0], leader=1, feed_forward={fed}}}"),
             "time.duration_s=40",
             // A lag is not a jam.
-            "breathing.mode=off",
+            "deadlock.mode=off",
         ];
         let mut scenario = builtin("pentagon", &sets);
         // A constant acceleration: a circle so large that its start is a parabola.
@@ -228,37 +228,45 @@ fn a_reference_cures_the_drift_that_feeding_causes() {
 
 /// 16 random vehicles on their way to given slots in a grid stand in each other's way.
 #[test]
-fn a_swarm_that_is_stuck_breathes_once_and_arrives_and_without_a_breath_does_not() {
+fn a_stalled_swarm_arrives_only_with_deadlock_recovery() {
     let stuck = |mode: &str| read(&CROWD.replace("MODE", mode));
     let held = run(&stuck("off"), &mut ()).expect("a report");
     assert!(!held.formation.reached && held.audit.status == Status::Clear, "{}", held.headline());
     let report = run(&stuck("auto"), &mut ()).expect("a report");
     assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
-    assert!(!report.breaths.is_empty() && report.headline().contains("breath"), "{}", report.headline());
+    assert!(
+        !report.deadlock_recoveries.is_empty() && report.headline().contains("deadlock recover"),
+        "{}",
+        report.headline()
+    );
     assert!(report.separation.min_m > report.separation.certified_m);
-    let first = &report.breaths[0];
-    assert!(first.scale == 2.0 && report.separation.certified_m <= first.certified_m, "{:?}", report.breaths);
+    let first = &report.deadlock_recoveries[0];
+    assert!(
+        first.scale == 2.0 && report.separation.certified_m <= first.certified_m,
+        "{:?}",
+        report.deadlock_recoveries
+    );
 }
 
-/// Slots that are spread from the start, on a weakly damped star: what is certified before the first step counts that breath.
+/// Slots that are spread from the start, on a weakly damped star: the certificate before the first step includes that spreading.
 #[test]
-fn a_breath_that_is_sure_to_come_is_part_of_what_is_certified() {
-    let weak = BREATH.replace("MODE", "start");
+fn the_certificate_includes_slots_spread_from_the_start() {
+    let weak = WEAK_STAR.replace("MODE", "start");
     let scenario = read(&weak);
     let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m.expect("a promise");
     let report = run(&scenario, &mut ()).expect("a report");
     let closest_m = report.separation.min_m.expect("a pair");
     assert!(promised_m <= closest_m && closest_m < 1.1, "{promised_m} {closest_m}");
-    // Negative twin: without the breath that much would not be kept.
-    let still = read(&BREATH.replace("MODE", "off"));
+    // Negative twin: the certificate without spreading is larger than the separation.
+    let still = read(&WEAK_STAR.replace("MODE", "off"));
     let promised_m = tautline_sim::preflight::Preflight::of(&still).expect("a law").certified_m.expect("a promise");
     assert!(promised_m > closest_m, "{promised_m} {closest_m}");
 }
 
 /// A leader stays where it is while slots are spread about it, and the energy does what the proof says.
 #[test]
-fn a_breath_around_a_leader_leaves_it_alone() {
-    let led = BREATH.replace("MODE", "start") + "reference = { kind = \"rest\", leader = 1 }\n";
+fn slots_spread_about_a_leader_leave_it_at_rest() {
+    let led = WEAK_STAR.replace("MODE", "start") + "reference = { kind = \"rest\", leader = 1 }\n";
     let scenario = read(&led);
     let (flight, log) = fly(&scenario);
     let moved_m = |sample: &tautline_core::record::OwnedSample| {
@@ -266,16 +274,16 @@ fn a_breath_around_a_leader_leaves_it_alone() {
     };
     assert!(log.samples.iter().all(|sample| moved_m(sample) < 1e-9));
     let rise = flight.energy_rise.expect("an energy");
-    assert!(rise.to <= rise.from * (1.0 + 1e-3) && !flight.breaths.is_empty(), "{rise:?}");
+    assert!(rise.to <= rise.from * (1.0 + 1e-3) && !flight.deadlock_recoveries.is_empty(), "{rise:?}");
 }
 
-const BREATH: &str = r#"
+const WEAK_STAR: &str = r#"
 swarm = { count = 5 }
 start = { positions_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
 formation = { shape = "points", points_m = [[0, 0], [2, 0], [0, 2], [-2, 0], [0, -2]] }
 law = { kind = "displacement", delta_m = 1.0, zeta_per_s = 0.1 }
 graph = { kind = "star" }
-breathing = { mode = "MODE", scale = 4.0 }
+deadlock = { mode = "MODE", scale = 4.0 }
 time = { duration_s = 60.0 }
 "#;
 
@@ -284,24 +292,26 @@ time = { duration_s = 60.0 }
 fn legs_are_promised_anew_where_slots_are_spread() {
     let text = CROWD.replace("MODE", "auto") + "[[leg]]\nscale = 1.2\n";
     let report = run(&read(&text), &mut ()).expect("a report");
-    let breath = report.breaths.first().expect("a breath");
-    assert_eq!(report.legs[1].certified_m, breath.certified_m);
+    let recovery = report.deadlock_recoveries.first().expect("a deadlock recovery");
+    assert_eq!(report.legs[1].certified_m, recovery.certified_m);
     assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
     assert!(report.legs[1].certified_m <= report.separation.certified_m, "{:?}", report.legs);
     assert!(report.separation.min_m > report.separation.certified_m);
 }
 
-/// Interchangeable vehicles that are stuck get each other's slots, keep them on the leg that follows, and need no breath.
+/// Interchangeable vehicles that are stuck get each other's slots, keep them on the leg that follows, and spread no slots.
 #[test]
-fn interchangeable_vehicles_that_are_stuck_go_to_other_slots_and_need_no_breath() {
+fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
     let anew = "assignment = \"when-stalled\"";
     let text = CROWD.replace("MODE", "auto").replace("spacing_m = 1.4", &format!("spacing_m = 1.4, {anew}"))
         + &format!("[[leg]]\nscale = 1.2\n{anew}\n");
     let scenario = read(&text);
     let report = run(&scenario, &mut ()).expect("a report");
     assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
-    let [assignment] = report.assignments[..] else { panic!("{:?} {:?}", report.assignments, report.breaths) };
-    assert!(report.breaths.is_empty() && assignment.vehicles > 1, "{}", report.headline());
+    let [assignment] = report.assignments[..] else {
+        panic!("{:?} {:?}", report.assignments, report.deadlock_recoveries)
+    };
+    assert!(report.deadlock_recoveries.is_empty() && assignment.vehicles > 1, "{}", report.headline());
     assert!(report.headline().contains("2 of 2 legs reached; 1 new assignment"), "{}", report.headline());
     assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
     assert_eq!(
@@ -379,6 +389,6 @@ swarm = { count = 16 }
 start = { shape = "random", half_extent_m = 3.8, min_separation_m = 1.15, seed = 5 }
 formation = { shape = "grid", spacing_m = 1.4 }
 law = { kind = "displacement", delta_m = 1.0 }
-breathing = { mode = "MODE" }
+deadlock = { mode = "MODE" }
 time = { duration_s = 60.0, dt_s = 0.01 }
 "#;

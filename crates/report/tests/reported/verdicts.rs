@@ -69,8 +69,13 @@ fn vehicles_that_creep_towards_their_slots_are_still_moving() {
 #[test]
 fn a_slow_approach_is_no_stall_and_spreads_no_slots() {
     let slow = report(&three(0.01, 900.0));
-    assert!(slow.formation.reached && slow.breaths.is_empty(), "{}: {:?}", slow.headline(), slow.breaths);
-    let off = report(&format!("breathing.mode = \"off\"\n{}", three(0.01, 900.0)));
+    assert!(
+        slow.formation.reached && slow.deadlock_recoveries.is_empty(),
+        "{}: {:?}",
+        slow.headline(),
+        slow.deadlock_recoveries
+    );
+    let off = report(&format!("deadlock.mode = \"off\"\n{}", three(0.01, 900.0)));
     assert_eq!(slow.formation.reached_at_s, off.formation.reached_at_s);
 }
 

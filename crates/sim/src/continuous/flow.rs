@@ -1,4 +1,4 @@
-//! The right-hand side of the equation of motion, as the solver asks for it.
+//! Right-hand side of the equation of motion for the solver.
 
 use std::cell::RefCell;
 
@@ -9,25 +9,25 @@ use crate::plant::Feedback;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::law::LawError;
 
-/// Longest step \[s\]: where nothing accelerates, the error control alone would let a pair pass each other unseen.
+/// Longest solver step \[s\]: without accelerations, the error control alone could skip an encounter of a pair.
 const LONGEST_STEP_S: f64 = 0.125;
 
-/// What vehicles do without a command.
+/// Motion without a command.
 #[derive(Clone, Copy)]
 pub(super) struct FreeMotion<'a> {
     pub(super) a22_per_s: f64,
-    /// Moved on to the end, at this time of the solver \[s\].
+    /// Wind, advanced to the end of the step, and that time of the solver \[s\].
     pub(super) air: Option<&'a Air>,
     pub(super) end_s: f64,
 }
 
 impl FreeMotion<'_> {
-    /// How long the wind is smooth from a time of the solver on \[s\].
+    /// Returns the time for which the wind is smooth from a time of the solver on \[s\].
     fn smooth_s(&self, time_s: f64) -> f64 {
         self.air.map_or(f64::INFINITY, |air| air.smooth_s(self.end_s - time_s))
     }
 
-    /// Adds what the wind does at a time of the solver \[s\] to accelerations, an axis after the other.
+    /// Adds the acceleration by the wind at a time of the solver \[s\], axis by axis.
     fn blow(&self, time_s: f64, accelerations: &mut [f64]) {
         let Some(air) = self.air else { return };
         let count = accelerations.len() / 3;
@@ -38,7 +38,7 @@ impl FreeMotion<'_> {
     }
 }
 
-/// The right-hand side. The solver asks it through a shared reference, so what changes is in a cell.
+/// Right-hand side. The solver has a shared reference to it, so mutable state is in a cell.
 pub(super) struct Flow<'law> {
     motion: FreeMotion<'law>,
     /// Time of the flight at the solver's time 0 \[s\].
@@ -50,7 +50,7 @@ struct Scratch<'law> {
     feedback: &'law mut dyn Feedback,
     swarm: Swarm,
     control: Rows,
-    /// Why the law had no answer, the first time since this was taken.
+    /// First error of the law since the last call of `take_failure`.
     failure: Option<LawError>,
 }
 
@@ -61,7 +61,7 @@ impl<'law> Flow<'law> {
         Self { motion, from_s, scratch: RefCell::new(scratch) }
     }
 
-    /// What a state looks like as a swarm.
+    /// Returns a state as a swarm.
     pub(super) fn swarm_of(&self, state: &[f64]) -> Swarm {
         let mut swarm = self.scratch.borrow().swarm.clone();
         unpack(state, &mut swarm);
@@ -72,7 +72,7 @@ impl<'law> Flow<'law> {
         self.scratch.borrow_mut().failure.take()
     }
 
-    /// How long the right-hand side is smooth from a time on \[s\].
+    /// Returns the time for which the right-hand side is smooth from a time on \[s\].
     pub(super) fn smooth_s(&self, time_s: f64) -> f64 {
         self.motion.smooth_s(time_s)
     }
@@ -89,8 +89,8 @@ impl<'law> Flow<'law> {
 }
 
 impl Flow<'_> {
-    /// Positions and velocities of a state after `time_s` more under the accelerations of now, which `now_s` of the solver is, and
-    /// how far the way there bends from a straight line \[m\]. None where the law has no answer now.
+    /// Returns the state after `time_s` more under the present accelerations, at the solver's time `now_s`, and the
+    /// bend of the way \[m\]. `None` if the law is undefined now.
     pub(super) fn coasted(&self, now_s: f64, state: &Vec<f64>, time_s: f64) -> Option<(Vec<f64>, f64)> {
         let mut rates = vec![0.0; state.len()];
         self.diff(now_s, state, &mut rates);
@@ -114,13 +114,13 @@ impl Flow<'_> {
 impl ODE<f64, Vec<f64>> for Flow<'_> {
     fn diff(&self, time_s: f64, state: &Vec<f64>, rates: &mut Vec<f64>) {
         let Scratch { feedback, swarm, control, failure } = &mut *self.scratch.borrow_mut();
-        // The stages after one without an answer are not numbers: the reason is that of the first.
+        // Stages after the first undefined one are NaN; the first error is kept.
         if failure.is_none() {
             unpack(state, swarm);
             *failure = feedback.command(self.from_s + time_s, swarm, control).err();
         }
         if failure.is_some() {
-            // An error estimate that is not a number refuses the step.
+            // An error estimate that is NaN refuses the step.
             rates.fill(f64::NAN);
             return;
         }

@@ -1,7 +1,7 @@
-//! Quadrotors in continuous time: what the bodies of the engine are measured against.
+//! Quadrotors in continuous time, a reference for those of the physics engine.
 //!
-//! Between two instants at which attitude loops run, the same forces and torques are solved by the method of order 8. Rotors
-//! follow exactly: with what is asked of them held, their speeds are exponentials of time.
+//! Between two runs of the attitude loops, the method of order 8 solves the same forces and torques. Rotors are exact:
+//! with held commands, their speeds are exponentials of time.
 
 use std::cell::RefCell;
 
@@ -14,28 +14,29 @@ use crate::vehicle::{Fleet, State};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, set_row};
 
-/// Numbers of a vehicle in the solver's state: place, velocity, attitude, rates.
+/// Size of a vehicle's state in the solver: position, velocity, attitude, rates.
 const NUMBERS: usize = 13;
 
-/// Part of a step that is rounding of times within it.
+/// Relative rounding of times within a step.
 const ROUNDING: f64 = 1e-9;
 
-/// Quadrotors that move as their equations say, in continuous time; attitude loops run at their rate and commands are held.
+/// Quadrotors in continuous time. Attitude loops run at their rate; commands are held.
 #[derive(Clone, Debug)]
 pub struct Quadrotors {
     fleet: Fleet,
 }
 
 impl Quadrotors {
-    /// At the start of a fleet.
+    /// Creates quadrotors in the states of a fleet.
     #[must_use]
     pub fn new(mut fleet: Fleet) -> Self {
         fleet.feel();
         Self { fleet }
     }
 
-    /// Solves over a time \[s\] in which the wind is smooth and what is asked of rotors does not change, so many seconds before
-    /// the wind's present; says how far a path bends from its chord at most \[m\], as [`super::Continuous::advance`] does.
+    /// Solves over a time \[s\] in which the wind is smooth and rotor commands are constant, beginning `before_s`
+    /// before the wind's present. Returns an upper bound of the bend of a path \[m\], as [`super::Continuous::advance`]
+    /// does.
     fn solve(&mut self, dt_s: f64, before_s: f64) -> Result<f64, PlantError> {
         let flow = Flow { before: &self.fleet, before_s, fleet: RefCell::new(self.fleet.clone()) };
         let Tolerances { relative, absolute } = Tolerances::default();
@@ -128,17 +129,17 @@ impl Plant for Quadrotors {
     }
 }
 
-/// The right-hand side, from the fleet at time 0.
+/// Right-hand side, relative to the fleet at time 0.
 struct Flow<'a> {
     before: &'a Fleet,
-    /// How many seconds before the wind's present that is.
+    /// Time from there to the wind's present \[s\].
     before_s: f64,
-    /// At the time that is asked about. The solver asks through a shared reference.
+    /// Fleet at the time of the last evaluation. The solver has a shared reference.
     fleet: RefCell<Fleet>,
 }
 
 impl Flow<'_> {
-    /// Brings the fleet to a state of the solver at a time.
+    /// Sets the fleet to a state of the solver at a time.
     fn at(&self, time_s: f64, numbers: &[f64]) {
         let fleet = &mut *self.fleet.borrow_mut();
         let lag = fleet.dynamics.rotor_lag(time_s);
@@ -167,7 +168,7 @@ impl ODE<f64, Vec<f64>> for Flow<'_> {
         for (i, rates) in rates.chunks_exact_mut(NUMBERS).enumerate() {
             let state = &fleet.states[i];
             let (acceleration_m_s2, turning_rad_s2) = fleet.dynamics.accelerations(state, fleet.wrench(i));
-            // The solver's own quaternion, of whatever length.
+            // The solver's own quaternion, which is not normalized.
             let own = &numbers[NUMBERS * i + 6..];
             let attitude = Quaternion::new(own[0], own[1], own[2], own[3]);
             let turning = attitude * Quaternion::from_imag(0.5 * state.rates_rad_s);

@@ -1,4 +1,4 @@
-//! `[actuation]`: how commands become accelerations, with a limit and the lag of motors.
+//! `[actuation]`: conversion of commands into accelerations, with a limit and a lag.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,15 +9,15 @@ use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::Void;
 
-/// How commands become accelerations: unchanged and without a lag unless given.
+/// Conversion of commands into accelerations: without limit and lag unless given.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ActuationSpec {
-    /// Limit of each vehicle's acceleration in m/s^2: longer commands are shortened, in their direction.
+    /// Limit of the magnitude of each acceleration in m/s^2; longer commands are scaled down. No limit unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
-    /// Time constant in s of the lag between command and acceleration, lag a' = u - a, from a = 0 at the start.
+    /// Time constant in s of the lag of motors, lag a' = u - a, with a = 0 at the start; 0 unless given.
     #[serde(skip_serializing_if = "is_off")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub lag_s: f64,
@@ -45,23 +45,23 @@ impl ImperfectionSpec for ActuationSpec {
     }
 }
 
-/// Limits commands, and follows them with a lag.
+/// Limits commands and follows them with a lag.
 #[derive(Clone, Debug)]
 pub(super) struct Actuation {
     spec: ActuationSpec,
-    /// Whether commands are held in between: otherwise they go from one to the next along straight lines.
+    /// Whether commands are held between instants; otherwise they are interpolated linearly.
     holds: bool,
     lag: Option<Lag>,
 }
 
-/// Accelerations a on their way to commands u: tau a' = u - a.
+/// Accelerations a that follow commands u: tau a' = u - a.
 #[derive(Clone, Debug)]
 struct Lag {
     before: Point,
     now: Point,
 }
 
-/// What was commanded and how vehicles were accelerated at an instant.
+/// Commands and accelerations at an instant.
 #[derive(Clone, Debug)]
 struct Point {
     time_s: f64,
@@ -80,8 +80,8 @@ impl Actuation {
         }
     }
 
-    /// Writes the accelerations at a time \[s\] over the commands that are given then. Asked again about the same time it
-    /// answers about that time again; otherwise time goes on.
+    /// Replaces the commands at a time \[s\] by accelerations. Times must not decrease; a repeated time replaces the
+    /// previous call.
     pub(super) fn act(&mut self, time_s: f64, command: &mut Rows) {
         if let Some(most_m_s2) = self.spec.max_accel_m_s2 {
             for i in 0..command.nrows() {
@@ -101,7 +101,7 @@ impl Actuation {
 }
 
 impl Lag {
-    /// The exact solution over the time between the two points, for a command that is held or goes along a straight line.
+    /// Advances the exact solution between the two points, for a command that is held or linear in time.
     fn follow(&mut self, lag_s: f64, holds: bool) {
         let Self { before, now } = self;
         let passed_s = now.time_s - before.time_s;
@@ -109,7 +109,7 @@ impl Lag {
         let entries = before.command.iter().zip(before.accelerations.iter()).zip(now.command.iter());
         for (((&from, &was), &to), now) in entries.zip(now.accelerations.iter_mut()) {
             let slope = if holds || passed_s == 0.0 { 0.0 } else { (to - from) / passed_s };
-            // Behind a command that goes on steadily the acceleration stays back by lag times slope.
+            // For a linear command, the steady acceleration trails by lag times slope.
             *now = from + slope * (passed_s - lag_s) + (was - from + slope * lag_s) * left;
         }
     }
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn long_commands_are_shortened_in_their_direction_and_short_ones_are_not() {
+    fn only_commands_above_the_limit_are_scaled_down() {
         let mut command = Rows::from_row_slice(&[3.0, 4.0, 0.0, 0.3, -0.4, 0.0]);
         actuation(Some(1.0), 0.0, None).act(0.0, &mut command);
         let expected = Rows::from_row_slice(&[0.6, 0.8, 0.0, 0.3, -0.4, 0.0]);
@@ -138,12 +138,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_follows_a_step_and_a_ramp_as_the_equation_does_whatever_the_steps() {
+    fn a_lag_solves_its_equation_exactly_for_steps_and_ramps() {
         for parts in [1, 7, 100] {
             for (holds, exact) in [
                 // From 0 after a step to 1.
                 (Some(10.0), 1.0 - libm::exp(-2.0_f64)),
-                // Behind u = t.
+                // For u = t.
                 (None, 0.4 - 0.2 + 0.2 * libm::exp(-2.0_f64)),
             ] {
                 let mut actuation = actuation(None, 0.2, holds);

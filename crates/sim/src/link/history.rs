@@ -1,29 +1,29 @@
-//! The past of a swarm at any instant, for what acts late.
+//! Interpolated past of a swarm, for delayed measurements and messages.
 
 use std::collections::VecDeque;
 
 use tautline_core::swarm::Swarm;
 
-/// The states of the last `span_s` seconds, and what lies between them.
+/// States of the last `span_s` seconds.
 ///
-/// Between two states each coordinate is the cubic that has their positions and velocities (Hermite): off by at most
-/// h^4/384 of the fourth derivative over a step h, and its velocity by a share h^3.
+/// Between two states, each coordinate is the Hermite cubic of their positions and velocities. Its error is at most
+/// h^4/384 times the fourth derivative over a step h; the error of its velocity is of order h^3.
 #[derive(Clone, Debug)]
 pub struct History {
     span_s: f64,
     states: VecDeque<(f64, Swarm)>,
-    /// Memory of states that were dropped.
+    /// Memory of dropped states, for reuse.
     spare: Vec<Swarm>,
 }
 
 impl History {
-    /// Nothing yet; at least the last `span_s` seconds will be kept.
+    /// Returns an empty history that keeps at least the last `span_s` seconds.
     #[must_use]
     pub fn new(span_s: f64) -> Self {
         Self { span_s, states: VecDeque::new(), spare: Vec::new() }
     }
 
-    /// Adds the state at a time later than all before; at the same time it takes the place of the last.
+    /// Adds the latest state, or replaces it at the same time.
     pub fn push(&mut self, time_s: f64, swarm: &Swarm) {
         self.forget_after(time_s.next_down());
         let state = match self.spare.pop() {
@@ -36,7 +36,7 @@ impl History {
         self.states.push_back((time_s, state));
     }
 
-    /// Drops what is older than the span before this time, which will not be taken back.
+    /// Drops states older than the span before this time. Time must not go back before it later.
     pub fn settle(&mut self, time_s: f64) {
         // The state before the span begins is needed to interpolate up to it.
         let oldest_s = time_s - self.span_s;
@@ -52,7 +52,7 @@ impl History {
         }
     }
 
-    /// Writes the state at a time \[s\]: the first state before it began, the last one after it ended.
+    /// Writes the state at a time \[s\]; before the first state that state, after the last state that one.
     pub fn at(&self, time_s: f64, swarm: &mut Swarm) {
         let later = self.states.partition_point(|(state_s, _)| *state_s <= time_s);
         let (before, after) = (later.checked_sub(1).and_then(|at| self.states.get(at)), self.states.get(later));
@@ -66,7 +66,7 @@ impl History {
     }
 }
 
-/// The cubic through two states `h_s` apart, at the share s of the way.
+/// Evaluates the Hermite cubic of two states `h_s` apart at s = (t - t0)/h, in \[0, 1\].
 fn interpolate(from: &Swarm, to: &Swarm, h_s: f64, s: f64, swarm: &mut Swarm) {
     let positions = from.positions_m.iter().zip(to.positions_m.iter());
     let velocities = from.velocities_m_s.iter().zip(to.velocities_m_s.iter());
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cubic_motion_is_known_at_every_instant_and_held_beyond_the_ends() {
+    fn a_cubic_motion_is_exact_within_the_history_and_constant_beyond_it() {
         let mut history = History::new(1.0);
         for t in [0.0, 0.3, 0.5, 1.0] {
             history.push(t, &cubic(t));
@@ -110,10 +110,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_older_than_the_span_is_dropped_and_what_did_not_happen_is_forgotten() {
+    fn states_before_the_span_and_refused_states_are_dropped() {
         let mut history = History::new(0.5);
         (0..=8).for_each(|k| history.push(0.25 * f64::from(k), &cubic(0.25 * f64::from(k))));
-        assert_eq!(history.states.len(), 9, "a step that may be taken back drops nothing");
+        assert_eq!(history.states.len(), 9, "a step that may be refused drops nothing");
         history.settle(2.0);
         assert_eq!(history.states.front().map(|(time_s, _)| *time_s), Some(1.5));
         history.forget_after(1.6);

@@ -1,4 +1,4 @@
-//! Messages that are sent at a rate, take their time, and may not come.
+//! Single messages: sent at a rate, delayed, and possibly lost.
 
 use std::collections::VecDeque;
 
@@ -12,23 +12,23 @@ use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::Graph;
 use tautline_laws::observation::Neighbour;
 
-/// Doubles that are drawn for a message on a link: for its loss, and for its jitter.
+/// Random doubles per message on a link: one for its loss, one for its jitter.
 const DRAWS: usize = 2;
 
-/// What all vehicles sent at one instant.
+/// Messages that all vehicles send at one instant.
 #[derive(Clone, Debug)]
 struct Broadcast {
-    /// Its number from 1 on; what is known before the first is 0.
+    /// Number, from 1; 0 stands for the state before the first message.
     number: u64,
     sent_s: f64,
-    /// When what is sent was measured \[s\].
+    /// Time of the measurement that the message holds \[s\].
     measured_s: f64,
     states: Swarm,
-    /// When it arrives over each link \[s\]; never where it is lost.
+    /// Arrival over each link \[s\]; infinite for a lost message.
     arrives_s: Vec<f64>,
 }
 
-/// What was heard last over a link.
+/// Last message received over a link.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     number: u64,
@@ -36,7 +36,7 @@ struct Heard {
     measured_s: f64,
 }
 
-/// Two vehicles between which nothing gets through for a while.
+/// Two vehicles whose link is down for some time.
 #[derive(Clone, Copy, Debug)]
 struct Down {
     ends: [usize; 2],
@@ -44,10 +44,10 @@ struct Down {
     to_s: f64,
 }
 
-/// The network of a flight: who sends what when, what is under way, and what was heard.
+/// Network of a flight: messages under way, and the last message received over each link.
 ///
-/// Message k is sent at k/`rate_hz` after the first measurement is known, by everybody to all neighbours, with what the
-/// sender knows of itself then. What becomes of it depends on the seed, the link and k alone.
+/// All vehicles send message k to all neighbours k/`rate_hz` after the first measurement is available. It holds the
+/// sender's knowledge of its own state at that time. Its delay and loss depend only on the seed, the link and k.
 #[derive(Clone, Debug)]
 pub(super) struct Messages {
     links: Links,
@@ -64,7 +64,7 @@ pub(super) struct Messages {
     under_way: VecDeque<Broadcast>,
     spare: Vec<Broadcast>,
     heard: Vec<Heard>,
-    /// Whether the last message on each link was lost; none before the first.
+    /// Whether the last message on each link was lost; `None` before the first.
     lost_before: Vec<Option<bool>>,
     sent: u64,
     lost: u64,
@@ -121,17 +121,17 @@ impl Messages {
         self.noise.reseed(seed, self.next - 1);
     }
 
-    /// Messages that were sent, and how many of them were lost.
+    /// Returns the numbers of messages sent and lost.
     pub(super) fn counts(&self) -> (u64, u64) {
         (self.sent, self.lost)
     }
 
-    /// How old what was heard is, over all links and messages.
+    /// Returns the ages of received states, over all links and messages.
     pub(super) fn ages(&self) -> &Ages {
         &self.ages
     }
 
-    /// Sends what is due up to a time \[s\], and delivers what has arrived by then.
+    /// Sends the messages that are due up to a time \[s\], and delivers those that have arrived.
     pub(super) fn settle(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
         loop {
             let sent_s = self.begins_s + (self.next - 1) as f64 / self.rate_hz;
@@ -185,7 +185,7 @@ impl Messages {
         }
     }
 
-    /// Takes what has arrived; of what overtook each other the later sent.
+    /// Delivers messages that have arrived; an older message never replaces a newer one.
     fn deliver(&mut self, time_s: f64) {
         for broadcast in &self.under_way {
             if broadcast.sent_s + self.latency_s > time_s + SAME_S {
@@ -209,13 +209,13 @@ impl Messages {
         }
     }
 
-    /// What vehicle `i` heard last of vehicle `j`, at a time \[s\]; none without a link.
+    /// Returns the last state of vehicle `j` that vehicle `i` received, at a time \[s\]; `None` without a link.
     pub(super) fn heard(&self, i: usize, j: usize, time_s: f64) -> Option<Neighbour> {
         let heard = self.heard[self.links.find(i, j)?];
         Some(Neighbour { age_s: (time_s - heard.measured_s).max(0.0), ..heard.neighbour })
     }
 
-    /// Farthest that anybody holds another from where it is \[m\], in this table.
+    /// Returns the largest distance \[m\] of a received position from the true position of its sender.
     pub(super) fn farthest_m(&self, positions_m: &Rows, carried: impl Fn(Neighbour) -> Neighbour, time_s: f64) -> f64 {
         (0..self.links.count()).fold(0.0, |farthest_m, sender| {
             let place_m = row(positions_m, sender);
@@ -227,7 +227,7 @@ impl Messages {
         })
     }
 
-    /// For each vehicle the age of the oldest of what it holds, and the mean \[s\], one after the other.
+    /// Writes the age of the oldest received state and the mean age for each vehicle, alternating \[s\].
     pub(super) fn write_ages(&self, time_s: f64, oldest_and_mean_s: &mut [f64]) {
         oldest_and_mean_s.fill(0.0);
         for sender in 0..self.links.count() {
@@ -239,7 +239,7 @@ impl Messages {
             }
         }
         for hearer in 0..self.links.count() {
-            // Links lead both ways: as many are heard as hear.
+            // Links are bidirectional: a vehicle hears as many vehicles as hear it.
             let neighbours = self.links.from(hearer).len().max(1);
             oldest_and_mean_s[2 * hearer + 1] /= neighbours as f64;
         }
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_lost_and_the_mean_burst_are_those_asked_for() {
+    fn the_share_lost_and_the_mean_burst_match_the_model() {
         for (share, burst) in [(0.02, None), (0.3, None), (0.1, Some(5.0)), (0.5, Some(20.0)), (0.05, Some(1.0))] {
             // Standard errors of both are below 1 %.
             let (lost, length) = measured(Loss::new(share, burst), 1_000_000);

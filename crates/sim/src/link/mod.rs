@@ -214,7 +214,8 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.
 const STEPS_PER_DELAY: f64 = 8.0;
 
-/// What lies between truth and law in a scenario, [`Direct`] where nothing does. A law may sense who is near, or not.
+/// Returns the imperfections of a scenario, [`Direct`] if it has none. `senses` is whether the law senses near
+/// vehicles.
 #[must_use]
 pub fn of(scenario: &Scenario, senses: bool) -> Box<dyn Imperfections> {
     if scenario.is_exact() { Box::new(Direct) } else { Box::new(World::new(scenario, senses)) }
@@ -231,13 +232,14 @@ struct World {
     failing: Failing,
     missing: Missing,
     near: NearBy,
-    /// Whether what vehicles know of themselves is all that anybody knows.
+    /// Whether all vehicles use each sender's knowledge of its own state, without communication effects.
     is_shared: bool,
-    /// Whether vehicles know their own present state.
+    /// Whether vehicles know their true present state.
     knows_itself: bool,
     time_s: f64,
     own: Swarm,
-    /// How far anybody is, or is held by another, from where it is seen \[m\].
+    /// Largest distance of a vehicle's true position, or its position as known to another vehicle, from its sensed
+    /// position \[m\].
     slack_m: f64,
 }
 
@@ -263,7 +265,7 @@ impl World {
         }
     }
 
-    /// What stands for a message, old as it is, at the time of a vehicle's own measurement.
+    /// Extrapolates a received state to the time of the receiver's own measurement, unless states are held.
     fn carried(&self, heard: Neighbour) -> Neighbour {
         if self.missing == Missing::Hold {
             return heard;
@@ -273,7 +275,8 @@ impl World {
         Neighbour { position_m: heard.position_m + heard.velocity_m_s * ahead_s, ..heard }
     }
 
-    /// Who is near where vehicles know each other by messages is found where they are, and they hold each other elsewhere.
+    /// Updates the slack: near vehicles known by messages are searched at their own positions but used at received
+    /// positions.
     fn find_slack(&mut self, truth: &Swarm) {
         let own = (0..self.own.count())
             .map(|i| (row(&self.own.positions_m, i) - row(&truth.positions_m, i)).norm())
@@ -320,7 +323,7 @@ impl Imperfections for World {
         self.sight.look(&self.history, time_s, truth);
         self.network.hear(time_s, &self.sensing, &self.history);
         if self.near == NearBy::Heard {
-            // What is seen is the truth here, from which the others' pictures are told.
+            // Sensed positions are the true ones here; the slack covers the difference to received positions.
             self.find_slack(truth);
         }
         Sensed { own: &self.own, others: Others::Held(self) }

@@ -1,34 +1,34 @@
-//! Random numbers that are counted, not drawn in turn.
+//! Random numbers that depend on a counter, not on the order of draws.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use std::f64::consts::TAU;
 
-/// Words of a block of the generator: draws of one number begin at a block of their own.
+/// Words of a block of the generator; each draw begins at a block boundary.
 const BLOCK_WORDS: u128 = 16;
 /// Words of a double.
 const DOUBLE_WORDS: usize = 2;
 
-/// What random numbers are for: streams of different sources never meet.
+/// Use of random numbers; each source has its own streams.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Source {
-    /// Errors of vehicles' own measurements.
+    /// Errors of vehicles' measurements of themselves.
     Own,
-    /// Errors that they keep.
+    /// Constant errors of vehicles' measurements of themselves.
     Bias,
-    /// Errors of what they see of each other.
+    /// Errors of vehicles' measurements of each other.
     Sight,
-    /// What becomes of messages.
+    /// Losses and delays of messages.
     Radio,
 }
 
-/// Random numbers that depend on a seed, on who draws them and on the number of the draw, and on nothing else: not on how
-/// often or in which order they are asked for.
+/// Random numbers that depend only on a seed, a source, a pair of vehicles and the number of the draw, not on the order
+/// or number of calls.
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
     random: ChaCha8Rng,
     source: Source,
-    /// The last number of a draw that was made before the seed was changed, and what it is drawn from.
+    /// Last draw made before the seed was changed, and its generator.
     before: Option<(u64, ChaCha8Rng)>,
 }
 
@@ -37,15 +37,14 @@ impl Noise {
         Self { random: ChaCha8Rng::seed_from_u64(seed), source, before: None }
     }
 
-    /// Goes on with another seed after the draw of this number, which was made: it stays what it is, however often it is asked
-    /// for. Nobody may ask for numbers before it again.
+    /// Changes the seed for draws after number `made`. Draw `made` keeps its value; earlier draws must not be repeated.
     pub(super) fn reseed(&mut self, seed: u64, made: u64) {
         let before = self.before.take().filter(|(last, _)| made <= *last);
         let random = std::mem::replace(&mut self.random, ChaCha8Rng::seed_from_u64(seed));
         self.before = Some(before.unwrap_or((made, random)));
     }
 
-    /// The numbers of two vehicles' draw, of which each takes at most `doubles`.
+    /// Returns a draw of at most `doubles` numbers for two vehicles.
     pub(super) fn draw(&self, vehicle: usize, other: usize, number: u64, doubles: usize) -> Draw {
         let made = self.before.as_ref().filter(|(last, _)| number <= *last);
         let mut random = made.map_or(&self.random, |(_, random)| random).clone();
@@ -63,13 +62,13 @@ pub(super) struct Draw {
 }
 
 impl Draw {
-    /// Uniform in \[0, 1), a multiple of 2^-53.
+    /// Returns a uniform number in \[0, 1), a multiple of 2^-53.
     pub(super) fn unit(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.random.next_u64() >> 11) as f64 * SCALE
     }
 
-    /// Two independent normal numbers of mean 0 and variance 1 (Box and Muller), from two doubles.
+    /// Returns two independent standard normal numbers (Box and Muller) from two doubles.
     fn normals(&mut self) -> [f64; 2] {
         let (u, turn) = (self.unit(), self.unit());
         let length = (-2.0 * libm::log(1.0 - u)).sqrt();
@@ -77,7 +76,7 @@ impl Draw {
         [length * cos, length * sin]
     }
 
-    /// Six of them, from six doubles.
+    /// Returns six independent standard normal numbers, from six doubles.
     pub(super) fn six_normals(&mut self) -> [f64; 6] {
         let [[a, b], [c, d], [e, f]] = [self.normals(), self.normals(), self.normals()];
         [a, b, c, d, e, f]
@@ -89,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_draw_is_the_same_whenever_it_is_asked_for_and_of_its_own_source_vehicle_and_number() {
+    fn a_draw_depends_only_on_source_vehicles_and_number() {
         let noise = Noise::new(7, Source::Own);
         let first = noise.draw(3, 0, 41, 6).six_normals();
         noise.draw(3, 0, 42, 6).six_normals();
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_drawn_stays_under_other_seeds_and_what_was_not_is_theirs() {
+    fn another_seed_changes_only_later_draws() {
         let draw = |noise: &Noise, number: u64| noise.draw(3, 0, number, 6).six_normals();
         let (first, second, third) =
             (Noise::new(7, Source::Own), Noise::new(8, Source::Own), Noise::new(9, Source::Own));
@@ -128,7 +127,7 @@ mod tests {
         let moment = |power: i32| numbers.iter().map(|x| x.powi(power)).sum::<f64>() / numbers.len() as f64;
         // Standard errors of 300,000 numbers: 0.002, 0.003 and 0.02.
         assert!(moment(1).abs() < 0.007 && (moment(2) - 1.0).abs() < 0.01 && (moment(4) - 3.0).abs() < 0.07);
-        // Neighbours of a draw do not know of each other.
+        // Consecutive numbers of a draw are uncorrelated.
         let pairs = numbers.chunks_exact(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 150_000.0;
         assert!(pairs.abs() < 0.01, "{pairs}");
     }

@@ -96,18 +96,18 @@ impl ImperfectionSpec for SensingSpec {
     }
 }
 
-/// Two instants that are less apart are the same one \[s\]: a millionth of the shortest period, and more than the rounding of
-/// times of a flight.
+/// Tolerance of equal instants \[s\]: a millionth of the shortest period, and more than the rounding of times of a
+/// flight.
 pub(super) const SAME_S: f64 = 1e-9;
 
-/// The last of the periods of a rate that has begun at a time \[s\], from 0; 0 before the first too.
+/// Returns the number of the current period of a rate that began at time 0; 0 also before it.
 pub(super) fn period(time_s: f64, rate_hz: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; a flight is bounded")]
     let number = ((time_s + SAME_S) * rate_hz).floor().max(0.0) as u64;
     number
 }
 
-/// When a vehicle measures: the latest instant of which it knows something at a time, and the number of that measurement.
+/// Times of measurements: the latest one available at a time, and its number.
 #[derive(Clone, Copy, Debug)]
 struct Clock {
     rate_hz: Option<f64>,
@@ -123,7 +123,7 @@ impl Clock {
         })
     }
 
-    /// How far back this looks \[s\].
+    /// Returns the required length of the history \[s\].
     fn span_s(self) -> f64 {
         self.latency_s + self.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz) + SAME_S
     }
@@ -142,7 +142,7 @@ impl Errors {
         self.position_m == 0.0 && self.velocity_m_s == 0.0
     }
 
-    /// Errors of position \[m\] and velocity \[m/s\] from six normal numbers.
+    /// Returns errors of position \[m\] and velocity \[m/s\] from six normal numbers.
     fn of(self, normals: [f64; 6]) -> (Vector3<f64>, Vector3<f64>) {
         let along = |from: usize, deviation: f64| {
             Vector3::from_fn(|axis, _| if axis < self.axes { deviation * normals[from + axis] } else { 0.0 })
@@ -151,16 +151,16 @@ impl Errors {
     }
 }
 
-/// What each vehicle knows of itself.
+/// Vehicles' measurements of themselves.
 #[derive(Clone, Debug)]
 pub(super) struct Sensing {
     clock: Clock,
     errors: Errors,
     noise: Noise,
-    /// Errors that vehicles keep, N x 3 \[m\].
+    /// Constant errors, N x 3 \[m\].
     bias_m: Rows,
     is_biased: bool,
-    /// Number of the measurement that vehicles know themselves by, where it is held.
+    /// Number of the held measurement.
     held: Option<u64>,
 }
 
@@ -177,7 +177,7 @@ impl Sensing {
         }
     }
 
-    /// What is measured from now on has errors of another seed; what was measured keeps its own, and so do lasting errors.
+    /// Changes the seed of later measurements; the held measurement and constant errors stay.
     pub(super) fn reseed(&mut self, seed: u64) {
         self.noise.reseed(seed, self.held.unwrap_or_default());
     }
@@ -190,28 +190,28 @@ impl Sensing {
         self.clock.latency_s
     }
 
-    /// Whether vehicles know their own present state.
+    /// Returns whether vehicles know their true present state.
     pub(super) fn is_exact(&self) -> bool {
         self.clock.rate_hz.is_none() && self.clock.latency_s == 0.0 && !self.errs()
     }
 
-    /// Whether what a vehicle knows of itself is off the state that it was measured of.
+    /// Returns whether measurements have errors.
     fn errs(&self) -> bool {
         !self.errors.are_none() || self.is_biased
     }
 
-    /// When what is known at a time was measured \[s\].
+    /// Returns the time of the measurement that is available at a time \[s\].
     pub(super) fn measured_s(&self, time_s: f64) -> f64 {
         self.clock.latest(time_s).0
     }
 
-    /// What was known after a time \[s\] was not.
+    /// Drops measurements made after a time \[s\].
     pub(super) fn forget_after(&mut self, time_s: f64) {
         let (_, number) = self.clock.latest(time_s);
         self.held = self.held.filter(|&held| held <= number);
     }
 
-    /// Writes what vehicles know of themselves now into where it was written the last time: a measurement is held.
+    /// Updates `known` to the present measurement. `known` must hold the result of the previous call.
     pub(super) fn know_now(&mut self, history: &History, time_s: f64, now: &Swarm, known: &mut Swarm) {
         let number = self.clock.rate_hz.map(|_| self.clock.latest(time_s).1);
         if number.is_none() || number != self.held {
@@ -220,7 +220,8 @@ impl Sensing {
         }
     }
 
-    /// Writes what vehicles know of themselves at a time at which the state is `now`, or which has passed.
+    /// Writes the measurement that is available at a present or past time; `now` is the state at that time if it is the
+    /// present.
     pub(super) fn know(&self, history: &History, time_s: f64, now: Option<&Swarm>, known: &mut Swarm) {
         let (measured_s, number) = self.clock.latest(time_s);
         look_back(history, measured_s, now.filter(|_| measured_s >= time_s), known);
@@ -241,7 +242,7 @@ impl Sensing {
     }
 }
 
-/// Errors of this standard deviation \[m\] that vehicles keep, N x 3 \[m\].
+/// Draws constant errors with a standard deviation \[m\], N x 3 \[m\].
 fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
     let mut bias_m = Rows::zeros(scenario.count());
     let bias = Noise::new(scenario.noise_seed, Source::Bias);
@@ -259,7 +260,7 @@ fn errors(scenario: &Scenario) -> Errors {
     Errors { position_m: position_noise_m, velocity_m_s: velocity_noise_m_s, axes }
 }
 
-/// Writes the state at a time that is now, or has passed.
+/// Writes the state at a present or past time.
 fn look_back(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Swarm) {
     match now {
         Some(now) => state.copy_from(now),
@@ -267,21 +268,21 @@ fn look_back(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Sw
     }
 }
 
-/// What vehicles see of whoever is near, with a sensor on board: where it is from there, and how it moves.
+/// Vehicles' measurements of near vehicles with a sensor on board: relative position, and velocity.
 ///
-/// An error of the vehicle's own place is none of it; errors of measurement have the deviations of the vehicle's own, and are
-/// drawn anew for each that is seen.
+/// Errors of the observer's own position do not enter. Errors have the standard deviations of its own measurements,
+/// drawn for each observed vehicle.
 #[derive(Clone, Debug)]
 pub(super) struct Sight {
     clock: Clock,
     errors: Errors,
     noise: Noise,
-    /// The true state that is seen, and the number of the measurement.
+    /// Measured true state, and the number of the measurement.
     seen: Swarm,
     number: u64,
     held: Option<u64>,
     age_s: f64,
-    /// Whether vehicles see each other where they know themselves to be.
+    /// Whether vehicles measure each other at their own measured states.
     is_own: bool,
 }
 
@@ -300,7 +301,7 @@ impl Sight {
         }
     }
 
-    /// What is seen from now on has errors of another seed.
+    /// Changes the seed of later measurements.
     pub(super) fn reseed(&mut self, seed: u64) {
         self.noise.reseed(seed, self.number);
     }
@@ -313,17 +314,17 @@ impl Sight {
         self.clock.latency_s
     }
 
-    /// Whether all that is seen is what vehicles know of themselves.
+    /// Returns whether vehicles measure each other at their own measured states.
     pub(super) fn is_own(&self) -> bool {
         self.is_own
     }
 
-    /// The true positions that are seen \[m\].
+    /// Returns the true positions at the time of the measurement \[m\].
     pub(super) fn seen_m(&self) -> &Rows {
         &self.seen.positions_m
     }
 
-    /// Looks, at a time at which the state is `now`.
+    /// Measures at a time at which the true state is `now`.
     pub(super) fn look(&mut self, history: &History, time_s: f64, now: &Swarm) {
         let (seen_s, number) = self.clock.latest(time_s);
         let measured = self.clock.rate_hz.map(|_| number);
@@ -334,13 +335,13 @@ impl Sight {
         (self.number, self.age_s) = (number, time_s - seen_s);
     }
 
-    /// What was seen after a time \[s\] was not.
+    /// Drops measurements made after a time \[s\].
     pub(super) fn forget_after(&mut self, time_s: f64) {
         let (_, number) = self.clock.latest(time_s);
         self.held = self.held.filter(|&held| held <= number);
     }
 
-    /// What vehicle `i`, which knows itself to be in its row of `own`, sees of vehicle `j`.
+    /// Returns the measurement of vehicle `j` by vehicle `i`, whose own measurement is its row of `own`.
     pub(super) fn of(&self, own: &Swarm, i: usize, j: usize) -> Neighbour {
         let seen = Neighbour::of(&self.seen, j, self.age_s);
         if self.is_own {

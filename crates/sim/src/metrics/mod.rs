@@ -1,7 +1,7 @@
-//! Numbers of a run, folded from its samples one at a time.
+//! Running metrics of a flight, updated sample by sample.
 //!
-//! [`Metrics`] is a recorder: it can watch a run as it is flown, or be given the samples of a recording. Arrival is judged at every
-//! step, and peaks are over the steps between samples too where a sample tells them, see [`tautline_core::record::Peaks`].
+//! [`Metrics`] is a [`Sink`]: it observes a flight, or takes the samples of a recording. Arrival is checked at every
+//! step. Peaks include steps between samples if samples hold them; see [`tautline_core::record::Peaks`].
 
 use std::borrow::Cow;
 
@@ -13,23 +13,23 @@ use tautline_laws::formation::Freedom;
 use tautline_laws::graph::Graph;
 use tautline_laws::target::{Arrival, Distance, Guidance, Leg, Reference, assign_anew};
 
-/// Folds samples, in the order of time, into a [`Summary`].
+/// Running metrics of samples, in order of time; results in a [`Summary`].
 #[derive(Clone, Debug)]
 pub struct Metrics<'a> {
-    /// As vehicles are assigned to them now.
+    /// Legs with the present assignment of vehicles.
     legs: Cow<'a, [Leg]>,
     graph: &'a Graph,
     guidance: Option<&'a Guidance>,
     arrival: Arrival,
     freedom: Freedom,
-    /// The leg under way, from 0.
+    /// Current leg, from 0.
     leg: usize,
-    /// Legs that have ended.
+    /// Ended legs.
     ended: Vec<LegSummary>,
     samples: u64,
-    /// First instant of the leg from which everything was within the limits up to now \[s\].
+    /// First instant of the leg since which all errors have been within the limits \[s\].
     good_since_s: Option<f64>,
-    /// Instant up to which that is known \[s\].
+    /// Last instant that was checked \[s\].
     judged_to_s: Option<f64>,
     last_s: f64,
     distance: Distance,
@@ -37,14 +37,14 @@ pub struct Metrics<'a> {
     peak_control_m_s2: f64,
     final_control_m_s2: f64,
     energy: Option<EnergyRange>,
-    /// The middle of the first sample.
+    /// Mean position of the first sample.
     origin_m: Option<Vector3<f64>>,
     extent_m: f64,
     fastest_m_s: f64,
     strain: Option<Strain>,
 }
 
-/// Energy \[m^2/s^2\] over the samples that have one.
+/// Range of the energy \[m^2/s^2\] over the samples that have one.
 #[derive(Clone, Copy, Debug)]
 struct EnergyRange {
     initial: f64,
@@ -52,33 +52,34 @@ struct EnergyRange {
     max: f64,
 }
 
-/// Numbers of a run. Those of the end are of its last sample. Where a state was not finite, so are its numbers.
+/// Metrics of a flight. Values at the end are those of the last sample; values of a state that is not finite are not
+/// finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
-    /// Samples seen.
+    /// Number of samples.
     pub samples: u64,
     /// Time of the last sample \[s\].
     pub end_s: f64,
-    /// When the formation was reached for good, see [`Metrics::finish`] \[s\].
+    /// Time at which the formation was reached for good \[s\]; see [`Metrics::finish`].
     pub reached_at_s: Option<f64>,
-    /// How long all tolerances had been kept when the run ended \[s\]; none where they were not kept at the end.
+    /// Time for which all tolerances had been kept at the end \[s\]; `None` if they were not kept at the end.
     pub held_s: Option<f64>,
     /// Largest error of a desired distance over the graph's edges at the end \[m\].
     pub max_edge_error_m: f64,
-    /// Root mean square distance of the vehicles from the formation in its best place, turned and perhaps mirrored where it
-    /// is free to be, at the end \[m\].
+    /// Root mean square distance of the vehicles from their slots at the end \[m\], after the best motion that the
+    /// formation is free to make (rotation, reflection, translation).
     pub rms_position_error_m: f64,
     /// Distance of the vehicle that is then farthest from its slot \[m\].
     pub max_position_error_m: f64,
-    /// Largest speed relative to the swarm's mean velocity, or to the reference's where it is followed, at the end \[m/s\].
+    /// Largest speed relative to the swarm's mean velocity, or to the reference if there is one, at the end \[m/s\].
     pub disagreement_m_s: f64,
     /// Speed of the mean velocity at the end \[m/s\].
     pub common_m_s: f64,
     /// Largest commanded acceleration of a vehicle, Euclidean norm, over all steps \[m/s^2\].
     pub peak_control_m_s2: f64,
-    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN where the law had no answer there.
+    /// Largest commanded acceleration of a vehicle at the end \[m/s^2\]; NaN if the law is undefined there.
     pub final_control_m_s2: f64,
-    /// Largest distance of a vehicle from the middle of the first sample \[m\].
+    /// Largest distance of a vehicle from the mean position of the first sample \[m\].
     pub extent_m: f64,
     /// Largest speed of a vehicle \[m/s\].
     pub fastest_m_s: f64,
@@ -88,21 +89,22 @@ pub struct Summary {
     pub energy_final: Option<f64>,
     /// Largest energy over all steps \[m^2/s^2\].
     pub energy_max: Option<f64>,
-    /// `energy_max` over `energy_initial`: 1 where the energy never exceeded its start; none for a start without energy.
+    /// Ratio `energy_max / energy_initial`: 1 if the energy never exceeded its initial value; `None` for a start
+    /// without energy.
     pub energy_max_over_initial: Option<f64>,
 }
 
-/// A leg that was followed by another.
+/// Leg before the last one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegSummary {
-    /// When the next one began \[s\].
+    /// Time at which the next leg began \[s\].
     pub ended_at_s: f64,
-    /// When its formation was reached for good, if it was \[s\].
+    /// Time at which its formation was reached for good \[s\], if it was.
     pub reached_at_s: Option<f64>,
 }
 
 impl<'a> Metrics<'a> {
-    /// No samples yet of a run through these legs by the limits of `arrival`.
+    /// Creates metrics of a flight through these legs with the limits of `arrival`.
     #[must_use]
     pub fn new(legs: &'a [Leg], graph: &'a Graph, arrival: Arrival) -> Self {
         Self {
@@ -129,21 +131,21 @@ impl<'a> Metrics<'a> {
         }
     }
 
-    /// The same, with formations that count as reached once they are moved so; by any rigid motion unless this is said.
+    /// Sets the motions that the formation is free to make; by default any rigid motion.
     #[must_use]
     pub fn free_by(mut self, freedom: Freedom) -> Self {
         self.freedom = freedom;
         self
     }
 
-    /// The same, with formations that a reference carries along.
+    /// Sets the reference that carries the formations.
     #[must_use]
     pub fn carried_by(mut self, guidance: Option<&'a Guidance>) -> Self {
         self.guidance = guidance;
         self
     }
 
-    /// Takes one sample: O(edges), and no allocation after the first.
+    /// Adds a sample, in O(edges); allocates only for the first one.
     pub fn observe(&mut self, sample: &Sample<'_>) {
         self.samples += 1;
         self.last_s = sample.time_s;
@@ -162,7 +164,7 @@ impl<'a> Metrics<'a> {
         }
     }
 
-    /// Notes whether a true state is within the limits of arrival.
+    /// Records whether a true state is within the limits of arrival.
     fn judge(&mut self, time_s: f64, swarm: &Swarm, is_within: bool) {
         let good = is_within && swarm.first_not_finite().is_none();
         self.good_since_s = good.then(|| self.good_since_s.unwrap_or(time_s));
@@ -173,7 +175,7 @@ impl<'a> Metrics<'a> {
         self.guidance.map_or_else(Reference::at_rest, |known| known.motion.at(time_s))
     }
 
-    /// Ends the present leg, which has been reached if the true state was within the limits for long enough, whatever the
+    /// Ends the current leg. It counts as reached if the true state was within the limits for long enough, whatever the
     /// vehicles sensed.
     fn begin_leg(&mut self, leg: usize, time_s: f64) {
         let held_since_s = self.good_since_s.filter(|&since_s| self.arrival.is_held(since_s, time_s));
@@ -182,19 +184,19 @@ impl<'a> Metrics<'a> {
         self.leg = leg;
     }
 
-    /// The legs that have ended, in order. [`Metrics::finish`] is about the one after them.
+    /// Returns the ended legs, in order. [`Metrics::finish`] covers the leg after them.
     #[must_use]
     pub fn ended_legs(&self) -> &[LegSummary] {
         &self.ended
     }
 
-    /// How far vehicles tilted and how hard their rotors pushed, where they are quadrotors.
+    /// Returns the largest tilt and rotor thrust, for quadrotors.
     #[must_use]
     pub fn strain(&self) -> Option<Strain> {
         self.strain
     }
 
-    /// A sample without a command has none at the end either.
+    /// Updates the commands; the final command of a sample without one is NaN.
     fn observe_control(&mut self, control: &Rows) {
         if control.nrows() == 0 {
             self.final_control_m_s2 = f64::NAN;
@@ -211,7 +213,7 @@ impl<'a> Metrics<'a> {
         self.fastest_m_s = larger(self.fastest_m_s, largest_row_norm(&swarm.velocities_m_s));
     }
 
-    /// What was larger between the samples.
+    /// Updates the peaks with those between samples.
     fn observe_peaks(&mut self, peaks: Peaks) {
         if let Some(control_m_s2) = peaks.control_m_s2 {
             self.peak_control_m_s2 = larger(self.peak_control_m_s2, control_m_s2);
@@ -221,7 +223,7 @@ impl<'a> Metrics<'a> {
         }
     }
 
-    /// A sample without energy has none at the end either.
+    /// Updates the energy; the final energy of a sample without one is NaN.
     fn observe_energy(&mut self, energy: Option<f64>) {
         match (&mut self.energy, energy) {
             (Some(range), Some(energy)) => {
@@ -234,18 +236,18 @@ impl<'a> Metrics<'a> {
         }
     }
 
-    /// Largest error of a desired distance at the last sample \[m\].
+    /// Returns the largest error of a desired distance at the last sample \[m\].
     #[must_use]
     pub fn edge_error_m(&self) -> f64 {
         self.distance.max_edge_error_m
     }
 
-    /// The numbers of everything seen.
+    /// Returns the metrics.
     ///
-    /// The formation counts as reached at the end of the first step from which on every step, to the last, had its
-    /// errors of edges and places and a disagreement within the limits, provided that this lasted at least `hold_s` up to the last
-    /// one. Where only samples are given, those are judged. A formation that was held for long and lost again is not reached; one
-    /// that was regained counts from when it was regained.
+    /// The formation is reached at the end of the first step of the last sequence of steps within the limits of edges,
+    /// positions and disagreement. The sequence must last at least `hold_s` and end with the last step. Without steps,
+    /// samples are used. A formation that was held and lost again is not reached; if it was regained, the time of that
+    /// counts.
     #[must_use]
     pub fn finish(&self) -> Summary {
         let held_s = self.good_since_s.map(|since| self.last_s - since);
@@ -293,7 +295,7 @@ impl Sink for Metrics<'_> {
         Ok(())
     }
 
-    /// Judges arrival at the end of every step, recorded or not.
+    /// Checks arrival at the end of every step, recorded or not.
     fn step(&mut self, step: &Step<'_>) {
         let is_within = self.legs.get(self.leg).is_some_and(|leg| {
             let reference = self.reference(step.time_s);
@@ -303,12 +305,12 @@ impl Sink for Metrics<'_> {
     }
 }
 
-/// The larger number; NaN where either is, which `f64::max` would hide.
+/// Returns the larger number; NaN if either is NaN, which `f64::max` ignores.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// What the channels of quadrotors showed, over the samples that have them.
+/// Peaks of the channels of quadrotors, over the samples that have them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strain {
     /// Largest angle between a vehicle's thrust and the vertical \[rad\].
@@ -318,13 +320,13 @@ pub struct Strain {
 }
 
 impl Strain {
-    /// Takes one sample; what has no channel `attitude` changes nothing.
+    /// Updates the peaks; samples without a channel `attitude` change nothing.
     fn observe(strain: &mut Option<Self>, sample: &Sample<'_>) {
         let channel = |name: &str| sample.channels.iter().find(|channel| &*channel.name == name);
         let (Some(attitude), Some(rotors)) = (channel("attitude"), channel("rotors")) else { return };
         let Self { max_tilt_rad, max_thrust_n } = strain.get_or_insert(Self { max_tilt_rad: 0.0, max_thrust_n: 0.0 });
         for q in attitude.values.chunks_exact(4) {
-            // The half angle from the vertical: its sine is that of the quaternion's part about x and y.
+            // Half angle from the vertical: its sine is the norm of the quaternion's x and y components.
             *max_tilt_rad = max_tilt_rad.max(2.0 * libm::asin((q[1] * q[1] + q[2] * q[2]).sqrt().min(1.0)));
         }
         *max_thrust_n = rotors.values.iter().copied().fold(*max_thrust_n, f64::max);

@@ -2,7 +2,7 @@ use super::*;
 use tautline_laws::formation::Formation;
 use tautline_laws::target::Begins;
 
-/// Sums of a few numbers of order 1 are right to some 1e-15.
+/// Rounding of sums of a few numbers of order 1.
 const ROUNDING: f64 = 1e-12;
 const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
 
@@ -10,7 +10,7 @@ fn pair_of_vehicles() -> (Vec<Leg>, Graph) {
     (vec![Leg::first(Formation::line(2, 3.0))], Graph::complete(2))
 }
 
-/// Two vehicles `error_m` too far apart, parting at `relative_m_s`, sampled every 0.25 s.
+/// Summary of two vehicles with an edge error `error_m` and a relative speed `relative_m_s`, sampled every 0.25 s.
 fn summary(course: &[(f64, f64)], judge: Arrival) -> Summary {
     let (legs, graph) = pair_of_vehicles();
     let mut metrics = Metrics::new(&legs, &graph, judge);
@@ -26,7 +26,7 @@ fn summary(course: &[(f64, f64)], judge: Arrival) -> Summary {
 
 const GOOD: (f64, f64) = (0.005, 0.0);
 const FAR: (f64, f64) = (0.5, 0.0);
-/// Half of the relative speed is the disagreement: 0.03 m/s.
+/// Disagreement 0.03 m/s: half of the relative speed.
 const FAST: (f64, f64) = (0.005, 0.06);
 
 #[test]
@@ -36,7 +36,7 @@ fn reached_is_the_first_instant_from_which_both_tolerances_hold_to_the_end() {
 }
 
 #[test]
-fn a_formation_held_shorter_than_asked_is_not_reached() {
+fn a_formation_held_for_less_than_hold_s_is_not_reached() {
     let s = summary(&[FAR, FAR, FAR, GOOD, GOOD, GOOD, GOOD], JUDGE);
     assert_eq!((s.reached_at_s, s.held_s), (None, Some(0.75)));
     let patient = Arrival { hold_s: 0.75, ..JUDGE };
@@ -44,7 +44,7 @@ fn a_formation_held_shorter_than_asked_is_not_reached() {
 }
 
 #[test]
-fn a_formation_that_is_lost_again_is_not_reached_however_long_it_was_held() {
+fn a_formation_that_is_lost_again_is_not_reached() {
     for lost in [FAR, FAST] {
         let mut course = vec![GOOD; 100];
         course.push(lost);
@@ -72,7 +72,7 @@ fn a_leg_is_held_up_to_the_time_at_which_the_next_begins() {
 }
 
 #[test]
-fn who_is_assigned_anew_is_judged_by_the_new_slot() {
+fn a_reassigned_vehicle_is_compared_with_its_new_slot() {
     let (mut legs, graph) = pair_of_vehicles();
     legs[0].interchangeable = true;
     let swapped = Swarm::at_rest(legs[0].formation.reordered(&[1, 0]).slots_m);
@@ -115,7 +115,7 @@ fn no_samples_reach_nothing() {
 }
 
 #[test]
-fn the_numbers_are_those_of_the_samples() {
+fn metrics_match_the_samples() {
     let (legs, graph) = pair_of_vehicles();
     let mut metrics = Metrics::new(&legs, &graph, JUDGE);
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.5, 0.0, 0.0]));
@@ -129,7 +129,7 @@ fn the_numbers_are_those_of_the_samples() {
     assert_eq!((s.samples, s.end_s), (3, 2.0));
     for (found, expected) in [
         (s.max_edge_error_m, 0.5),
-        // Each of the two is a quarter of a metre from its place in the best fit.
+        // Each of the two vehicles is a quarter of a metre from its slot in the best fit.
         (s.rms_position_error_m, 0.25),
         (s.max_position_error_m, 0.25),
         (s.disagreement_m_s, 0.1),

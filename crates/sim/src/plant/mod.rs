@@ -1,7 +1,7 @@
-//! Bodies that carry out the commanded accelerations.
+//! Plants: equations of motion of the vehicles under commanded accelerations.
 //!
-//! A [`Plant`] holds the true state of the swarm; it depends on no law. [`rapier`] flies rigid bodies in a physics engine;
-//! only that module uses the engine.
+//! A [`Plant`] holds the true state of the swarm and is independent of laws. [`rapier`] simulates rigid bodies in a
+//! physics engine; only that module uses the engine.
 
 pub mod rapier;
 mod unicycle;
@@ -21,37 +21,37 @@ use tautline_core::swarm::{Pair, Rows, Swarm, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_laws::wind::Wind;
 
-/// What moves a swarm, however it is realised: p'' = a22 v + u (equation (1)) for the point vehicles.
+/// Equations of motion of a swarm: p'' = a22 v + u (equation (1)) for points.
 ///
-/// A step has two phases. [`Plant::advance`] drifts to the end of the step and predicts the state there, of which the law
-/// makes a command; [`Plant::apply`] completes the state with it and holds it over the next step. That state is
-/// recorded. A flight begins with `apply`, for the command at the start.
+/// A step has two phases. [`Plant::advance`] drifts to the end of the step and predicts the state there, for which the
+/// law computes a command. [`Plant::apply`] completes the state with the command and holds it over the next step. The
+/// completed state is recorded. A flight begins with `apply`, for the command at the start.
 ///
 /// All of a plant's memory is saved with a simulation, so it must be [`Clone`].
 pub trait Plant: DynClone + Send {
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     fn count(&self) -> usize;
 
-    /// Moves every vehicle over `dt_s` seconds and writes into `predicted` where it is then and how fast it is expected
-    /// to be; `path` gets what the way there was like beside a straight line. Without an [`Plant::apply`] since the step
-    /// before, the command that is held goes on.
+    /// Moves every vehicle over `dt_s` seconds and writes the predicted state at the end into `predicted`, and the
+    /// deviation of the way from a straight line into `path`. Without a call of [`Plant::apply`] since the previous
+    /// step, the held command continues.
     ///
     /// # Errors
-    /// [`PlantError`]; the plant then holds no state that may be observed.
+    /// [`PlantError`]; the state of the plant is then undefined.
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError>;
 
-    /// Whether a command is held over a step. Otherwise the plant is one of continuous time, which evaluates the law all the way
-    /// along ([`Plant::advance_under`]).
+    /// Returns whether a command is held over a step. Otherwise the plant evaluates the law in continuous time
+    /// ([`Plant::advance_under`]).
     fn holds_commands(&self) -> bool {
         true
     }
 
-    /// Like [`Plant::advance`], from the time `from_s` \[s\] on, with commands from `feedback` in the place of the held one, in
-    /// a plant of continuous time. The result is the law's error where vehicles came to its barrier: they then moved on with
-    /// the accelerations that they had there.
+    /// Moves every vehicle like [`Plant::advance`], from the time `from_s` \[s\] on, with commands from `feedback` in
+    /// continuous time. Returns the law's error if vehicles reached its barrier; they then moved on with the
+    /// accelerations that they had there.
     ///
     /// # Errors
-    /// [`PlantError`]; the plant then holds no state that may be observed.
+    /// [`PlantError`]; the state of the plant is then undefined.
     fn advance_under(
         &mut self,
         _feedback: &mut dyn Feedback,
@@ -62,63 +62,62 @@ pub trait Plant: DynClone + Send {
         self.advance(dt_s, end, path).map(|()| None)
     }
 
-    /// Takes the accelerations u \[m/s^2\], N x 3, to be held over the next step, and changes the velocities of `state` from
-    /// what was predicted to what they are; positions stay, for they have been judged. Called again at the same instant it
-    /// changes nothing but what is held.
+    /// Sets the accelerations u \[m/s^2\], N x 3, to hold over the next step, and corrects the predicted velocities of
+    /// `state`. Positions stay, because they have been audited. A second call at the same instant only changes the held
+    /// command.
     fn apply(&mut self, command: &Rows, state: &mut Swarm);
 
     /// Writes the true state.
     fn observe(&self, swarm: &mut Swarm);
 
-    /// Puts the vehicles back into a state that was observed: a step that was refused is undone.
+    /// Resets the vehicles to an observed state, to undo a refused step.
     fn restore(&mut self, swarm: &Swarm);
 
-    /// Appends the pairs whose keep-out balls overlapped when the plant's own collision detection last looked, in index
-    /// order. A plant without one appends nothing.
+    /// Appends the pairs whose keep-out balls overlapped in the last collision detection of the plant, in index order.
+    /// Plants without collision detection append nothing.
     fn keep_out_contacts(&self, _pairs: &mut Vec<Pair>) {}
 
-    /// Appends the pairs whose solid hulls pushed each other apart in the last [`Plant::advance`]. A plant of points
-    /// appends nothing.
+    /// Appends the pairs whose solid hulls collided in the last [`Plant::advance`]. Plants of points append nothing.
     fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
 
-    /// Wall-clock time spent so far in the forces, rotors and attitude loops of its vehicles, where they have them.
+    /// Returns the wall-clock time spent in forces, rotors and attitude loops.
     fn airframe_time(&self) -> Duration {
         Duration::ZERO
     }
 
-    /// What is known of its vehicles beside position and velocity: a channel each, without values yet.
+    /// Returns the channels of the vehicles besides position and velocity, without values.
     fn channels(&self) -> Vec<Channel> {
         Vec::new()
     }
 
-    /// Writes the present values into channels of [`Plant::channels`], in their order.
+    /// Writes the present values into the channels of [`Plant::channels`], in the same order.
     fn write_channels(&self, _channels: &mut [Channel]) {}
 
-    /// Begins its random numbers anew.
+    /// Restarts the random numbers from another seed.
     fn reseed(&mut self, _seed: u64) {}
 }
 
 dyn_clone::clone_trait_object!(Plant);
 
-/// What closes the loop: the accelerations u(t, p, v).
+/// Feedback of the control loop: the accelerations u(t, p, v).
 pub trait Feedback {
-    /// Writes the accelerations \[m/s^2\], N x 3, for a true state at a time \[s\]. Trial states are asked about too, in
-    /// any order of time.
+    /// Writes the accelerations \[m/s^2\], N x 3, for a true state at a time \[s\]. The solver also calls this for
+    /// trial states, in any order of time.
     ///
     /// # Errors
-    /// [`LawError`] where there are none.
+    /// [`LawError`] if the law is undefined.
     fn command(&mut self, time_s: f64, truth: &Swarm, command: &mut Rows) -> Result<(), LawError>;
 
-    /// The solution has come to this state, in the order of time: what a delayed sensor remembers.
+    /// Takes the next state of the solution, in order of time, as memory of delayed sensors.
     fn accept(&mut self, _time_s: f64, _truth: &Swarm) {}
 
-    /// Longest solver step that the memory of the feedback allows \[s\].
+    /// Returns the longest solver step that the memory of the feedback allows \[s\].
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }
 }
 
-/// The plant of a scenario, at its start.
+/// Creates the plant of a scenario, at its start.
 #[must_use]
 pub fn of(scenario: &Scenario) -> Box<dyn Plant> {
     if let Some(unicycle) = scenario.airframe.unicycle() {
@@ -131,59 +130,59 @@ pub fn of(scenario: &Scenario) -> Box<dyn Plant> {
     }
 }
 
-/// A plant of quadrotors.
+/// Plant of quadrotors.
 pub trait Quadrotors: Plant {
-    /// They, as they are now.
+    /// Returns the current state of the fleet.
     fn fleet(&self) -> &Fleet;
 }
 
-/// Two hulls that pushed each other.
+/// Collision of two hulls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HullContact {
-    /// Whose.
+    /// The two vehicles of the pair.
     pub pair: Pair,
-    /// How fast their centres neared each other before \[m/s\].
+    /// Closing speed of their centres before the collision \[m/s\].
     pub closing_m_s: f64,
 }
 
-/// Why a plant could not carry out a step.
+/// Error of a step of a plant.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
-    /// A position or velocity left the range of the plant's numbers.
+    /// A position or velocity is not finite.
     #[error("the state of vehicle {} is no longer a finite number", vehicle + 1)]
     NotFinite {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// No step is short enough to solve the equations of motion.
+    /// The equations of motion cannot be solved with any step.
     #[error("the equations of motion cannot be solved to their tolerances")]
     Stalled,
-    /// The law has no command on the way, in a plant of continuous time.
+    /// The law is undefined on the way, in a plant of continuous time.
     #[error(transparent)]
     Law(#[from] LawError),
 }
 
-/// The way of a swarm over a step: straight segments through the instants that were passed, and how far at most the true
-/// paths bend away from them.
+/// Way of a swarm over a step: straight segments between instants, and an upper bound of the deviation of the true
+/// paths from them.
 ///
-/// A plant that moves on one straight line within a step adds nothing. One that takes steps of its own passes through
-/// their ends; one that moves on curves says how far they bend.
+/// A plant that moves along one straight line per step adds nothing. A plant with internal steps adds their ends; a
+/// plant with curved paths adds their bend.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
-    /// Reused from step to step; the first `passed` are of this one.
+    /// Instants; their memory is reused, and only the first `passed` belong to this step.
     instants: Vec<(f64, Rows)>,
     passed: usize,
     bend_m: f64,
 }
 
 impl Path {
-    /// A straight line from the state before the step.
+    /// Resets the way to a straight line from the state before the step.
     pub fn begin(&mut self) {
         (self.passed, self.bend_m) = (0, 0.0);
     }
 
-    /// Passes through these positions \[m\], N x 3, `after_s` seconds from the beginning of the step, in increasing
-    /// order and before its end.
+    /// Adds positions \[m\], N x 3, `after_s` seconds after the beginning of the step, in increasing order and before
+    /// its end.
     pub fn pass(&mut self, after_s: f64, positions_m: &Rows) {
         if self.passed == self.instants.len() {
             self.instants.push((after_s, positions_m.clone()));
@@ -195,36 +194,36 @@ impl Path {
         self.passed += 1;
     }
 
-    /// No vehicle's true path leaves its segments by more than this \[m\], or by more than what was said before.
+    /// Raises the bound of the deviation to at least this value \[m\].
     pub fn bend(&mut self, bend_m: f64) {
         self.bend_m = self.bend_m.max(bend_m);
     }
 
-    /// How far at most a true path leaves its segments \[m\].
+    /// Returns the bound of the deviation of a true path from its segments \[m\].
     #[must_use]
     pub fn bend_m(&self) -> f64 {
         self.bend_m
     }
 
-    /// The instants between the ends of the step: seconds from its beginning, and positions \[m\].
+    /// Returns the instants between the ends of the step: seconds from its beginning, and positions \[m\].
     pub fn passed(&self) -> impl Iterator<Item = (f64, &Rows)> {
         self.instants[..self.passed].iter().map(|(after_s, positions_m)| (*after_s, positions_m))
     }
 }
 
-/// A wind, and points that are pushed by their drag times its velocity. The other half of a drag, on their own velocity, is of
+/// Wind and its push on points: drag times wind velocity. The part of the drag due to a point's own velocity belongs to
 /// the motion in still air.
 #[derive(Clone, Debug)]
 pub(crate) struct Air {
     wind: Wind,
-    /// Along each axis \[1/s\]; none along z in the plane.
+    /// Drag along each axis \[1/s\]; 0 along z in the plane.
     drag_per_s: Vector3<f64>,
-    /// What is commanded \[m/s^2\].
+    /// Commanded accelerations \[m/s^2\].
     command: Rows,
 }
 
 impl Air {
-    /// That of the scenario, where a wind blows.
+    /// Creates the wind of a scenario; `None` in still air.
     pub(crate) fn of(scenario: &Scenario) -> Option<Self> {
         let up_per_s = if scenario.space == Space::Plane { 0.0 } else { scenario.drag_per_s };
         let drag_per_s = Vector3::new(scenario.drag_per_s, scenario.drag_per_s, up_per_s);
@@ -232,34 +231,34 @@ impl Air {
         (!scenario.wind.is_still()).then(|| Self { wind: scenario.air(), drag_per_s, command })
     }
 
-    /// Moves the wind on by `dt_s` seconds.
+    /// Advances the wind by `dt_s` seconds.
     pub(crate) fn advance(&mut self, dt_s: f64) {
         self.wind.advance(dt_s);
     }
 
-    /// Takes the last [`Air::advance`] back.
+    /// Undoes the last [`Air::advance`].
     pub(crate) fn undo(&mut self) {
         self.wind.undo();
     }
 
-    /// Takes another command.
+    /// Sets the command.
     pub(super) fn hold(&mut self, command: &Rows) {
         self.command.copy_from(command);
     }
 
-    /// Writes the command and what the wind adds to it now \[m/s^2\].
+    /// Writes the command plus the present push of the wind \[m/s^2\].
     pub(super) fn write_held(&self, held: &mut Rows) {
         for i in 0..self.command.nrows() {
             set_row(held, i, row(&self.command, i) + self.push_m_s2(i, 0.0));
         }
     }
 
-    /// What the wind pushes a vehicle with, `before_s` seconds before now \[m/s^2\].
+    /// Returns the push of the wind on a vehicle, `before_s` seconds before the present \[m/s^2\].
     pub(crate) fn push_m_s2(&self, vehicle: usize, before_s: f64) -> Vector3<f64> {
         self.wind.air_at_m_s(vehicle, self.wind.now_s() - before_s).component_mul(&self.drag_per_s)
     }
 
-    /// How long the wind is smooth from so many seconds before now on \[s\].
+    /// Returns the time for which the wind is smooth, from `before_s` seconds before the present on \[s\].
     pub(crate) fn smooth_s(&self, before_s: f64) -> f64 {
         let time_s = self.wind.now_s() - before_s;
         self.wind.next_turn_s(time_s) - time_s
@@ -283,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_holds_what_was_passed_in_this_step_and_the_largest_bend() {
+    fn a_path_holds_the_instants_of_its_step_and_the_largest_bend() {
         let at = |x: f64| Rows::from_element(2, x);
         let mut path = Path::default();
         path.pass(0.1, &at(1.0));

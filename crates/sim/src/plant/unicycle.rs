@@ -1,30 +1,30 @@
-//! Unicycles: vehicles in the plane that go where they look and cannot stop.
+//! Plant of unicycles: vehicles in the plane that move along their heading and cannot stop.
 //!
-//! No engine moves them and nothing is solid: their way over a step is an arc in closed form, of which the chord is judged
-//! and the rest is its bend. Steering is that of the command at the beginning of a step over its first half, and that of the
-//! next command over the other, which makes the coupling second order as that of rigid bodies is.
+//! Without engine and solids: the way over a step is an arc in closed form. The audit sweeps its chord; the rest is its
+//! bend. The steering of the command at the beginning of a step acts over its first half, that of the next command over
+//! its second half. This makes the coupling second order, as for rigid bodies.
 
 use super::{Path, Plant, PlantError};
 use crate::vehicle::{Heading, Steering, Unicycle};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 
-/// A swarm of unicycles.
+/// Swarm of unicycles.
 #[derive(Clone, Debug)]
 pub struct Unicycles {
     unicycle: Unicycle,
     positions_m: Rows,
     headings: Vec<Heading>,
-    /// Steering over the last step, from where it began.
+    /// Headings at the beginning of the last step, and its steering.
     began: Vec<(Heading, Steering)>,
-    /// Length of the step that waits for its second half \[s\]; 0 for a completed state.
+    /// Length of a step whose second half is pending \[s\]; 0 for a completed state.
     moved_s: f64,
     /// Accelerations \[m/s^2\] held over the step.
     held: Rows,
 }
 
 impl Unicycles {
-    /// Unicycles that start where this swarm is, each along its velocity.
+    /// Creates unicycles at the positions of a swarm, with headings along its velocities.
     #[must_use]
     pub fn new(unicycle: Unicycle, start: &Swarm) -> Self {
         let headings: Vec<_> = (0..start.count()).map(|i| Heading::of(row(&start.velocities_m_s, i))).collect();
@@ -77,7 +77,7 @@ impl Plant for Unicycles {
 
     fn restore(&mut self, swarm: &Swarm) {
         self.positions_m.copy_from(&swarm.positions_m);
-        // A step that is undone leaves the headings that it began with, to the last bit.
+        // Undoing a step restores the headings at its beginning, bit for bit.
         if self.moved_s > 0.0 {
             for (heading, (before, _)) in self.headings.iter_mut().zip(&self.began) {
                 *heading = *before;

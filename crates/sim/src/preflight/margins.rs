@@ -1,4 +1,4 @@
-//! How late and how seldom the law may be asked near its formation, as linear theory says.
+//! Delays and command rates that the formation tolerates in linear theory.
 
 use serde::Serialize;
 
@@ -6,36 +6,36 @@ use super::warning::significant;
 use crate::scenario::Scenario;
 use tautline_laws::law::{Law, Linear};
 
-/// How much of an imperfection the formation is predicted to bear.
+/// Predicted tolerance of the formation to an imperfection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PredictedMargin {
-    /// The key of the imperfection.
+    /// Key of the imperfection.
     pub key: &'static str,
-    /// What is near the slots.
+    /// Contact of the vehicles near their slots.
     pub state: Near,
-    /// Whether `value` is the most or the least that is borne.
+    /// Whether `value` is an upper or a lower limit.
     pub bound: Bound,
-    /// In the unit that the key names; null where anything is borne.
+    /// Limit in the unit of the key; null if every value is tolerated.
     pub value: Option<f64>,
 }
 
-/// What is near the slots.
+/// Contact of the vehicles near their slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Near {
-    /// Vehicles that push nobody: beyond this the smallest disturbance grows. A bound from above on what is borne.
+    /// No pair in contact: beyond the limit the smallest disturbance grows. An upper bound on the tolerance.
     Free,
-    /// The nearest vehicles are on the edge of pushing each other, as they are at the goal: a bound from below.
+    /// The nearest pairs at the edge of contact, as they are at the goal: a lower bound on the tolerance.
     InContact,
 }
 
-/// Which end of what is borne.
+/// Direction of a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bound {
-    /// No more than this.
+    /// Upper limit.
     AtMost,
-    /// No less than this.
+    /// Lower limit.
     AtLeast,
 }
 
@@ -43,8 +43,8 @@ const KNOWN_LATE: &str = "sensing.latency_s";
 const HEARD_LATE: &str = "network.latency_s";
 const COMMANDED: &str = "time.control_hz";
 
-/// What linear theory predicts for the first formation; nothing where the law's modes are not known, nor for vehicles that are
-/// more than points, whose own lag the theory does not know.
+/// Returns the margins of linear theory for the first formation. Empty if the modes of the law are unknown, and for
+/// vehicles that are not points, whose own lag the theory does not include.
 pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin> {
     if !scenario.airframe.is_point() {
         return Vec::new();
@@ -73,32 +73,32 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// What a scenario asks for that is more than free vehicles bear, in words.
+/// Returns a message if a scenario exceeds a margin of free vehicles.
 pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option<String> {
-    let asked = |key: &str| match key {
+    let given = |key: &str| match key {
         KNOWN_LATE => Some(scenario.sensing.latency_s),
         HEARD_LATE => Some(scenario.network.latency_s),
         _ => scenario.time.control_hz,
     };
     margins.iter().filter(|margin| margin.state == Near::Free).find_map(|margin| {
-        let (asked, value) = (asked(margin.key)?, margin.value?);
-        let (is_beyond, most) = match margin.bound {
-            Bound::AtMost => (asked > value, "most"),
-            Bound::AtLeast => (asked < value, "least"),
+        let (given, value) = (given(margin.key)?, margin.value?);
+        let (is_beyond, limit) = match margin.bound {
+            Bound::AtMost => (given > value, "upper"),
+            Bound::AtLeast => (given < value, "lower"),
         };
         is_beyond.then(|| {
-            let what = if margin.key == HEARD_LATE { "of the swarm, its common motion too," } else { "about the formation" };
+            let common = if margin.key == HEARD_LATE { " of the swarm, common motion included," } else { "" };
             format!(
-                "{} is {asked}, and the {most} at which a small disturbance {what} decays, with everything else exact, is {}: \
-                 beyond it grows.",
+                "{} = {given} is beyond the {limit} limit {}: a small disturbance{common} grows, even without other \
+                 imperfections.",
                 margin.key,
-                significant(value)
+                significant(value),
             )
         })
     })
 }
 
-/// The margins in a line.
+/// Returns the margins in one line.
 pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
     let of = |key: &str| {
         let mut parts = margins.iter().filter(|margin| margin.key == key).map(|margin| {
@@ -110,5 +110,5 @@ pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
         Some(parts.fold(format!("{key} {first}"), |line, part| format!("{line}, {part}")))
     };
     let lines: Vec<_> = [KNOWN_LATE, HEARD_LATE, COMMANDED].into_iter().filter_map(of).collect();
-    (!lines.is_empty()).then(|| lines.join("; ") + " (each alone, all else exact)")
+    (!lines.is_empty()).then(|| lines.join("; ") + " (each without other imperfections)")
 }

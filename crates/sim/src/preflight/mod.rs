@@ -1,8 +1,8 @@
-//! What is known before the first step: stability, the certified separation, the step that it asks for, and whether the
-//! formation can be reached at all.
+//! Checks a scenario without flying it: stability, certified separation, required step, and whether the formation can
+//! be reached.
 //!
-//! [`Preflight::of`] computes numbers from a scenario alone, without flying it, and says in [`Warning`]s what stands in
-//! the way. Its fields are the keys of `tautline check --json`.
+//! [`Preflight::of`] computes the numbers, and [`Warning`]s describe problems. Its fields are the keys of `tautline
+//! check --json`.
 
 mod margins;
 mod stability;
@@ -22,102 +22,103 @@ pub use margins::{Bound, Near, PredictedMargin};
 pub use stability::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
-/// A velocity margin up to this part of its two terms is rounding of eigenvalues, not damping.
+/// Relative size below which a velocity margin is rounding of eigenvalues, not damping.
 const MARGIN_ROUNDING: f64 = 1e-12;
 
-/// Where the eigenvalues of a graph come from.
+/// Origin of the eigenvalues of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Connectivity {
-    /// They were solved for.
+    /// All eigenvalues are solved for.
     Solved,
-    /// A bound from below stands in for one of them, which would have taken long.
+    /// A lower bound replaces an eigenvalue that would take long to solve for.
     Bound,
 }
 
-/// What is known before the first step. SI units; what does not apply or is not known is null.
+/// Findings of the check of a scenario, in SI units. Values that do not apply or are unknown are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Preflight {
     /// Name of the scenario.
     pub scenario: String,
     /// Number of vehicles N.
     pub vehicles: usize,
-    /// The space that they live in: 2 the plane z = 0, 3 space.
+    /// Number of dimensions: 2 for the plane z = 0, 3 for space.
     pub dimensions: usize,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
-    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; distances between vehicles are scaled lengths then, of
-    /// which delta is the width of the ellipsoid.
+    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]. Separations are then scaled so that
+    /// delta is the width of the ellipsoid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_axes_m: Option<[f64; 3]>,
     /// Second smallest eigenvalue lambda2 of the graph's Laplacian.
     pub algebraic_connectivity: f64,
-    /// Where it comes from, or the least eigenvalue of the pinned Laplacian.
+    /// Origin of this eigenvalue, or of the smallest eigenvalue of the pinned Laplacian.
     pub connectivity_is: Connectivity,
-    /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension: for g >= 0 relative
-    /// velocities are damped at least at this rate where it is positive, and grow where it is negative. For g < 0 the
-    /// largest possible eigenvalue N takes the place of lambda2.
+    /// g lambda2/N - a22 \[1/s\] with the law's gain g on velocities, 1 + a22 for the edge tension. For g >= 0,
+    /// relative velocities are damped at least at this rate if it is positive, and grow if it is negative. For g < 0,
+    /// the largest possible eigenvalue N replaces lambda2.
     pub velocity_margin_per_s: Option<f64>,
-    /// Rate a22 at which the swarm's mean velocity grows \[1/s\]; negative where it decays.
+    /// Growth rate a22 of the swarm's mean velocity \[1/s\]; negative for decay.
     pub common_mode_rate_per_s: f64,
     /// Energy E(0) of the start \[m^2/s^2\].
     pub energy_initial: Option<f64>,
-    /// Separation below which no pair ever comes \[m\].
+    /// Certified lower bound of the separation of every pair \[m\].
     pub certified_m: Option<f64>,
-    /// Up to when \[s\]; null where it holds for ever, or nothing is certified. Where a wind blows on it is the end of the flight, or
-    /// when what the wind may have added leaves too little to be told from delta.
+    /// Time until which the certificate holds \[s\]; null if it holds forever, or without a certificate. In wind: the
+    /// end of the flight, or the time at which the energy that the wind may have added leaves a bound too close to
+    /// delta.
     pub certified_until_s: Option<f64>,
-    /// What every vehicle keeps beyond the clearance of every obstacle \[m\], where there are obstacles.
+    /// Certified lower bound of the distance of every vehicle beyond the clearance of every obstacle \[m\]; only with
+    /// obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub certified_room_m: Option<f64>,
-    /// The least that a vehicle has beyond the clearance of an obstacle at the start \[m\], where there are obstacles.
+    /// Smallest distance of a vehicle beyond the clearance of an obstacle at the start \[m\]; only with obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_room_m: Option<f64>,
-    /// The same for each leg of a flight of several, in their order.
+    /// Certificate of each leg, in order; only for several legs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub legs: Vec<LegPromise>,
-    /// Whether slots may be spread where the swarm is stalled, which renews what is certified.
-    pub breathes: bool,
-    /// Whether interchangeable vehicles may be given other slots before that, which renews it too.
+    pub legs: Vec<LegCertificate>,
+    /// Whether a stalled swarm may spread its slots, which renews the certificate.
+    pub recovers_from_deadlock: bool,
+    /// Whether a stalled swarm may reassign interchangeable vehicles, which renews the certificate.
     pub reassigns: bool,
-    /// What the law needs beside the links, such as a sensor, in a few words each.
+    /// Requirements of the law besides links, such as a sensor, in a few words each.
     pub needs: Vec<&'static str>,
-    /// Why nothing is certified, a sentence each.
+    /// Reasons why no separation is certified, one sentence each.
     pub certificate_void: Vec<String>,
-    /// Separation below which no pair joined by an edge ever comes \[m\], where the graph is not complete, so that no other
-    /// pair is kept apart, and the energy decays.
+    /// Certified lower bound of the separation of pairs joined by an edge \[m\], on a graph that is not complete, if
+    /// the energy decays. Other pairs have no bound.
     pub certified_edges_m: Option<f64>,
-    /// How far the swarm's mean is carried by the end, by its own velocity or by rounding \[m\].
+    /// Distance of the swarm's mean position from the start at the end, due to its own velocity or to rounding \[m\].
     pub drift_m: f64,
-    /// Distance between neighbouring numbers there \[m\].
+    /// Spacing of floating-point numbers there \[m\].
     pub spacing_m: f64,
-    /// The scenario's step \[s\].
+    /// Time step of the scenario \[s\].
     pub dt_s: f64,
-    /// Steps are flown in parts where the law's fastest rate asks for shorter ones: these are at least so long \[s\], see
-    /// [`Preflight::of`].
+    /// Lower bound of the substeps that the law's fastest rate requires \[s\]; see [`Preflight::of`].
     pub dt_max_s: Option<f64>,
-    /// No step is flown in parts longer than this \[s\]: the links alone ask for it, wherever vehicles are.
+    /// Upper bound of the substeps \[s\]: the step that the links require at any distances.
     pub dt_links_s: Option<f64>,
-    /// How late and how seldom the law may be asked near the formation, as linear theory predicts; none where it does not.
+    /// Delays and command rates that the formation tolerates in linear theory; empty where the theory does not apply.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub margins: Vec<PredictedMargin>,
-    /// Samples that are recorded.
+    /// Number of recorded samples.
     pub samples: u64,
-    /// What their positions, velocities and commands take in the recording, which holds little else \[bytes\].
+    /// Size of positions, velocities and commands in the recording, which make up most of it \[bytes\].
     pub recording_bytes: u64,
-    /// Dimension of the smallest flat that holds the start and its relative velocities: 0 point, 1 line, 2 plane, 3 space.
+    /// Dimension of the affine hull of the start and its relative velocities: 0 point, 1 line, 2 plane, 3 space.
     pub start_dimension: usize,
-    /// Smallest distance of two vehicles at the start, less delta \[m\].
+    /// Smallest separation at the start minus delta \[m\].
     pub start_margin_m: Option<f64>,
-    /// Dimension of the smallest flat that holds the formation.
+    /// Dimension of the affine hull of the formation.
     pub formation_dimension: usize,
-    /// Smallest desired distance, less delta \[m\]: the tension of an edge exists only where it is positive.
+    /// Smallest desired distance minus delta \[m\]; edge tensions exist only if it is positive.
     pub formation_margin_m: Option<f64>,
-    /// Infinitesimal rigidity of the formation on its graph, in the space that the swarm lives in.
+    /// Infinitesimal rigidity of the formation on its graph, in the space of the swarm.
     pub rigidity: Rigidity,
-    /// What stands in the way, the worst first.
+    /// Warnings, the most severe first.
     pub warnings: Vec<Warning>,
-    /// What bodies that turn bring in the place of what describes points.
+    /// Model of quadrotors, which replaces the properties of points.
     #[serde(skip)]
     vehicle: Option<Quadrotor>,
     #[serde(skip)]
@@ -126,38 +127,38 @@ pub struct Preflight {
     links_all: bool,
     #[serde(skip)]
     barrier_m: Option<f64>,
-    /// The shortest part that a step may be flown in \[s\].
+    /// Shortest substep \[s\].
     #[serde(skip)]
     dt_shortest_s: f64,
 }
 
-/// What is certified from the beginning of a leg to the beginning of the next.
+/// Certificate from the beginning of a leg to the beginning of the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LegPromise {
-    /// No pair comes closer than this \[m\].
+pub struct LegCertificate {
+    /// Lower bound of the separation of every pair \[m\].
     pub certified_m: Option<f64>,
-    /// The energy does not exceed this \[m^2/s^2\].
+    /// Upper bound of the energy \[m^2/s^2\].
     pub energy_bound: f64,
 }
 
 impl Preflight {
-    /// Everything that is known about a scenario before the first step.
+    /// Checks a scenario.
     ///
-    /// # The velocity margin
-    /// With v~ = v - mean v and a velocity gain g the energy obeys dE/dt <= -(g lambda2/N - a22) sum |v~_i|^2 on every
+    /// # Velocity margin
+    /// With v~ = v - mean v and a velocity gain g, the energy obeys dE/dt <= -(g lambda2/N - a22) sum |v~_i|^2 on every
     /// connected graph.
     ///
-    /// # The shortest part of a step
-    /// [`crate::scenario::TimeSpec::max_rate_dt`] of the inverse of the fastest rate that the law can have while no pair comes nearer than its
-    /// certificate says, see [`Rates::fastest_per_s`](tautline_laws::law::Rates::fastest_per_s).
+    /// # Substeps
+    /// [`Preflight::dt_max_s`] is [`crate::scenario::TimeSpec::max_rate_dt`] over the fastest rate of the law while no
+    /// pair is closer than certified; see [`Rates::fastest_per_s`](tautline_laws::law::Rates::fastest_per_s).
     ///
     /// # Errors
-    /// [`ParameterError`] where the scenario's law does not exist, which a validated scenario rules out but for memory.
+    /// [`ParameterError`] if the parameters give no law; for a validated scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         Ok(Self::under(scenario, scenario.law()?.as_ref()))
     }
 
-    /// As [`Preflight::of`], under another law than the scenario's.
+    /// Checks a scenario under another law.
     #[must_use]
     pub fn under(scenario: &Scenario, law: &dyn Law) -> Self {
         let certificate = scenario.certificate(law);
@@ -191,11 +192,11 @@ impl Preflight {
             legs: certificate
                 .legs
                 .iter()
-                .map(|&LegBound { energy, certified_m, .. }| LegPromise { certified_m, energy_bound: energy })
+                .map(|&LegBound { energy, certified_m, .. }| LegCertificate { certified_m, energy_bound: energy })
                 .collect(),
-            breathes: capabilities.settling.is_some() && scenario.breathing.is_on(),
+            recovers_from_deadlock: capabilities.settling.is_some() && scenario.deadlock.is_on(),
             reassigns: capabilities.settling.is_some()
-                && scenario.breathing.is_on()
+                && scenario.deadlock.is_on()
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: capabilities.needs.to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
@@ -222,7 +223,7 @@ impl Preflight {
             barrier_m: capabilities.barrier_m,
             dt_shortest_s: scenario.time.dt_s / f64::from(1_u32 << scenario.time.max_halvings.min(MAX_HALVINGS)),
         };
-        // The law has a copy of the graph, and has asked it for the eigenvalues behind its rates by now.
+        // The law holds a copy of the graph and has computed the eigenvalues for its rates by now.
         if scenario.graph.connectivity_is_bound() {
             found.connectivity_is = Connectivity::Bound;
         }
@@ -251,13 +252,13 @@ impl Preflight {
         found
     }
 
-    /// Stable names of the warnings that refuse the flight ([`Code::refuses`]).
+    /// Returns the codes of the warnings that refuse the flight ([`Code::refuses`]).
     #[must_use]
     pub fn refusing(&self) -> Vec<&'static str> {
         self.warnings.iter().filter(|warning| warning.code.refuses()).map(|warning| warning.code.name()).collect()
     }
 
-    /// Whether some warning refuses the flight.
+    /// Returns whether some warning refuses the flight.
     #[must_use]
     pub fn refuses(&self) -> bool {
         !self.refusing().is_empty()
@@ -267,7 +268,7 @@ impl Preflight {
         self.controls == Controls::Distances
     }
 
-    /// Dimension of the flat that the start never leaves, where the formation does not fit into it.
+    /// Returns the dimension of the affine hull of the start if the law cannot leave it but the formation requires it.
     #[must_use]
     pub fn trap_dimension(&self) -> Option<usize> {
         (self.controls_distances() && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
@@ -279,8 +280,8 @@ impl Preflight {
             _ => ("in a plane", "plane"),
         };
         Some(format!(
-            "The start lies {place}, the law pushes and pulls along the lines between vehicles, and so they never leave \
-             that {flat}: the formation cannot be reached. Offset a start, or add start.jitter_m."
+            "The start lies {place}. The law acts along the lines between vehicles, so the swarm never leaves \
+             that {flat} and cannot reach the formation. Offset a start, or add start.jitter_m."
         ))
     }
 
@@ -290,7 +291,7 @@ impl Preflight {
     }
 
     fn not_rigid(&self, scenario: &Scenario) -> Option<String> {
-        // Out of its own flat a flat formation is never rigid in space, which has a warning of its own.
+        // A flat formation is never rigid in space; another warning covers that.
         let rigidity = if self.is_flat_in_space() {
             self.rigidity.within(self.formation_dimension, self.vehicles)
         } else {
@@ -300,8 +301,8 @@ impl Preflight {
             if scenario.graph.is_complete() { "Bend the formation a little." } else { "Add edges to the graph." };
         (self.controls_distances() && rigidity.rigid == Some(false)).then(|| {
             format!(
-                "The formation is not rigid on its graph: {} of {} independent constraints hold it, so other shapes have \
-                 the same edges or are approached only slowly. {remedy}",
+                "The formation is not rigid on its graph: it has {} of {} independent constraints. Other shapes have \
+                 the same edge lengths, or convergence is slow. {remedy}",
                 rigidity.rank.map_or("too few".to_owned(), |rank| rank.to_string()),
                 rigidity.needed
             )
@@ -309,13 +310,13 @@ impl Preflight {
     }
 
     fn flat_formation_in_space(&self) -> Option<String> {
-        let said = "The formation is flat and the swarm lives in space: at the goal nothing resists motion out of the \
-                    flat to first order, so that part of the error falls as t^(-1/2), not exponentially. Set \
+        let said = "The formation is flat but the swarm has three dimensions. Near the goal no force resists motion \
+                    out of the flat to first order, so this part of the error decays as t^(-1/2). Set \
                     swarm.dimensions to 2 if the swarm may stay in the plane.";
         (self.controls_distances() && self.is_flat_in_space()).then(|| said.to_owned())
     }
 
-    /// Why no separation is certified, and what is in its place.
+    /// Returns the reasons for the missing certificate, and the bound of pairs joined by an edge.
     fn not_certified(&self) -> String {
         let edges = self.certified_edges_m.map(|edges_m| {
             let least = at_least(edges_m, 6);
@@ -326,34 +327,34 @@ impl Preflight {
         self.certificate_void.iter().cloned().chain(edges).collect::<Vec<_>>().join(" ")
     }
 
-    /// Whether the formation spans less of space than so many vehicles can.
+    /// Returns whether the formation is flat in space although it has enough vehicles to span it.
     fn is_flat_in_space(&self) -> bool {
         self.dimensions == 3 && self.formation_dimension < 3.min(self.vehicles.saturating_sub(1))
     }
 }
 
-/// Where even the shortest parts of a step are too long for the law with all vehicles far apart: near each other they need be
-/// shorter still.
+/// Returns a warning if even the shortest substep is too long for the law with all vehicles far apart; close vehicles
+/// require shorter ones.
 fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let shortest_s = scenario.time.shortest_step_s();
     let needed_s = scenario.links_step_s(law)?;
     (shortest_s > needed_s).then(|| {
         format!(
-            "The law's links ask for steps of {} s, and the shortest that time.dt_s and time.max_halvings allow are {} s: what would \
-             be flown is not the motion of the law. Shorten time.dt_s, add links, or lower the law's gains.",
+            "The law's links require steps of {} s, but time.dt_s and time.max_halvings allow at least {} s: the \
+             flight would not follow the law. Reduce time.dt_s, add links, or reduce the law's gains.",
             warning::significant(needed_s),
             warning::significant(shortest_s)
         )
     })
 }
 
-/// Dimension of the flat, moving with the swarm's mean velocity, that forces along the lines between vehicles never
-/// leave: that of the positions and the relative velocities together, each by its own extent.
+/// Returns the dimension of the affine subspace that forces along the lines between vehicles never leave. It moves with
+/// the mean velocity and contains positions and relative velocities, each scaled by its extent.
 fn motion_dimension(start: &Swarm) -> usize {
     let count = start.count();
     let mut directions = Rows::zeros(2 * count);
     for (place, rows) in [(0, &start.positions_m), (count, &start.velocities_m_s)] {
-        // From the first vehicle, whose own row is zero: the flat goes through the origin.
+        // Relative to the first vehicle: its own row is zero, so that the subspace contains the origin.
         let from_first = |i: usize| row(rows, i) - row(rows, 0);
         let extent = (0..count).map(|i| from_first(i).amax()).fold(0.0, f64::max);
         if extent > 0.0 {
@@ -363,7 +364,7 @@ fn motion_dimension(start: &Swarm) -> usize {
     affine_dimension(&directions, FLATNESS)
 }
 
-/// A warning where relative velocities are not damped.
+/// Returns a warning if relative velocities are not damped.
 fn relative_velocity_unstable(margin: Option<VelocityMargin>) -> Option<String> {
     let margin = margin?;
     (margin.per_s <= MARGIN_ROUNDING * margin.terms_per_s).then(|| {

@@ -18,8 +18,8 @@ impl Preflight {
         let drift = scenario.drift(self.common_mode_rate_per_s);
         let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
         format!(
-            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the whole \
-             swarm {} m away",
+            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the \
+             whole swarm {} m away",
             self.common_mode_rate_per_s,
             scenario.time.duration_s,
             warning::significant(drift.speed_m_s),
@@ -30,15 +30,12 @@ impl Preflight {
     pub(super) fn drift_unresolved(&self, scenario: &Scenario) -> Option<String> {
         let (needed_m, spacing_m) = (scenario.arrival.edge_error_m, self.spacing_m);
         let unresolved = if spacing_m > needed_m {
-            format!(
-                "where positions are {} m apart from number to number and {needed_m} m count",
-                warning::significant(spacing_m)
-            )
+            format!("where the position resolution is {} m; {needed_m} m is required", warning::significant(spacing_m))
         } else if self.drift_rounding_m(scenario) > needed_m {
             let rounding_m = warning::significant(self.drift_rounding_m(scenario));
             format!("where the rounding of all steps adds up to {rounding_m} m; {needed_m} m is required")
         } else if self.drift_m > LARGEST {
-            format!("farther than the {LARGEST:e} m that a flight is meant for")
+            format!("beyond the limit of {LARGEST:e} m")
         } else {
             return None;
         };
@@ -47,14 +44,14 @@ impl Preflight {
         } else {
             format!("The mean velocity carries the whole swarm {} m away", warning::significant(self.drift_m))
         };
-        Some(format!("{said}, {unresolved}. Shorten time.duration_s, or reduce what drives the mean velocity."))
+        Some(format!("{said}, {unresolved}. Reduce time.duration_s, or the cause of the mean velocity."))
     }
 
-    /// Bound of the rounding errors of all steps of the drift \[m\].
+    /// Returns a bound of the rounding errors of all steps of the drift \[m\].
     ///
-    /// A step rounds the position x to eps |x|/2 and the velocity to 3 eps |v|/2. The error of the velocity moves the vehicle
-    /// in all later steps. With x growing as exp(r t) the sum over steps of dt is 4 (eps/2) x/(r dt). With a constant velocity
-    /// it is 2 (eps/2) x T/dt.
+    /// A step rounds the position x to eps |x|/2 and the velocity to 3 eps |v|/2. The error of the velocity moves the
+    /// vehicle in all later steps. With x growing as exp(r t), the sum over steps of dt is 4 (eps/2) x/(r dt). With a
+    /// constant velocity it is 2 (eps/2) x T/dt.
     fn drift_rounding_m(&self, scenario: &Scenario) -> f64 {
         let time = &scenario.time;
         let uniform = 2.0 * time.duration_s / time.dt_s;
@@ -64,7 +61,7 @@ impl Preflight {
 
     pub(super) fn why_common_mode_grows(&self, scenario: &Scenario) -> &'static str {
         if self.common_mode_rate_per_s < scenario.velocity_coefficient_per_s() {
-            "the law brakes it too little"
+            "the law damps it too little"
         } else {
             "the law cannot move the centre of mass"
         }
@@ -74,56 +71,52 @@ impl Preflight {
         if self.common_mode_rate_per_s <= 0.0 || self.drift_unresolved(scenario).is_some() {
             return None;
         }
-        let told = if FINE_SPACINGS * self.spacing_m <= scenario.arrival.edge_error_m {
-            ". No distance between vehicles feels that.".to_owned()
+        let effect = if FINE_SPACINGS * self.spacing_m <= scenario.arrival.edge_error_m {
+            ". This changes no separation.".to_owned()
         } else {
             let spacing = warning::significant(self.spacing_m);
-            format!(
-                ", where positions are told to {spacing} m only. Shorten time.duration_s, or reduce swarm.a22_per_s."
-            )
+            format!(", where the position resolution is {spacing} m. Reduce time.duration_s or swarm.a22_per_s.")
         };
-        Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &told)
+        Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &effect)
     }
 }
 
-/// Offsets below this share of the extent do not make a start or a formation leave its line or plane: far above rounding
-/// (1e-16), far below any offset that is meant.
+/// Relative offset below which a point counts as within a line or plane: far above rounding (1e-16), far below any
+/// intended offset.
 pub const FLATNESS: f64 = 1e-9;
 
-/// Most vehicles for which the rank is computed on a graph that is not complete, at O((3 N)^3): a second or two.
+/// Largest number of vehicles for which the rank is computed on an incomplete graph, in O((3 N)^3): one or two seconds.
 pub const MOST_RANKED: usize = 200;
 
-/// Eigenvalues of R^T R above this part of the largest one count towards the rank. Rounding leaves up to 1e-13 of it in
-/// the rigid motions at [`MOST_RANKED`]; a mode that is held 1e11 times more softly than another is not held in any
-/// flight.
+/// Relative size above which eigenvalues of R^T R count towards the rank. Rounding leaves up to 1e-13 in the rigid
+/// motions at [`MOST_RANKED`] vehicles; a mode 1e11 times softer than another has no effect in any flight.
 pub const RANK_TOLERANCE: f64 = 1e-11;
 
 /// Infinitesimal rigidity of a formation on its graph.
 ///
-/// Row (i, j) of the rigidity matrix R is the unit vector along that edge in the columns of i and its opposite in those
-/// of j: R times the velocities of the slots is the rate of the edges' lengths. The formation is rigid where only rigid
-/// motions keep all lengths, that is where the rank of R is as large as that of all pairs. Then the law's stiffness
-/// matrix R^T diag(V'') R / N at the formation has no zero mode but these, and the formation is approached
-/// exponentially; otherwise only algebraically, if at all.
+/// Row (i, j) of the rigidity matrix R is the unit vector along the edge in the columns of i and its opposite in those
+/// of j. R times the velocities of the slots is the rate of the edge lengths. The formation is rigid if only rigid
+/// motions keep all lengths, that is if R has the rank of the complete graph. Then the law's stiffness matrix R^T
+/// diag(V'') R / N at the formation has no other zero modes, and convergence is exponential. Otherwise convergence is
+/// algebraic at best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Rigidity {
-    /// Rank of R, the same in the plane and in space; null for a graph of more than [`MOST_RANKED`] vehicles that is not
-    /// complete.
+    /// Rank of R, the same in the plane and in space; null for an incomplete graph of more than [`MOST_RANKED`]
+    /// vehicles.
     pub rank: Option<usize>,
     /// Rank of a rigid formation: n N - n (n + 1)/2 in n dimensions, N (N - 1)/2 for N <= n vehicles.
     pub needed: usize,
-    /// Whether the rank is the one needed; null where it cannot be told.
+    /// Whether the formation is rigid; null if unknown.
     pub rigid: Option<bool>,
     #[serde(skip)]
     pub(super) edges: usize,
 }
 
 impl Rigidity {
-    /// Of a formation in a space of n = `dimensions`.
+    /// Computes the rigidity of a formation in a space of n = `dimensions`.
     ///
-    /// On the complete graph the rank follows from the flat of dimension k that the slots span: k N - k (k + 1)/2. On
-    /// another graph it is counted from the eigenvalues of R^T R; one with fewer edges than needed is not rigid
-    /// whatever its rank is.
+    /// On the complete graph, slots that span k dimensions give the rank k N - k (k + 1)/2. On other graphs the rank is
+    /// the number of nonzero eigenvalues of R^T R. A graph with fewer edges than needed is never rigid.
     #[must_use]
     pub fn of(formation: &Formation, graph: &Graph, dimensions: usize) -> Self {
         let count = formation.count();
@@ -137,7 +130,8 @@ impl Rigidity {
         Self { rank, needed: 0, rigid: None, edges: graph.edge_count() }.within(dimensions, count)
     }
 
-    /// The same formation of `count` vehicles judged in a space (or in its own flat) of another dimension.
+    /// Returns the rigidity of the same formation of `count` vehicles in a space (or its own affine hull) of another
+    /// dimension.
     #[must_use]
     pub fn within(self, dimensions: usize, count: usize) -> Self {
         let needed = needed(count, dimensions);
@@ -146,7 +140,7 @@ impl Rigidity {
     }
 }
 
-/// Rank of the rigidity matrix of all pairs of `count` points that span `dimensions`.
+/// Returns the rank of the rigidity matrix of all pairs of `count` points that span `dimensions`.
 fn needed(count: usize, dimensions: usize) -> usize {
     if count <= dimensions {
         count * count.saturating_sub(1) / 2

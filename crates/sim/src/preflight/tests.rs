@@ -7,7 +7,7 @@ use tautline_laws::law::EdgeTension;
 
 use crate::scenario::{Override, PlantSpec, Source, Space};
 
-/// Certified separations are printed with 6 digits.
+/// Resolution of printed certified separations, 6 digits.
 const PRINTED_M: f64 = 1e-6;
 /// A few roundings of numbers of order 1.
 const ROUNDING: f64 = 1e-12;
@@ -25,7 +25,7 @@ fn codes(scenario: &Scenario) -> Vec<Code> {
     check(scenario).warnings.iter().map(|warning| warning.code).collect()
 }
 
-/// Vehicles of a formation of radius 10 m that start a little off it, delta = 1 m.
+/// Returns vehicles with delta = 1 m that start slightly off a formation of radius 10 m.
 fn swarm(formation: Formation, graph: Graph, a22_per_s: f64) -> Scenario {
     let mut start = Swarm::at_rest(&formation.slots_m * 1.5);
     start.positions_m[(0, 1)] += 0.1;
@@ -98,11 +98,11 @@ fn a_large_star_is_refused_by_its_connectivity() {
 }
 
 #[test]
-fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
+fn a_drift_is_described_and_refused_beyond_the_position_resolution() {
     let said = |sets: &[&str]| {
         let found = check(&scenario("pentagon", sets));
         let warning = found.warnings.iter().find(|warning| warning.message.contains("mean velocity grows"));
-        let warning = warning.expect("a22 > 0 is told").clone();
+        let warning = warning.expect("a22 > 0 is reported").clone();
         (warning.code, warning.message)
     };
     let (code, harmless) = said(&[]);
@@ -110,10 +110,10 @@ fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
     assert!(
         harmless.contains("in 120 s rounding grows to about 3.61e-11 m/s and carries the whole swarm 3.61e-10 m away")
     );
-    assert!(harmless.ends_with("No distance between vehicles feels that."), "{harmless}");
+    assert!(harmless.ends_with("This changes no separation."), "{harmless}");
     let fine = ["arrival.edge_error_m=1e-6", "time.duration_s=521", "time.dt_s=0.5", "time.record_hz=1"];
     let (code, felt) = said(&fine);
-    assert!(code == Code::CommonModeUnstable && felt.contains("positions are told to"), "{felt}");
+    assert!(code == Code::CommonModeUnstable && felt.contains("position resolution is"), "{felt}");
     let (code, summed) = said(&[&fine[..2], &["time.dt_s=0.01", "time.record_hz=1"]].concat());
     assert!(code == Code::DriftUnresolved && summed.contains("the rounding of all steps adds up to"), "{summed}");
     let (end, uncounted) = ("time.duration_s=900", "swarm.a22_per_s=100");
@@ -122,7 +122,7 @@ fn a_drift_is_worded_by_what_it_does_and_refused_where_numbers_run_out() {
         assert!(code == Code::DriftUnresolved && !ruinous.contains("NaN"), "{ruinous}");
         let found = check(&scenario("pentagon", sets));
         assert!(found.refuses() && found.headline() == "REFUSED: drift-unresolved", "{}", found.headline());
-        assert!(!codes(&scenario("pentagon", sets)).contains(&Code::CommonModeUnstable), "it is told once");
+        assert!(!codes(&scenario("pentagon", sets)).contains(&Code::CommonModeUnstable), "reported once");
     }
     assert!(!check(&scenario("pentagon", &["time.duration_s=400"])).refuses());
 }
@@ -149,7 +149,7 @@ fn a_start_on_a_line_is_refused_where_the_formation_leaves_it() {
 }
 
 #[test]
-fn relative_velocities_leave_a_line_and_common_ones_do_not() {
+fn only_relative_velocities_leave_a_line() {
     let mut line = scenario("pentagon-collinear", &["swarm.a22_per_s=0"]);
     line.start.velocities_m_s.column_mut(1).fill(1.0);
     assert_eq!(check(&line).start_dimension, 1);
@@ -186,7 +186,7 @@ fn a_flat_formation_in_space_converges_algebraically() {
 }
 
 #[test]
-fn a_formation_that_its_edges_do_not_hold_is_not_rigid() {
+fn a_formation_with_too_few_edges_is_not_rigid() {
     // Two triangles on a common side are rigid in the plane; without that side the square shears.
     let sides = [(0, 1), (1, 2), (2, 3), (3, 0)];
     let braced: Vec<_> = sides.into_iter().chain([(0, 2)]).collect();
@@ -202,7 +202,7 @@ fn a_formation_that_its_edges_do_not_hold_is_not_rigid() {
 }
 
 #[test]
-fn enough_edges_in_a_degenerate_place_do_not_make_a_formation_rigid() {
+fn a_degenerate_formation_with_enough_edges_is_not_rigid() {
     // Two triangles joined by three bars: rigid, but for parallel bars of equal length, along which it shears.
     let edges = [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)];
     let prism = |shift_m: f64| {
@@ -267,11 +267,11 @@ fn the_longest_step_follows_the_fastest_mode() {
     let found = check(&pentagon);
     let tension = EdgeTension::new(1.0, 2.0, 3.0).expect("a tension");
     let omega_per_s = 0.3 / found.dt_max_s.expect("a bound");
-    // The stiffest pair at the certified separation, by finite differences of V'.
+    // Stiffness of the stiffest pair at the certified separation, by finite differences of V'.
     let (l, h) = (found.certified_m.expect("a certificate"), 1e-6);
     let stiffness_per_s2 = (tension.derivative(l + h) - tension.derivative(l - h)) / (2.0 * h);
     assert!((omega_per_s.powi(2) / stiffness_per_s2 - 1.0).abs() < 1e-6);
-    // No pair is stiffer there, and none pulls across itself more stiffly.
+    // No other pair is stiffer there, and no pull is stiffer across its edge.
     for d in [3.0, 3.5, 27.0_f64.sqrt(), 6.0] {
         let other = EdgeTension::new(1.0, 2.0, d).expect("a tension");
         let nearest_m = other.push_side_root(5.0 * found.energy_initial.expect("an energy"));
@@ -344,18 +344,16 @@ fn the_json_has_the_promised_keys_and_codes() {
 }
 
 #[test]
-fn the_words_say_what_the_numbers_say() {
+fn the_text_matches_the_numbers() {
     let pentagon = check(&scenario("pentagon", &[]));
     assert_eq!(
         pentagon.headline(),
         "READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 1 warning"
     );
     let text = pentagon.text();
-    for said in [
-        "margin of relative velocities 1.000000 1/s",
-        "0.00417 s, flown in parts down to ",
-        "rank 7: in the plane rigid",
-    ] {
+    for said in
+        ["margin of relative velocities 1.000000 1/s", "0.00417 s, divided down to ", "rank 7: in the plane rigid"]
+    {
         assert!(text.contains(said), "{said:?} in\n{text}");
     }
     let line = check(&scenario("pentagon-collinear", &[]));
@@ -381,7 +379,7 @@ fn a_law_whose_links_are_too_fast_for_the_shortest_steps_is_refused() {
 }
 
 #[test]
-fn a_certificate_that_numbers_do_not_tell_from_delta_is_none() {
+fn a_certificate_within_the_resolution_of_delta_is_void() {
     let faint = ["law.kind=displacement", "law.alpha=1e-9", "graph.kind=path", "start.positions_m.4.x=-1e5"];
     let found = check(&scenario("pentagon", &faint));
     assert!(found.certified_m.is_none() && found.certificate_void[0].contains("nearer to delta"), "{found:?}");
@@ -390,7 +388,7 @@ fn a_certificate_that_numbers_do_not_tell_from_delta_is_none() {
 }
 
 #[test]
-fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_are_warned_of() {
+fn margins_are_predicted_and_scenarios_beyond_them_get_a_warning() {
     let margin = |found: &Preflight, key: &str, state: Near| {
         found.margins.iter().find(|margin| margin.key == key && margin.state == state).copied()
     };
@@ -401,16 +399,16 @@ fn margins_are_predicted_where_the_theory_gives_them_and_scenarios_beyond_them_a
     assert!((value("sensing.latency_s", Near::InContact) - 0.0811).abs() < 5e-5);
     assert!((value("time.control_hz", Near::Free) - 0.5).abs() < 1e-9, "2 s between commands");
     assert!(value("time.control_hz", Near::InContact) > 5.0);
-    assert!(value("network.latency_s", Near::Free) > 3.0, "others are a fifth of what is heard each");
+    assert!(value("network.latency_s", Near::Free) > 3.0, "each of five vehicles contributes a fifth");
     let text = found.text();
     assert!(text.contains("sensing.latency_s up to 0.711, up to 0.0811 in contact"), "{text}");
 
-    // An edge tension has modes on the complete graph alone, other laws none.
+    // An edge tension has known modes only on the complete graph, other laws have none.
     assert!(!check(&scenario("pentagon", &[])).margins.is_empty());
     for sets in [&["graph.kind=ring"][..], &["law={kind=\"orca\", delta_m=2.0}", "swarm.hull_radius_m=0.2"]] {
         assert_eq!(check(&scenario("pentagon", sets)).margins, []);
     }
-    // Followers of a hub hear nobody in a loop.
+    // Vehicles that follow only a hub form no loop.
     let led = check(&scenario("pentagon-leader", &[]));
     assert_eq!(margin(&led, "network.latency_s", Near::Free).expect("a star").value, None);
 

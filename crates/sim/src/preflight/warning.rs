@@ -1,49 +1,49 @@
-//! What stands in the way of a flight.
+//! Warnings of a check, and its text.
 
 use serde::Serialize;
 
-use super::{Connectivity, LegPromise, Preflight, margins};
+use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
 use tautline_core::text::{at_least, counted, seconds, table};
 
-/// Something that stands in the way of a flight.
+/// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
-    /// Stable name.
+    /// Stable code.
     pub code: Code,
-    /// A sentence or two, with the remedy where there is one.
+    /// Message with a remedy, one to three sentences.
     pub message: String,
 }
 
-/// What a [`Warning`] is about.
+/// Kind of a [`Warning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Code {
     /// Relative velocities are not damped.
     RelativeVelocityUnstable,
-    /// The start lies on a line that the law never leaves, and the formation does not.
+    /// The start lies on a line that the law never leaves, but the formation does not.
     StartOnLine,
-    /// The start lies in a plane that the law never leaves, and the formation does not.
+    /// The start lies in a plane that the law never leaves, but the formation does not.
     StartInPlane,
-    /// Steps cannot be made as short as the law's links ask for.
+    /// Even the shortest substep is longer than the law's links require.
     StepTooLong,
-    /// By the end the swarm has drifted so far that numbers do not tell its positions apart.
+    /// The swarm drifts so far that numbers no longer resolve its positions.
     DriftUnresolved,
-    /// More delay, or fewer commands, than the formation bears.
+    /// A delay or command rate is beyond a predicted margin.
     BeyondMargin,
-    /// Nothing is certified about separations.
+    /// No separation is certified.
     NoCertificate,
-    /// The formation can be bent without changing the length of an edge to first order.
+    /// The formation can be deformed without changing an edge length to first order.
     NotRigid,
-    /// A flat formation in space: nothing resists motion out of its flat to first order.
+    /// A flat formation in space: no force resists motion out of its plane to first order.
     FlatFormationInSpace,
-    /// The swarm's mean velocity grows by itself.
+    /// The swarm's mean velocity grows.
     CommonModeUnstable,
 }
 
 impl Code {
-    /// Every code, the worst first.
+    /// All codes, the most severe first.
     pub const ALL: [Self; 10] = [
         Self::RelativeVelocityUnstable,
         Self::StartOnLine,
@@ -57,7 +57,8 @@ impl Code {
         Self::CommonModeUnstable,
     ];
 
-    /// Whether the flight cannot do what it is for: the formation is out of reach, or nothing may be called stable.
+    /// Returns whether the warning refuses the flight: the formation cannot be reached, or the flight would be
+    /// meaningless.
     #[must_use]
     pub fn refuses(self) -> bool {
         matches!(
@@ -70,7 +71,7 @@ impl Code {
         )
     }
 
-    /// The stable name, such as `start-on-line`.
+    /// Returns the stable name, such as `start-on-line`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -94,13 +95,13 @@ impl std::fmt::Display for Warning {
     }
 }
 
-/// A rate \[1/s\] to six decimals, with its sign.
+/// Formats a rate \[1/s\] with six decimals and sign.
 pub(super) fn rate(rate_per_s: f64) -> String {
-    // Adding zero takes the sign from what rounds to zero.
+    // Adding zero removes the sign of -0.
     format!("{:.6}", (rate_per_s * 1e6).round() / 1e6 + 0.0)
 }
 
-/// A positive number to three significant digits.
+/// Formats a positive number with three significant digits.
 pub(super) fn significant(number: f64) -> String {
     if number == 0.0 || (1e-6..1e6).contains(&number.abs()) {
         text::significant(number, 3)
@@ -110,22 +111,22 @@ pub(super) fn significant(number: f64) -> String {
 }
 
 impl Preflight {
-    /// The check in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2 warnings`,
-    /// or `REFUSED: start-on-line`.
+    /// Returns the result in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2
+    /// warnings`, or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
         let refusing = self.refusing();
         if !refusing.is_empty() {
             return format!("REFUSED: {}", refusing.join(", "));
         }
-        let promise = match self.certified_m {
+        let certificate = match self.certified_m {
             Some(certified_m) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m){}",
                     at_least(certified_m, 6),
                     self.delta_m,
-                    match (self.breathes, self.reassigns) {
-                        (true, true) => " unless slots are spread or assigned anew",
+                    match (self.recovers_from_deadlock, self.reassigns) {
+                        (true, true) => " unless slots are spread or reassigned",
                         (true, false) => " unless slots are spread",
                         _ => "",
                     }
@@ -137,10 +138,10 @@ impl Preflight {
             0 => "no warnings".to_owned(),
             n => counted(n as u64, "warning", "warnings"),
         };
-        format!("READY: {promise}, {warnings}")
+        format!("READY: {certificate}, {warnings}")
     }
 
-    /// The numbers as a short table, a line each, with a line end.
+    /// Returns the numbers as a table, one line each.
     #[must_use]
     pub fn text(&self) -> String {
         let mut rows =
@@ -152,7 +153,7 @@ impl Preflight {
             ("needs", self.needs_line()),
             (
                 "margins",
-                margins::line(&self.margins).unwrap_or_else(|| "not known for this law, graph and vehicle".to_owned()),
+                margins::line(&self.margins).unwrap_or_else(|| "unknown for this law, graph and vehicle".to_owned()),
             ),
             ("step", self.step_line()),
             ("recording", self.recording_line()),
@@ -172,7 +173,7 @@ impl Preflight {
             eigenvalue(self.algebraic_connectivity),
             match self.connectivity_is {
                 Connectivity::Solved => "",
-                Connectivity::Bound => ", a bound from below: more takes long",
+                Connectivity::Bound => ", a lower bound: the exact value takes long",
             },
             self.common_mode_rate_per_s
         )
@@ -182,13 +183,13 @@ impl Preflight {
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => {
-                let breath = match (self.breathes, self.reassigns) {
-                    (true, true) => ", renewed where slots are spread or assigned anew (breathing.mode)",
-                    (true, false) => ", renewed where slots are spread (breathing.mode)",
+                let renewal = match (self.recovers_from_deadlock, self.reassigns) {
+                    (true, true) => ", renewed when slots are spread or reassigned (deadlock.mode)",
+                    (true, false) => ", renewed when slots are spread (deadlock.mode)",
                     _ => "",
                 };
                 let until = self.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
-                format!("{} m{}, from {energy}{breath}", at_least(certified_m, 6), until.unwrap_or_default())
+                format!("{} m{}, from {energy}{renewal}", at_least(certified_m, 6), until.unwrap_or_default())
             }
             None => format!("none. {} {energy}", self.not_certified()).trim_end().to_owned(),
         }
@@ -203,15 +204,14 @@ impl Preflight {
     }
 
     fn needs_line(&self) -> String {
-        let links =
-            if self.links_all { "everybody hears everybody" } else { "neighbours on the graph hear each other" };
+        let links = if self.links_all { "links between all pairs" } else { "links along the edges of the graph" };
         std::iter::once(links).chain(self.needs.iter().copied()).collect::<Vec<_>>().join("; ")
     }
 
     fn step_line(&self) -> String {
         let dt_s = significant(self.dt_s);
         let links = match self.dt_links_s {
-            Some(links_s) if links_s < self.dt_s => format!("; the links ask for {} s at most", significant(links_s)),
+            Some(links_s) if links_s < self.dt_s => format!("; the links require at most {} s", significant(links_s)),
             _ => String::new(),
         };
         match self.dt_max_s {
@@ -220,18 +220,18 @@ impl Preflight {
                 let down = significant(dt_max_s.max(self.dt_shortest_s));
                 let least = if dt_max_s < self.dt_shortest_s {
                     format!(
-                        " (time.max_halvings; as near as is certified it could ask for {}, and a flight that does will not pass)",
+                        " (time.max_halvings; the law requires {} s at the certified separation, where a flight fails)",
                         significant(dt_max_s)
                     )
                 } else {
                     String::new()
                 };
-                format!("{dt_s} s, flown in parts down to {down} s where the law asks for it{least}{links}")
+                format!("{dt_s} s, divided down to {down} s as the law requires{least}{links}")
             }
             None if self.barrier_m.is_some() => {
-                format!("{dt_s} s, flown in parts where a clearance shrinks too fast{links}")
+                format!("{dt_s} s, divided where a clearance shrinks too fast{links}")
             }
-            None => format!("{dt_s} s, what the law needs depends on how near vehicles come{links}"),
+            None => format!("{dt_s} s, the required step depends on the separations{links}"),
         }
     }
 
@@ -271,27 +271,27 @@ impl Preflight {
 }
 
 impl Preflight {
-    /// How a formation that is not rigid is approached.
+    /// Describes the convergence to a formation that is not rigid.
     fn approach(&self) -> &'static str {
         let edges = self.rigidity.edges;
         if self.rigidity.rank == Some(edges) {
-            // Each length can be set by itself: shapes with the right lengths are a smooth family, approached as such.
+            // The lengths are independent: shapes with these lengths are a smooth family with exponential convergence.
             ", exponential convergence of the edges' lengths, which do not fix the shape"
         } else if edges == self.vehicles * self.vehicles.saturating_sub(1) / 2 {
-            // All lengths fix the shape, and some motion changes none of them to first order.
+            // The lengths fix the shape, but some motion changes none of them to first order.
             ", algebraic convergence at best"
         } else {
-            ", convergence perhaps slow"
+            ", convergence may be slow"
         }
     }
 }
 
-/// What a quadrotor brings in the place of what describes points.
+/// Describes the model of quadrotors.
 fn vehicle_line(quadrotor: &Quadrotor) -> String {
     let model = &quadrotor.model;
     format!(
-        "{}, {} kg, hull {} m, thrust to weight {:.2}, attitude at {} Hz; swarm.mass_kg, hull_radius_m and a22_per_s describe \
-         points and are not used",
+        "{}, {} kg, hull {} m, thrust to weight {:.2}, attitude at {} Hz; swarm.mass_kg, hull_radius_m and \
+         a22_per_s describe points and are not used",
         model.name,
         model.mass_kg,
         model.hull_radius_m,
@@ -300,9 +300,9 @@ fn vehicle_line(quadrotor: &Quadrotor) -> String {
     )
 }
 
-fn leg_line(promise: &LegPromise) -> String {
-    let energy = format!("energy at most {:.6} m^2/s^2", promise.energy_bound);
-    match promise.certified_m {
+fn leg_line(leg: &LegCertificate) -> String {
+    let energy = format!("energy at most {:.6} m^2/s^2", leg.energy_bound);
+    match leg.certified_m {
         Some(certified_m) => format!("{} m, {energy}", at_least(certified_m, 6)),
         None => energy,
     }

@@ -1,8 +1,7 @@
-//! From the document to the scenario: numbers per vehicle, shapes into points, defaults that depend on
-//! other keys.
+//! Builds a scenario from a document: values per vehicle, points of shapes, defaults that depend on other keys.
 //!
-//! What is checked here is what cannot be told from the finished scenario, or must be known before memory is taken for
-//! it; [`super::validate`] judges the rest.
+//! This module checks only the conditions that the finished scenario no longer shows, and those that bound the memory
+//! to allocate; [`super::validate`] checks the rest.
 
 use super::document::{Document, StartShape, StartTable};
 use super::document::{PerVehicle, Point, rows};
@@ -19,7 +18,7 @@ use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
 
-/// Completes a scenario. It still has to be validated.
+/// Builds a scenario, which is not validated yet.
 pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     let count = count(&document)?;
     check_count(count)?;
@@ -74,7 +73,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         actuation: document.actuation,
         failures: document.failure,
         arrival: document.arrival,
-        breathing: document.breathing,
+        deadlock: document.deadlock,
         noise_seed: document.noise.seed,
         name: document.name.unwrap_or_default(),
         airframe,
@@ -93,7 +92,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
     Ok(scenario)
 }
 
-/// The safety distance \[m\]: as given, or else the width of the ellipsoid.
+/// Returns the safety distance \[m\]: `law.delta_m`, or else the width of the ellipsoid.
 fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
     match (given_m, safety) {
         (Some(delta_m), _) => Ok(delta_m),
@@ -105,7 +104,7 @@ fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
     }
 }
 
-/// Number of vehicles: as given, or else as many as there are points, start before formation.
+/// Returns the number of vehicles: `swarm.count`, or else the number of start positions, or else of slots.
 fn count(document: &Document) -> Result<usize, ScenarioError> {
     if let Some(count) = document.swarm.count {
         return usize::try_from(count)
@@ -113,14 +112,14 @@ fn count(document: &Document) -> Result<usize, ScenarioError> {
     }
     let listed = document.start.positions_m.as_ref().map(Vec::len);
     listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
-        ScenarioError::new("the number of vehicles is not given")
+        ScenarioError::new("the number of vehicles is missing")
             .coded("scenario/missing-key")
             .with_help("add `count` to [swarm], for example count = 6")
             .at("swarm.count")
     })
 }
 
-/// Refuses lists that are not as long as there are vehicles.
+/// Refuses lists whose length is not the number of vehicles.
 fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
     let per_vehicle = |numbers: &PerVehicle| match numbers {
         PerVehicle::All(_) => None,
@@ -140,7 +139,7 @@ fn check_lists(document: &Document, count: usize) -> Result<(), ScenarioError> {
     )
 }
 
-/// The space asked for, or else the plane if everything lies in it.
+/// Returns the space of `swarm.dimensions`, or else the plane if every given vector lies in it.
 fn space(document: &Document) -> Result<Space, ScenarioError> {
     let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
     let moved = document.leg.iter().filter_map(|leg| leg.placement.move_m).chain(document.formation.placement.move_m);
@@ -151,7 +150,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
     match document.swarm.dimensions {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
-        Some(other) => Err(ScenarioError::new(format!("a swarm of {other} dimensions"))
+        Some(other) => Err(ScenarioError::new(format!("`dimensions` must be 2 or 3, got {other}"))
             .coded("scenario/out-of-range")
             .with_help("2 is the plane z = 0, 3 is space")
             .at("swarm.dimensions")),
@@ -164,7 +163,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
     }
 }
 
-/// Positions and velocities at time 0.
+/// Returns the positions and velocities at time 0.
 fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result<Swarm, ScenarioError> {
     let mut random = super::start::random(table.seed);
     let mut positions_m = match (&table.positions_m, &table.shape) {

@@ -1,13 +1,13 @@
-//! The scenarios that the program carries with it.
+//! Built-in scenarios, embedded in the program.
 
-/// A scenario embedded in the program.
+/// Built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Builtin {
-    /// Its name, as [`super::Source::resolve`] takes it.
+    /// Name that [`super::Source::resolve`] accepts.
     pub name: &'static str,
-    /// What it shows, in one line.
+    /// Summary in one line.
     pub summary: &'static str,
-    /// Its file, comments included: what to copy for a scenario of one's own.
+    /// Text of the scenario file, comments included; a start for new scenarios.
     pub toml: &'static str,
 }
 
@@ -24,22 +24,22 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "pentagon-laplacian",
-        summary: "the pentagon's start under the Laplacian baseline, which avoids nothing: a violation",
+        summary: "the start of the pentagon under the Laplacian baseline, which avoids no collision: a violation",
         toml: include_str!("../../../../assets/pentagon-laplacian.toml"),
     },
     Builtin {
         name: "pentagon-collinear",
-        summary: "the pentagon from an exactly straight line, which no force leaves: clear but never reached",
+        summary: "the pentagon from an exactly straight line, which the law cannot leave: clear but never reached",
         toml: include_str!("../../../../assets/pentagon-collinear.toml"),
     },
     Builtin {
         name: "pentagon-leader",
-        summary: "the pentagon around a leader that listens to nobody, over a star: clear and reached",
+        summary: "the pentagon around a leader that follows only its own reference, over a star: clear and reached",
         toml: include_str!("../../../../assets/pentagon-leader.toml"),
     },
     Builtin {
         name: "leader-lossy",
-        summary: "a leader that flies on, heard over a radio that loses one in ten: carried along what is old does no harm",
+        summary: "a moving leader over a radio that loses one message in ten, extrapolated: clear and reached",
         toml: include_str!("../../../../assets/leader-lossy.toml"),
     },
     Builtin {
@@ -54,17 +54,17 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "obstacles",
-        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of each other and of them, reached",
+        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of all of them, reached",
         toml: include_str!("../../../../assets/obstacles.toml"),
     },
     Builtin {
         name: "crazyflies",
-        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear and reached, nothing certified",
+        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear, reached, not certified",
         toml: include_str!("../../../../assets/crazyflies.toml"),
     },
     Builtin {
         name: "gusts",
-        summary: "rings in a turbulent wind with gusts on some of them: what all feel alike changes no distance, reached",
+        summary: "rings in a turbulent wind with gusts on some vehicles: a common wind changes no separation, reached",
         toml: include_str!("../../../../assets/gusts.toml"),
     },
     Builtin {
@@ -74,13 +74,13 @@ const ALL: &[Builtin] = &[
     },
 ];
 
-/// All built-in scenarios, the default first.
+/// Returns all built-in scenarios, the default first.
 #[must_use]
 pub fn all() -> &'static [Builtin] {
     ALL
 }
 
-/// The built-in scenario of this name.
+/// Returns the built-in scenario with a name.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Builtin> {
     ALL.iter().find(|builtin| builtin.name == name)

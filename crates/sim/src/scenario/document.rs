@@ -1,7 +1,8 @@
-//! The scenario file: its keys, units and defaults.
+//! Scenario file: its keys, units and defaults.
 //!
-//! Read by `text`, made into a flight by `build`; `resolved` makes it back from a flight and writes it. A table
-//! whose keys depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the keys common to all choices.
+//! `text` reads a document, `build` makes a scenario of it, and `resolved` converts a scenario back. A table whose keys
+//! depend on a choice (`shape`, `kind`) is an enum inside a struct that holds the common keys. Doc comments of the keys
+//! become the schema, the reference in docs/scenario.md and parts of error messages.
 
 use std::path::PathBuf;
 
@@ -19,78 +20,80 @@ use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use tautline_core::swarm::{Rows, set_row};
 use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;
-use tautline_laws::target::{Arrival, Begins, Breathing};
+use tautline_laws::target::{Arrival, Begins, DeadlockOptions};
 use tautline_laws::wind::WindSpec;
 
-/// A flight of a swarm into a formation. Every number is in SI units, named at the end of its key. Vehicles, and the
-/// entries of every list, are counted from 1.
+/// Scenario: a swarm, its start, its formations and its control law. All numbers are in SI units, named at the end of
+/// the key. Vehicles and entries of lists are counted from 1.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(title = "tautline scenario")]
 #[serde(deny_unknown_fields)]
 pub(super) struct Document {
-    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`. The file's name unless given.
+    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`. The name of the file unless
+    /// given.
     #[schemars(length(min = 1, max = 64), pattern("^[A-Za-z0-9_-]+$"))]
     pub(super) name: Option<String>,
-    /// The vehicles.
+    /// Number and properties of the vehicles.
     #[serde(default)]
     pub(super) swarm: SwarmTable,
-    /// What kind of body they are: points unless given.
+    /// Model of the vehicles: points unless given.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) vehicle: VehicleTable,
-    /// Air that moves.
+    /// Wind: none unless given.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) wind: WindSpec,
-    /// What must stay empty around each: a ball unless given.
+    /// Space around each vehicle that must stay empty: a ball unless given.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) safety: SafetyTable,
-    /// Where they start.
+    /// Positions and velocities at the start.
     pub(super) start: StartTable,
-    /// The slots that they shall reach.
+    /// Slots of the first formation.
     pub(super) formation: FormationTable,
-    /// The formations after it, in their order.
+    /// Later formations, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) leg: Vec<LegTable>,
-    /// Solids at rest that are in the way.
+    /// Obstacles at rest.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) obstacle: Vec<ObstacleTable>,
-    /// A motion that the formations are carried along with; slots are places then.
+    /// Motion of the reference, which carries the formations. With it, slots are absolute positions relative to the
+    /// reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "ReferenceTable")]
     pub(super) reference: Option<ReferenceTable>,
     /// The control law.
     pub(super) law: LawTable,
-    /// Laws that `tautline compare` flies by name: `[laws.NAME]` holds the keys of a law, where NAME is its kind or any other
-    /// name with a `kind` beside the keys.
+    /// Laws that `tautline compare` flies by name. `[laws.NAME]` holds the keys of a law; without a `kind`, NAME is the
+    /// kind.
     #[serde(default, skip_serializing_if = "Laws::is_empty")]
     pub(super) laws: Laws,
-    /// Which vehicles sense each other: all of them unless given.
+    /// Pairs of vehicles that sense each other: all pairs unless given.
     #[serde(default)]
     pub(super) graph: GraphTable,
-    /// The bodies that carry out the commands.
+    /// Equations of motion that are solved.
     #[serde(default)]
     pub(super) plant: PlantTable,
     /// Duration and rates.
     pub(super) time: TimeSpec,
-    /// What counts as a reached formation.
+    /// Criteria of a reached formation.
     #[serde(default)]
     pub(super) arrival: Arrival,
-    /// When slots are spread for a while, so that vehicles that stand in each other's way get past; under the displacement
-    /// law.
+    /// Deadlock recovery: a stalled swarm spreads its slots for some time, so that vehicles that block each other can
+    /// pass. Only under the displacement law.
     #[serde(default, skip_serializing_if = "is_default")]
-    pub(super) breathing: Breathing,
-    /// What vehicles measure of themselves and of whoever is near.
+    pub(super) deadlock: DeadlockOptions,
+    /// Measurements by the vehicles of themselves and of near vehicles.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) sensing: SensingSpec,
-    /// What vehicles hear of each other, and when.
+    /// Messages between the vehicles.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) network: NetworkSpec,
-    /// How commands become accelerations.
+    /// Conversion of commands into accelerations.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) actuation: ActuationSpec,
-    /// Vehicles of which a part fails.
+    /// Vehicles with a failed part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) failure: Vec<Failure>,
-    /// Chance in flight.
+    /// Seed of the random numbers in flight.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) noise: NoiseTable,
     #[serde(skip)]
@@ -106,53 +109,52 @@ pub(super) struct Given {
 }
 
 impl Document {
-    /// What a vehicle's own velocity accelerates it by \[1/s\].
+    /// Returns the velocity coefficient a22 less the drag of the air \[1/s\].
     pub(super) fn velocity_coefficient_per_s(&self) -> f64 {
         self.a22_per_s() - self.vehicle.drag_per_s
     }
 }
 
-/// The vehicles.
+/// Number and properties of the vehicles.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct SwarmTable {
-    /// Number of vehicles N. Needed where neither the start nor the formation lists points; checked against them
-    /// where they do.
+    /// Number of vehicles N. Required if neither the start nor the formation lists points; otherwise it must match
+    /// them.
     #[schemars(range(min = 2))]
     pub(super) count: Option<u64>,
-    /// 2 keeps the swarm in the plane z = 0, 3 lets it use all axes. Without it: 2 when every position, velocity and
-    /// slot has z = 0, otherwise 3.
+    /// Number of dimensions: 2 restricts the swarm to the plane z = 0, 3 allows all axes. Unless given, 2 if every
+    /// position, velocity and slot has z = 0, otherwise 3.
     #[schemars(range(min = 2, max = 3))]
     pub(super) dimensions: Option<u64>,
-    /// Mass of points in kg: one number for all vehicles or a list with one for each. Laws command accelerations, so it changes no
-    /// motion until hulls touch; the ideal plant's vehicles are points and have no use for it.
+    /// Mass of points in kg, for all vehicles or for each. Laws command accelerations, so the mass matters only if
+    /// hulls touch. The ideal plant ignores it.
     pub(super) mass_kg: PerVehicle,
-    /// Radius of the solid hull of points in m, for all vehicles or for each. The hulls of any two vehicles must fit within
-    /// `law.delta_m`, so they change no motion until a pair is closer than that; the ideal plant has no hulls.
+    /// Radius of the solid hull of points in m, for all vehicles or for each. Two hulls must fit within `law.delta_m`,
+    /// so hulls touch only after a violation. The ideal plant ignores it.
     pub(super) hull_radius_m: PerVehicle,
-    /// Velocity coefficient a22 of points, p'' = a22 v + u, in 1/s: negative is drag against the ground, whatever blows, positive
-    /// feeds energy in. Drag in the air is `vehicle.drag_per_s`.
+    /// Velocity coefficient a22 of points in p'' = a22 v + u, in 1/s. Negative is drag relative to the ground, positive
+    /// adds energy. `vehicle.drag_per_s` is drag relative to the air.
     pub(super) a22_per_s: f64,
 }
 
-/// Where the vehicles start: `positions_m`, or a `shape` with its parameters.
+/// Positions and velocities at the start: `positions_m`, or a `shape` with its keys.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StartTable {
     /// Position of each vehicle in m.
     pub(super) positions_m: Option<Vec<Point>>,
-    /// Velocity of each vehicle in m/s; at rest unless given.
+    /// Velocity of each vehicle in m/s; 0 unless given.
     pub(super) velocities_m_s: Option<Vec<Point>>,
-    /// Largest random offset along each axis in m, uniform, added to every position. Along z only in three
-    /// dimensions.
+    /// Largest random offset along each axis in m, uniform, added to every position; along z only in three dimensions.
     #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(extend("minimum" = 0, "default" = 0.0))]
     pub(super) jitter_m: f64,
-    /// Seed of the random numbers (`ChaCha8`, the same on every machine).
+    /// Seed of the random numbers of the start (`ChaCha8`, the same on every machine).
     #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0))]
     pub(super) seed: u64,
-    /// Whether vehicles take the start's places in an order that is drawn by `seed`.
+    /// Whether the vehicles take the positions in a random order, drawn with `seed`.
     #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(extend("default" = false))]
     pub(super) shuffle: bool,
@@ -165,7 +167,7 @@ pub(super) struct StartTable {
 #[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum StartShape {
-    /// Vehicles 1, 2, ... along x.
+    /// Vehicles 1, 2, ... along the x axis.
     Line {
         /// Distance between neighbours in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -183,24 +185,24 @@ pub(super) enum StartShape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
-    /// Points spread evenly over a sphere.
+    /// Points distributed evenly over a sphere.
     Sphere {
         /// Radius in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
-    /// Uniformly random positions in a square, or in a cube in three dimensions, that keep a distance.
+    /// Uniformly random positions in a square, or in a cube in three dimensions, with a smallest separation.
     Random {
         /// Half the side of the square or cube around the origin in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         half_extent_m: f64,
-        /// Smallest distance between two vehicles in m: more than `law.delta_m`, and 1.5 times that unless given.
+        /// Smallest separation in m, more than `law.delta_m`; 1.5 times `law.delta_m` unless given.
         #[schemars(extend("exclusiveMinimum" = 0))]
         min_separation_m: Option<f64>,
     },
 }
 
-/// The slots of the formation. Laws that control distances reach it up to rotation, reflection and translation.
+/// Slots of the first formation. Laws that control distances reach them up to rotation, reflection and translation.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FormationTable {
@@ -210,12 +212,12 @@ pub(super) struct FormationTable {
     pub(super) shape: FormationShape,
 }
 
-/// A formation after the first: a `shape`, or the one before it, placed anew.
+/// Later formation: a `shape`, or the slots of the previous formation with a new placement.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
-    /// Time at which it begins in s, or when the one before it begins if that is later; `"reached"`, once that one is reached,
-    /// unless given.
+    /// Time in s at which the leg begins, but not before the previous leg begins; or `"reached"`: once the previous
+    /// formation is reached. `"reached"` unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "LegStart")]
     pub(super) start_s: Option<LegStart>,
@@ -225,11 +227,11 @@ pub(super) struct LegTable {
     pub(super) shape: Option<FormationShape>,
 }
 
-/// Where the slots of a formation are, and which vehicle flies to which slot.
+/// Placement of the slots, and assignment of vehicles to slots.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(default)]
 pub(super) struct Placement {
-    /// Which vehicle flies to which slot; for a leg, from the slots before.
+    /// Assignment of vehicles to slots; for a leg, from the slots of the previous leg.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = "given"))]
     pub(super) assignment: Assignment,
@@ -237,11 +239,11 @@ pub(super) struct Placement {
     #[serde(skip_serializing_if = "is_unscaled")]
     #[schemars(extend("exclusiveMinimum" = 0, "default" = 1.0))]
     pub(super) scale: f64,
-    /// Turn of the scaled slots about their centre in degrees, counterclockwise seen from above.
+    /// Rotation of the scaled slots about their centre in degrees, counterclockwise seen from above.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0))]
     pub(super) yaw_deg: f64,
-    /// Translation of the turned slots in m.
+    /// Translation of the rotated slots in m.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Point")]
     pub(super) move_m: Option<Point>,
@@ -253,23 +255,23 @@ impl Default for Placement {
     }
 }
 
-/// Who flies to which slot.
+/// Assignment of vehicles to slots.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Assignment {
-    /// Each vehicle to the slot of its number.
+    /// Each vehicle flies to the slot with its number.
     #[default]
     Given,
-    /// Vehicles are interchangeable: the sum of squared ways is least, once the formation is moved as the law leaves it free, or
-    /// around a leader, who keeps its slot; and so again where the swarm is stalled. For up to 5000 vehicles, and 500 under a law
-    /// that holds distances.
+    /// The assignment with the least sum of squared distances, over the rigid motions that the law leaves free or
+    /// around a leader, which keeps its slot. A stalled swarm is reassigned. At most 5000 vehicles, or 500 under a law
+    /// that controls distances.
     Optimal,
-    /// Vehicles are interchangeable where the swarm is stalled; up to then each goes to the slot of its number. Under the
-    /// displacement law.
+    /// Each vehicle flies to the slot with its number until the swarm is stalled, which reassigns the slots. Only under
+    /// the displacement law.
     WhenStalled,
 }
 
-/// A formation and its size.
+/// Shape of a formation and its size.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
@@ -280,13 +282,13 @@ pub(super) enum FormationShape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         side_m: f64,
     },
-    /// Equal angles on a circle in the plane z = 0.
+    /// Slots at equal angles on a circle in the plane z = 0.
     Circle {
         /// Radius in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
     },
-    /// Along x.
+    /// Slots along the x axis.
     Line {
         /// Distance between neighbours in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -298,7 +300,7 @@ pub(super) enum FormationShape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         spacing_m: f64,
     },
-    /// Points spread evenly over a sphere.
+    /// Points distributed evenly over a sphere.
     Sphere {
         /// Radius in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -308,21 +310,21 @@ pub(super) enum FormationShape {
     V(VKeys),
     /// A filled triangle in the plane z = 0: rows of 1, 2, 3, ... slots.
     Wedge(SpacingKeys),
-    /// Circles in the plane z = 0: 1, 6, 12, 18, ... slots.
+    /// Concentric circles in the plane z = 0: 1, 6, 12, 18, ... slots.
     Rings(SpacingKeys),
-    /// A screw about the z axis.
+    /// A helix about the z axis.
     Helix(HelixKeys),
-    /// A cubic grid, as near to a cube as the number allows.
+    /// A cubic grid, as close to a cube as the number of slots allows.
     Cube(SpacingKeys),
-    /// Letters, in the plane z = 0.
+    /// Letters in the plane z = 0.
     Text(TextKeys),
-    /// An SVG drawing, in the plane z = 0.
+    /// An SVG drawing in the plane z = 0.
     Svg(SvgKeys),
     /// The dark or opaque part of a picture, in the plane z = 0.
     Image(ImageKeys),
-    /// A list of slots in a file.
+    /// Slots listed in a file.
     File(FileKeys),
-    /// A list of slots.
+    /// Slots listed in the scenario.
     Points {
         /// Slot of each vehicle in m.
         points_m: Vec<Point>,
@@ -335,17 +337,17 @@ pub(super) enum FormationShape {
 pub(super) struct LawTable {
     #[schemars(flatten)]
     pub(super) kind: LawSpec,
-    /// Safety distance delta in m: every flight is judged by it, whatever the law. Needed unless `[safety]` has an ellipsoid.
+    /// Safety distance delta in m; the audit of every flight uses it. Required unless `[safety]` gives an ellipsoid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) delta_m: Option<f64>,
 }
 
-/// The bodies that carry out the commands.
+/// Equations of motion that are solved.
 #[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct PlantTable {
-    /// What moves the vehicles.
+    /// Plant that moves the vehicles.
     pub(super) kind: PlantSpec,
 }
 
@@ -361,12 +363,12 @@ pub(super) struct SafetyTable {
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct NoiseTable {
-    /// Seed of the random numbers in flight (`ChaCha8`, the same on every machine). The start has its own seed.
+    /// Seed of the random numbers in flight (`ChaCha8`, the same on every machine). `start.seed` is separate.
     pub(super) seed: u64,
 }
 
 impl Document {
-    /// Velocity coefficient a22 \[1/s\] that laws know of: 0 for other bodies than points.
+    /// Returns the velocity coefficient a22 \[1/s\] that laws use; 0 for vehicles that are not points.
     pub(super) fn a22_per_s(&self) -> f64 {
         if self.vehicle.is_point() { self.swarm.a22_per_s } else { 0.0 }
     }
@@ -397,7 +399,8 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct VKeys {
-    /// Distance between neighbours on an arm in m, and of the nearest slots; 1.5 times `law.delta_m` unless given.
+    /// Distance between neighbours on an arm in m, and smallest distance of slots; 1.5 times `law.delta_m` unless
+    /// given.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
     /// Angle between the arms in degrees, from 60 to 180.
@@ -414,7 +417,7 @@ fn right_angle_deg() -> f64 {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SpacingKeys {
-    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless given.
+    /// Smallest distance of slots in m; 1.5 times `law.delta_m` unless given.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
@@ -426,29 +429,29 @@ pub(super) struct HelixKeys {
     /// Radius in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) radius_m: f64,
-    /// Rise of a full turn in m.
+    /// Rise per full turn in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) pitch_m: f64,
-    /// Distance between neighbours in m, and of the nearest slots; 1.5 times `law.delta_m` unless this or `turns` is
-    /// given.
+    /// Distance between neighbours in m, and smallest distance of slots; 1.5 times `law.delta_m` unless this or `turns`
+    /// is given.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
-    /// Turns from the first slot to the last, in place of `spacing_m`.
+    /// Number of turns from the first slot to the last, instead of `spacing_m`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) turns: Option<f64>,
 }
 
-/// Size of a drawing: one of the keys, or none.
+/// Size of a drawing: at most one of these keys.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[expect(clippy::struct_field_names, reason = "each is in metres")]
 pub(super) struct DrawingSize {
-    /// Height of everything that is drawn in m.
+    /// Height of the drawing in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) height_m: Option<f64>,
-    /// Width of everything that is drawn in m, in place of `height_m`.
+    /// Width of the drawing in m, instead of `height_m`.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) width_m: Option<f64>,
-    /// Distance of the nearest slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
+    /// Smallest distance of slots in m; 1.5 times `law.delta_m` unless this, the height or the width is given.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub(super) spacing_m: Option<f64>,
 }
@@ -457,7 +460,7 @@ pub(super) struct DrawingSize {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TextKeys {
-    /// The text; a line break begins a new line below.
+    /// Text to draw; a line break starts a new line below.
     #[schemars(length(min = 1, max = 1000))]
     pub(super) text: String,
     #[serde(flatten)]
@@ -468,11 +471,11 @@ pub(super) struct TextKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SvgKeys {
-    /// Path data, in the form of the attribute `d` of SVG.
+    /// Path data, as in the attribute `d` of SVG.
     pub(super) path: Option<String>,
-    /// An SVG file, in place of `path`; relative to the folder of the scenario file.
+    /// SVG file instead of `path`, relative to the folder of the scenario file.
     pub(super) file: Option<PathBuf>,
-    /// Whether slots fill the areas inside the lines, instead of standing on the lines.
+    /// Whether slots fill the areas inside the lines instead of lying on the lines.
     #[serde(default)]
     pub(super) filled: bool,
     #[serde(flatten)]
@@ -483,10 +486,10 @@ pub(super) struct SvgKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ImageKeys {
-    /// A PNG picture; relative to the folder of the scenario file.
+    /// PNG picture, relative to the folder of the scenario file.
     pub(super) file: PathBuf,
-    /// Pixels that are drawn: unless given, the opaque pixels of a picture with transparent ones, otherwise the dark
-    /// pixels.
+    /// Pixels that belong to the drawing. Unless given, the opaque pixels of a picture with transparent ones, otherwise
+    /// the dark pixels.
     #[serde(default)]
     #[schemars(with = "Ink")]
     pub(super) ink: Option<Ink>,
@@ -498,8 +501,8 @@ pub(super) struct ImageKeys {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FileKeys {
-    /// A text file with a line for each slot: x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
-    /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
+    /// Text file with one line per slot: x, y and optionally z in m, separated by commas, semicolons, tabs or blanks. A
+    /// first line may name the columns. Relative to the folder of the scenario file.
     pub(super) file: PathBuf,
 }
 
@@ -513,14 +516,14 @@ pub(super) enum PerVehicle {
     Each(#[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))] Vec<f64>),
 }
 
-/// A point: x, y and, unless it is 0, z.
+/// A point: x, y and optionally z.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(with = "Vec<f64>", extend("minItems" = 2, "maxItems" = 3))]
 #[serde(untagged)]
 pub(super) enum Point {
-    /// In the plane z = 0.
+    /// A point in the plane z = 0.
     Plane([f64; 2]),
-    /// In space.
+    /// A point in space.
     Space([f64; 3]),
 }
 
@@ -530,7 +533,7 @@ pub(super) enum Point {
 pub(super) struct Edge(#[schemars(inner(range(min = 1)))] pub(super) [u64; 2]);
 
 impl Point {
-    /// x, y and z.
+    /// Returns x, y and z.
     pub(super) fn coordinates(self) -> [f64; 3] {
         match self {
             Self::Plane([x, y]) => [x, y, 0.0],
@@ -539,7 +542,7 @@ impl Point {
     }
 }
 
-/// Some vehicles, counted from 1, or all of them.
+/// A list of vehicles, counted from 1, or all vehicles.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum Vehicles {
@@ -557,13 +560,13 @@ pub(super) enum All {
     All,
 }
 
-/// When a leg begins.
+/// Start of a leg.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(super) enum LegStart {
-    /// As soon as the previous leg is reached.
+    /// Once the previous formation is reached.
     When(Reached),
-    /// At this time in s.
+    /// A time in s.
     At(f64),
 }
 
@@ -571,7 +574,7 @@ pub(super) enum LegStart {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Reached {
-    /// As soon as the previous leg is reached.
+    /// Once the previous formation is reached.
     Reached,
 }
 
@@ -584,7 +587,7 @@ impl LegStart {
     }
 }
 
-/// A row for each point.
+/// Returns a matrix with a row for each point.
 pub(super) fn rows(points: &[Point]) -> Rows {
     let mut rows = Rows::zeros(points.len());
     for (i, point) in points.iter().enumerate() {

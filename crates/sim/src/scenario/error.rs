@@ -1,12 +1,12 @@
-//! What is wrong with a scenario, where it stands and what to do about it.
+//! Errors of scenarios: place, message and remedy.
 
 use std::borrow::Cow;
 use std::fmt;
 use std::ops::Range;
 
-/// Why a scenario cannot be flown.
+/// Error of a scenario.
 ///
-/// [`fmt::Display`] writes place, message and remedy. The parts are for programs that show the text around the place.
+/// [`fmt::Display`] writes place, message and remedy. The accessors serve programs that show the text around the place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenarioError {
     code: &'static str,
@@ -16,7 +16,7 @@ pub struct ScenarioError {
     place: Option<Box<Place>>,
 }
 
-/// A key of the scenario file, or one entry of the list that it holds. Shown as an override names it:
+/// Key of the scenario file, or an entry of the list that it holds. Displayed as an override names it:
 /// `start.positions_m.2` is the position of vehicle 2, and `leg.1.points_m.2` its slot in the first `[[leg]]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
@@ -24,18 +24,18 @@ pub struct Field {
     pub key: Cow<'static, str>,
     /// Entry of a list, from 0.
     pub entry: Option<usize>,
-    /// The leg that has the key, from 0: the first is `[formation]`, the others are `[[leg]]`. 0 for keys of no leg.
+    /// Leg that has the key, from 0: the first is `[formation]`, the others are `[[leg]]`. 0 for keys outside legs.
     pub leg: usize,
 }
 
-/// Where in a text an error stands.
+/// Place of an error in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// What the text is called: a path, the name of a built-in scenario, or `--set` for an override.
+    /// Name of the text: a path, the name of a built-in scenario, or `--set` for an override.
     pub source: String,
     /// The whole text.
     pub text: String,
-    /// The offending bytes of the text.
+    /// Offending bytes of the text.
     pub span: Range<usize>,
     /// Line of the first offending byte, from 1.
     pub line: usize,
@@ -49,12 +49,12 @@ impl ScenarioError {
         Self { code: "scenario/inconsistent", message, help: None, fields: Vec::new(), place: None }
     }
 
-    /// A value out of its range.
+    /// Returns an error about a value out of its range.
     pub(crate) fn out_of_range(message: impl AsRef<str>) -> Self {
         Self::new(message).coded("scenario/out-of-range")
     }
 
-    /// Gives the error another code than `scenario/inconsistent`.
+    /// Replaces the default code `scenario/inconsistent`.
     pub(crate) fn coded(mut self, code: &'static str) -> Self {
         self.code = code;
         self
@@ -65,37 +65,37 @@ impl ScenarioError {
         self
     }
 
-    /// Names a key whose value is part of what is wrong. The first one named stands for the error, unless another was
-    /// overridden.
+    /// Adds a key that is part of the problem. The error is placed at the first key, unless an override set another
+    /// one.
     pub(crate) fn at(mut self, key: impl Into<Cow<'static, str>>) -> Self {
         self.fields.push(Field { key: key.into(), entry: None, leg: 0 });
         self
     }
 
-    /// Like [`ScenarioError::at`], for several keys in this order.
+    /// Adds several keys; see [`ScenarioError::at`].
     pub(crate) fn at_keys<const N: usize>(self, keys: [&'static str; N]) -> Self {
         keys.into_iter().fold(self, Self::at)
     }
 
-    /// Like [`ScenarioError::at`], for an entry of a list.
+    /// Adds an entry of a list; see [`ScenarioError::at`].
     pub(crate) fn at_entry(mut self, key: &'static str, entry: usize) -> Self {
         self.fields.push(Field { key: key.into(), entry: Some(entry), leg: 0 });
         self
     }
 
-    /// Like [`ScenarioError::at`], for a key of `[formation]` or, for a leg after the first, of its `[[leg]]`.
+    /// Adds a key of `[formation]` or, for a later leg, of its `[[leg]]`; see [`ScenarioError::at`].
     pub(super) fn at_leg(mut self, leg: usize, key: &'static str) -> Self {
         self.fields.push(Field { key: key.into(), entry: None, leg });
         self
     }
 
-    /// Its keys of `[formation]` are those of a leg after the first.
+    /// Moves the added keys of `[formation]` to a leg.
     pub(super) fn on_leg(mut self, leg: usize) -> Self {
         self.fields.iter_mut().filter(|field| field.key.starts_with("formation")).for_each(|field| field.leg = leg);
         self
     }
 
-    /// Like [`ScenarioError::at_leg`], for an entry of a list.
+    /// Adds an entry of a list of a leg; see [`ScenarioError::at_leg`].
     pub(super) fn at_leg_entry(mut self, leg: usize, key: &'static str, entry: usize) -> Self {
         self.fields.push(Field { key: key.into(), entry: Some(entry), leg });
         self
@@ -106,37 +106,36 @@ impl ScenarioError {
         self
     }
 
-    /// The stable name of the problem, such as `scenario/out-of-range`.
+    /// Returns the stable code of the problem, such as `scenario/out-of-range`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         self.code
     }
 
-    /// What is wrong, in one sentence.
+    /// Returns the message, one sentence.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// What to do about it.
+    /// Returns the remedy.
     #[must_use]
     pub fn help(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// The key whose value is wrong, for a scenario that was read well but cannot be flown.
+    /// Returns the key at which the error is placed, for a scenario that was read but is inconsistent.
     #[must_use]
     pub fn field(&self) -> Option<Field> {
         self.fields.first().cloned()
     }
 
-    /// All keys that are part of what is wrong.
+    /// Returns all keys that are part of the problem.
     pub(super) fn fields(&self) -> &[Field] {
         &self.fields
     }
 
-    /// Where it stands in the text that it was read from. None for a scenario built in code, and for a file that
-    /// could not be read at all.
+    /// Returns the place in the text; `None` for a scenario built in code, and for a file that could not be read.
     #[must_use]
     pub fn place(&self) -> Option<&Place> {
         self.place.as_deref()
@@ -169,8 +168,8 @@ impl fmt::Display for Field {
 }
 
 impl Place {
-    /// The place of a span of bytes in a text; a span beyond the text or within a character is moved to the nearest
-    /// boundary before it.
+    /// Returns the place of a span of bytes in a text. A span beyond the text or within a character moves to the
+    /// nearest boundary before it.
     #[must_use]
     pub fn new(source: &str, text: &str, span: Range<usize>) -> Self {
         let start = floor_char_boundary(text, span.start);
@@ -186,12 +185,12 @@ impl Place {
     }
 }
 
-/// The largest boundary between characters that is not beyond `index`.
+/// Returns the largest character boundary that is at most `index`.
 fn floor_char_boundary(text: &str, index: usize) -> usize {
     (0..=index.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
 }
 
-/// The text with control characters escaped: what a file holds must not steer the terminal.
+/// Escapes control characters, which could control the terminal.
 fn printable(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
         if c.is_control() && c != '\n' {
@@ -203,12 +202,12 @@ fn printable(text: &str) -> String {
     })
 }
 
-/// A remedy for a name that is not known: the nearest one, if it is near, and all of them.
+/// Returns a remedy for an unknown name: the nearest known name if it is similar, and all known names.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     let list = known.iter().map(|known| format!("`{known}`")).collect::<Vec<_>>().join(", ");
     let nearest = known.iter().map(|known| (edit_distance(name, known), known)).min();
     match nearest {
-        None => "none is known here".to_owned(),
+        None => "no name is allowed here".to_owned(),
         Some((distance, nearest)) if distance <= 1 + nearest.chars().count() / 3 => {
             format!("did you mean `{nearest}`? Known here: {list}")
         }
@@ -216,8 +215,8 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     }
 }
 
-/// Fewest insertions, deletions and replacements of a character that turn one word into another (Levenshtein). Words
-/// of more than 64 characters are compared by their first 64.
+/// Returns the Levenshtein distance of two words: the fewest insertions, deletions and replacements of a character.
+/// Words of more than 64 characters are compared by their first 64.
 fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

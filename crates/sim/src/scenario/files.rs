@@ -1,4 +1,4 @@
-//! Files that a scenario names.
+//! Reads the files that a scenario names: points, pictures, drawings, models.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -10,19 +10,19 @@ use super::document::Point;
 use super::error::ScenarioError;
 use super::limits::LARGEST;
 
-/// The key that names the file of a formation.
+/// Key of the file of a formation.
 pub(super) const KEY: &str = "formation.file";
 
-/// Largest file that is read \[bytes\].
+/// Size limit of a file \[bytes\].
 const MAX_BYTES: u64 = 128 << 20;
 
-/// All bytes of a file that is not too long, which a key names.
+/// Reads a file of at most [`MAX_BYTES`]; `key` is the key that names it.
 pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioError> {
     let shown = path.display();
     let refused = |said: String, help: &str| ScenarioError::new(said).coded("scenario/file").with_help(help).at(key);
     let unreadable = |error: std::io::Error| {
-        let help = "give the path of a file that can be read; it counts from the folder of the scenario file, or from the \
-                    working directory where there is none";
+        let help = "give the path of a readable file, relative to the folder of the scenario file or to the working \
+                    directory";
         refused(format!("cannot read {shown}: {error}"), help)
     };
     let file = File::open(path).map_err(unreadable)?;
@@ -30,42 +30,40 @@ pub(super) fn bytes(path: &Path, key: &'static str) -> Result<Vec<u8>, ScenarioE
         return Err(refused(format!("{shown} is a directory"), "give the path of a file within it"));
     }
     let mut bytes = Vec::new();
-    // A device or a pipe does not say how long it is.
+    // The size of a device or a pipe is unknown in advance.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
-        return Err(refused(
-            format!("{shown} has more than {} MiB", MAX_BYTES >> 20),
-            "nothing that a scenario names is that long: is it the right file?",
-        ));
+        return Err(refused(format!("{shown} has more than {} MiB", MAX_BYTES >> 20), "name a smaller file"));
     }
     Ok(bytes)
 }
 
-/// Characters of a wrong field that a message shows.
+/// Characters of a wrong field that a message quotes.
 const SHOWN_CHARS: usize = 40;
 
-/// What the columns of a file are, and what is said where they are not.
+/// Columns of a text file, and words for its errors.
 pub(super) struct Columns {
-    /// The key that names the file.
+    /// Key that names the file.
     pub(super) key: &'static str,
-    /// What each may be called, in small letters and without its unit, in the order that they have where they are not named.
+    /// Names of each column, in lower case and without unit, in the default order of the columns.
     pub(super) names: &'static [&'static [&'static str]],
-    /// So many of them, the first, are needed.
+    /// Number of required columns, the first ones.
     pub(super) needed: usize,
-    /// What a row has: `a slot has x, y and perhaps z`.
+    /// Description of a row: `a slot has x, y and optionally z`.
     pub(super) row: &'static str,
-    /// How a file is written.
+    /// Remedy: the format of a line.
     pub(super) help: &'static str,
 }
 
 impl Columns {
-    /// The rows of a file of text, each with its line: columns in the order of their names, or as a first line names them
-    /// (`x`, `y_m`, ...), with commas, semicolons, tabs or blanks between. Empty lines, and those that begin with `#`, do
-    /// not count.
+    /// Reads the rows of a text file, each with its line number. Columns are in the default order, or as a first line
+    /// names them (`x`, `y_m`, ...), separated by commas, semicolons, tabs or blanks. Empty lines and lines that begin
+    /// with `#` are skipped.
     pub(super) fn read(&self, path: &Path) -> Result<Vec<(u64, Vec<f64>)>, ScenarioError> {
         let refused = |line: u64, said: &str| self.refused(path, line, said);
         let bytes = bytes(path, self.key)?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| refused(1, &format!("this is no text: {error}")))?;
+        let text =
+            std::str::from_utf8(&bytes).map_err(|error| refused(1, &format!("the file is not UTF-8: {error}")))?;
         let text = text.trim_start_matches('\u{feff}');
         let delimiter = delimiter(text);
         let mut reader = ReaderBuilder::new()
@@ -92,7 +90,7 @@ impl Columns {
                 }
             }
             if !is_named && fields.len() > columns.len() {
-                let said = format!("{} columns where the first line has {}", fields.len(), columns.len());
+                let said = format!("the line has {} columns, but the first line has {}", fields.len(), columns.len());
                 return Err(refused(line, &said));
             }
             let numbers = numbers(&fields, &columns).map_err(|said| refused(line, &said))?;
@@ -101,10 +99,10 @@ impl Columns {
             }
             rows.push((line, numbers));
         }
-        if rows.is_empty() { Err(refused(1, "there is no point")) } else { Ok(rows) }
+        if rows.is_empty() { Err(refused(1, "the file has no points")) } else { Ok(rows) }
     }
 
-    /// What is wrong in a line of the file.
+    /// Returns an error about a line of the file.
     pub(super) fn refused(&self, path: &Path, line: u64, said: &str) -> ScenarioError {
         ScenarioError::new(format!("{}:{line}: {said}", path.display()))
             .coded("scenario/file")
@@ -112,7 +110,7 @@ impl Columns {
             .at(self.key)
     }
 
-    /// Where each column is, by the first line, and whether that line is a heading.
+    /// Returns the position of each column, and whether the first line is a heading.
     fn places(&self, fields: &[&str]) -> Result<(Vec<usize>, bool), String> {
         if let Some(places) = self.named(fields) {
             return Ok((places, true));
@@ -130,7 +128,7 @@ impl Columns {
         Ok(((0..fields.len()).collect(), false))
     }
 
-    /// Where each column is, where a heading names all that are needed.
+    /// Returns the position of each column if the line is a heading with all required columns.
     fn named(&self, fields: &[&str]) -> Option<Vec<usize>> {
         let headings: Vec<String> = fields.iter().map(|field| field.to_ascii_lowercase()).collect();
         let bare = |heading: &str| {
@@ -145,7 +143,7 @@ impl Columns {
     }
 }
 
-/// `x and y`, `t, x and y`.
+/// Joins names: `x and y`, `t, x and y`.
 fn needed(names: impl Iterator<Item = &'static str>) -> String {
     let names: Vec<_> = names.collect();
     match &names[..] {
@@ -154,7 +152,7 @@ fn needed(names: impl Iterator<Item = &'static str>) -> String {
     }
 }
 
-/// What stands between columns: the first line with a number or a name tells.
+/// Returns the delimiter of the columns, from the first line that is not a comment.
 fn delimiter(text: &str) -> u8 {
     let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
     [b',', b';', b'\t'].into_iter().find(|&mark| first.as_bytes().contains(&mark)).unwrap_or(b' ')
@@ -177,37 +175,38 @@ const SLOTS: Columns = Columns {
     key: KEY,
     names: &[&["x"], &["y"], &["z"]],
     needed: 2,
-    row: "a slot has x, y and perhaps z",
-    help: "a line has the coordinates of a slot in m, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the columns x, y, z",
+    row: "a slot has x, y and optionally z",
+    help: "write a slot in m per line, such as 1.5,2.0 or 1.5,2.0,3.0; a first line may name the columns x, y, z",
 };
 
 const PLACES: Columns = Columns {
     key: "reference.file",
     names: &[&["t", "time"], &["x"], &["y"], &["z"]],
     needed: 3,
-    row: "a place in time has t, x, y and perhaps z",
-    help: "a line has a time in s, later than that of the line before, and the place there in m, such as 0.5,1.0,2.0 or \
-           0.5,1.0,2.0,3.0; a first line may name the columns t, x, y, z",
+    row: "a point has t, x, y and optionally z",
+    help: "write a time in s and a position in m per line, in order of time, such as 0.5,1.0,2.0. A first line may name \
+           the columns t, x, y, z",
 };
 
-/// The slots in a file of columns x, y and perhaps z in m.
+/// Reads slots from a file with the columns x, y and optionally z in m.
 pub(super) fn slots(path: &Path) -> Result<Vec<Point>, ScenarioError> {
     Ok(SLOTS.read(path)?.iter().map(|(_, coordinates)| point(coordinates)).collect())
 }
 
-/// When a motion is where \[s\] \[m\], at least twice: a file of columns t, x, y and perhaps z, whose times grow.
+/// Reads times \[s\], which must increase, and positions \[m\] from a file with the columns t, x, y and optionally z;
+/// at least two rows.
 pub(super) fn places(path: &Path) -> Result<(Vec<f64>, Vec<Point>), ScenarioError> {
     let rows = PLACES.read(path)?;
     let mut before_s = f64::NEG_INFINITY;
     for (line, numbers) in &rows {
         let refused = |said: &str| Err(PLACES.refused(path, *line, said));
         if numbers[0] <= before_s {
-            return refused(&format!("the time {} s is not after {before_s} s", numbers[0]));
+            return refused(&format!("the time must be more than {before_s} s, got {} s", numbers[0]));
         }
         before_s = numbers[0];
     }
     if let [(line, _)] = &rows[..] {
-        return Err(PLACES.refused(path, *line, "there is one point, and a motion has at least two"));
+        return Err(PLACES.refused(path, *line, "a motion needs at least 2 points, got 1"));
     }
     Ok(rows.iter().map(|(_, numbers)| (numbers[0], point(&numbers[1..]))).unzip())
 }

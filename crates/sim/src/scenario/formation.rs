@@ -1,4 +1,4 @@
-//! `[formation]` and `[[leg]]` of the scenario file as legs: shapes into slots, placed and assigned one after the other.
+//! `[formation]` and `[[leg]]` of the scenario file: converts shapes to slots, then places and assigns them leg by leg.
 
 use std::path::Path;
 
@@ -18,10 +18,10 @@ use tautline_laws::formation::{
 };
 use tautline_laws::target::{Begins, Leg};
 
-/// Slots of the pentagon.
+/// Number of slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
 
-/// Gives a scenario without legs those of its file. One without a law is left for [`super::validate`] to refuse.
+/// Adds the legs of the file to a scenario. A scenario with an invalid law is left to [`super::validate`].
 pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[LegTable]) -> Result<(), ScenarioError> {
     let (count, delta_m) = (scenario.count(), scenario.delta_m);
     scenario.legs.push(first.placement.place(Leg::first(formation(&first.shape, count, delta_m)?)));
@@ -47,51 +47,57 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
     Ok(())
 }
 
-/// How formations may be moved under the law of the scenario, where vehicles may be assigned to them.
+/// Returns the rigid motions that the law leaves free, for the assignment of vehicles.
 fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     let Ok(law) = scenario.law() else { return Ok(None) };
     let leads = scenario.reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
-    // Wherever a leader is, slots are moved there.
+    // The formation follows a leader by translation.
     let freedom = if leads { Freedom::Translation } else { law.capabilities().controls.freedom() };
     let most = most_assigned(freedom);
     if scenario.count() > most {
-        return Err(ScenarioError::new(format!("{} vehicles are too many to be assigned", scenario.count()))
-            .coded("scenario/out-of-range")
-            .with_help(format!("set assignment to \"given\", or fly at most {most} vehicles"))
-            .at_keys(["formation.assignment", "swarm.count"]));
+        return Err(ScenarioError::new(format!(
+            "an assignment needs at most {most} vehicles, got {}",
+            scenario.count()
+        ))
+        .coded("scenario/out-of-range")
+        .with_help(format!("set assignment to \"given\", or reduce swarm.count"))
+        .at_keys(["formation.assignment", "swarm.count"]));
     }
     Ok(Some(freedom))
 }
 
-/// Whether a leg's vehicles may be given other slots where they are stalled. Nobody tells whether they are under a law that
-/// is not given spread slots then either, or where breathing is off.
+/// Returns whether a stalled swarm may reassign the slots of a leg. Refuses `when-stalled` if the law has no deadlock
+/// recovery or it is off.
 fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> Result<bool, ScenarioError> {
     if assignment == Assignment::Given {
         return Ok(false);
     }
     let Ok(law) = scenario.law() else { return Ok(false) };
-    let why = match (law.capabilities().settling, scenario.breathing.is_on()) {
+    let why = match (law.capabilities().settling, scenario.deadlock.is_on()) {
         (Some(_), true) => return Ok(true),
-        (None, _) => format!("under the law `{}` nobody is assigned anew where the swarm is stalled", law.name()),
-        (Some(_), false) => "with breathing off nobody is assigned anew where the swarm is stalled".to_owned(),
+        (None, _) => format!("the law `{}` reassigns no slots when the swarm is stalled", law.name()),
+        (Some(_), false) => "no slots are reassigned with deadlock recovery off".to_owned(),
     };
     if assignment != Assignment::WhenStalled {
         return Ok(false);
     }
-    Err(ScenarioError::new(why).coded("scenario/unsupported-by-law")
-        .with_help("set the assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and breathing.mode to \"auto\"")
+    Err(ScenarioError::new(why)
+        .coded("scenario/unsupported-by-law")
+        .with_help(
+            "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"",
+        )
         .at_leg(leg, "formation.assignment")
-        .at_keys(["law.kind", "breathing.mode"]))
+        .at_keys(["law.kind", "deadlock.mode"]))
 }
 
-/// Gives each vehicle the slot that makes the sum of squared ways from these places \[m\] least; a leader keeps its own.
+/// Assigns slots with the least sum of squared distances from the positions `from_m` \[m\]; a leader keeps its slot.
 fn assign(leg: &mut Leg, by: Assignment, from_m: &Rows, (freedom, leader): (Option<Freedom>, Option<usize>)) {
     let (Assignment::Optimal, Some(freedom)) = (by, freedom) else { return };
     let slots = match leader {
         Some(leader) => optimal_slots_around(from_m, &leg.formation, leader),
         None => optimal_slots(from_m, &leg.formation, freedom),
     };
-    // What is not finite is told by validation.
+    // Validation refuses positions that are not finite.
     if let Some(slots) = slots {
         leg.formation = leg.formation.reordered(&slots);
     }
@@ -107,27 +113,27 @@ impl Placement {
     }
 }
 
-/// Moves each leg so that a leader's slot is where the leader is on the reference: it listens to nobody, and so the swarm is
-/// formed around it.
+/// Translates each leg so that the slot of the leader is the leader's position relative to the reference: the leader
+/// follows only its reference.
 fn anchor(scenario: &mut Scenario) {
     let Some(leader) = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader()) else { return };
     let place_m = row(&scenario.start.positions_m, leader) - scenario.reference_at(0.0).position_m;
     for leg in &mut scenario.legs {
         let slots_m = &mut leg.formation.slots_m;
         let move_m = place_m - row(slots_m, leader);
-        // What is not finite is told of whom it is.
+        // Validation refuses positions that are not finite, and names the vehicle.
         if move_m != Vector3::zeros() && move_m.iter().all(|x| x.is_finite()) {
             (0..slots_m.nrows()).for_each(|i| {
                 let slot_m = row(slots_m, i) + move_m;
                 set_row(slots_m, i, slot_m);
             });
-            // Not a rounding beside it.
+            // Exactly, without rounding.
             set_row(slots_m, leader, place_m);
         }
     }
 }
 
-/// Number of slots of a shape that has its own.
+/// Returns the number of slots of a shape with a fixed number.
 pub(super) fn listed_slots(shape: &FormationShape) -> Option<usize> {
     match shape {
         FormationShape::Points { points_m } => Some(points_m.len()),
@@ -136,7 +142,7 @@ pub(super) fn listed_slots(shape: &FormationShape) -> Option<usize> {
     }
 }
 
-/// Refuses a leg whose list of slots is not as long as there are vehicles.
+/// Refuses legs whose number of slots is not the number of vehicles.
 pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), ScenarioError> {
     let listed = legs.iter().map(|leg| leg.shape.as_ref().and_then(listed_slots));
     for (number, slots) in listed.enumerate() {
@@ -151,7 +157,7 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
     Ok(())
 }
 
-/// The formation of a shape.
+/// Returns the formation of a shape.
 pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     Ok(match shape {
         &FormationShape::Pentagon { side_m } => Formation::pentagon(side_m),
@@ -172,8 +178,7 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
     })
 }
 
-/// Makes a shape's file, named relative to a folder, one that can be opened from where the program runs, and a file of
-/// points a list of them.
+/// Resolves the file of a shape relative to a folder, and replaces a file of points by a list.
 pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
     match shape {
         FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),
@@ -186,7 +191,7 @@ pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -
     Ok(())
 }
 
-/// Whether all slots lie in the plane z = 0.
+/// Returns whether all slots lie in the plane z = 0.
 pub(super) fn is_flat(shape: &FormationShape) -> bool {
     match shape {
         FormationShape::Points { points_m } => points_m.iter().all(|point| point.coordinates()[2] == 0.0),
@@ -199,10 +204,10 @@ fn spacing(spacing_m: Option<f64>, delta_m: f64) -> f64 {
     spacing_m.unwrap_or(DEFAULT_SPACING * delta_m)
 }
 
-/// Part of the spacing by which rounding may bring slots of a helix nearer.
+/// Relative rounding of the smallest distance of slots of a helix.
 const ROUNDING: f64 = 1e-12;
 
-/// How much steeper a helix is tried to be until its turns keep the spacing.
+/// Factor between the pitches that are tried until turns of a helix keep the spacing.
 const STEEPER: f64 = 1.01;
 
 fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
@@ -228,7 +233,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
     };
     if !keeps(pitch_m, step_rad) {
-        // With less, a slot is too near to the one above it wherever that is.
+        // With a smaller pitch, slots of adjacent turns are always closer than the spacing.
         let flattest_m = pitch_m.max(0.5 * spacing_m);
         let steeper = std::iter::successors(Some(flattest_m), |pitch_m| Some(pitch_m * STEEPER));
         let steeper = steeper.take_while(|&pitch_m| pitch_m <= 2.0 * spacing_m);
@@ -249,16 +254,16 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
 const TEXT: &str = "formation.text";
 const PATH: &str = "formation.path";
 
-/// How large a drawing shall be.
+/// Size of a drawing.
 #[derive(Clone, Copy)]
 enum Size {
-    /// By a dimension of all of it \[m\].
+    /// Height or width of the drawing \[m\].
     Of(Dimension, f64),
-    /// By the distance of the nearest slots \[m\].
+    /// Smallest distance of slots \[m\].
     Spacing(f64),
 }
 
-/// Height or width: its key, what has it, and its axis.
+/// Height or width: key, adjective and axis.
 #[derive(Clone, Copy)]
 struct Dimension {
     key: &'static str,
@@ -282,21 +287,21 @@ impl DrawingSize {
                 let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
                 let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
                     .coded("scenario/exclusive-keys")
-                    .with_help("keep one of them: each decides how large the drawing is");
+                    .with_help("keep one of them: each sets the size of the drawing");
                 Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
             }
         }
     }
 }
 
-/// The letters of a text.
+/// Returns the slots of a text.
 pub(super) fn text(keys: &TextKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     let size = keys.size.size(delta_m)?;
     let drawing = Drawing::text(&keys.text).map_err(|error| refused(&error, TEXT, None))?;
     sized(&drawing, size, count, delta_m, TEXT)
 }
 
-/// SVG path data or an SVG file.
+/// Returns the slots of SVG path data or of an SVG file.
 pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     let size = keys.size.size(delta_m)?;
     let (drawing, key) = match (&keys.path, &keys.file) {
@@ -320,7 +325,7 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
     sized(&drawing, size, count, delta_m, key)
 }
 
-/// A picture.
+/// Returns the slots of a picture.
 pub(super) fn image(keys: &ImageKeys, count: usize, delta_m: f64) -> Result<Formation, ScenarioError> {
     let size = keys.size.size(delta_m)?;
     let bytes = files::bytes(&keys.file, files::KEY)?;
@@ -328,7 +333,7 @@ pub(super) fn image(keys: &ImageKeys, count: usize, delta_m: f64) -> Result<Form
     sized(&drawing, size, count, delta_m, files::KEY)
 }
 
-/// The slots of a drawing, at its size.
+/// Returns the slots of a drawing, scaled to a size.
 fn sized(
     drawing: &Drawing,
     size: Size,
@@ -339,7 +344,7 @@ fn sized(
     let mut formation = drawing.slots(count).map_err(|error| refused(&error, key, None))?;
     let (pair, nearest) = formation.min_distance().unwrap_or((Pair::new(0, 1), f64::INFINITY));
     if nearest == 0.0 {
-        return Err(ScenarioError::new(format!("slots {pair} of what is drawn are the same point"))
+        return Err(ScenarioError::new(format!("slots {pair} of the drawing are the same point"))
             .coded("scenario/within-delta")
             .with_help("draw longer lines or larger areas, or fly fewer vehicles")
             .at_keys([key, "swarm.count"]));
@@ -353,8 +358,8 @@ fn sized(
 }
 
 impl Dimension {
-    /// What a drawing, whose nearest slots are this near, is enlarged by to have the dimension that is asked for, if
-    /// its slots then are more than delta apart.
+    /// Returns the scale that gives a drawing this dimension. Refuses a scale at which the nearest slots are not more
+    /// than delta apart.
     fn scale(
         self,
         drawing: &Drawing,
@@ -366,10 +371,12 @@ impl Dimension {
         let Self { key, name, axis } = self;
         let drawn = drawing.size()[axis];
         if drawn == 0.0 {
-            return Err(ScenarioError::new(format!("what is drawn is a straight line, and not {asked_m} m {name}"))
-                .coded("scenario/shape")
-                .with_help("give its other dimension, or spacing_m")
-                .at(key));
+            return Err(ScenarioError::new(format!(
+                "the drawing is a straight line, which cannot be {asked_m} m {name}"
+            ))
+            .coded("scenario/shape")
+            .with_help("give its other dimension, or spacing_m")
+            .at(key));
         }
         let scale = asked_m / drawn;
         let nearest_m = scale * nearest;
@@ -390,7 +397,7 @@ impl Dimension {
     }
 }
 
-/// What cannot be drawn, at the key that says it.
+/// Returns the error of a drawing, at the key that gives it.
 fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> ScenarioError {
     let help = match error {
         DrawingError::Glyph(_) => "letters, digits and signs of Latin, Greek and Cyrillic scripts are drawn".to_owned(),
@@ -406,7 +413,7 @@ fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> Scen
         DrawingError::NotFinite => "draw nearer to the origin".to_owned(),
         DrawingError::Empty if key == TEXT => "give at least one letter".to_owned(),
         DrawingError::Empty => {
-            "there must be lines or areas with an extent; in an SVG file letters are to be made paths, in a picture \
+            "draw lines or areas with an extent; in an SVG file convert letters to paths, in a picture \
                                 `ink` says which pixels count"
                 .to_owned()
         }

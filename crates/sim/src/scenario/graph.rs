@@ -1,4 +1,4 @@
-//! `[graph]` of the scenario file: its keys, and the graph that they mean.
+//! `[graph]` of the scenario file: its keys, and the graph that they describe.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,10 +8,10 @@ use super::error::ScenarioError;
 use super::limits::pair_count;
 use tautline_laws::graph::{Graph, GraphError};
 
-/// Links of a vehicle of a random graph, in the mean, unless given.
+/// Default mean number of links of a vehicle of a random graph.
 const DEFAULT_DEGREE: u64 = 4;
 
-/// Which vehicles sense each other.
+/// Pairs of vehicles that sense each other.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraphTable {
@@ -26,9 +26,9 @@ pub(super) struct GraphTable {
 pub(super) enum GraphKind {
     /// Every pair.
     Complete {},
-    /// One vehicle with every other.
+    /// One vehicle with every other vehicle.
     Star {
-        /// That vehicle.
+        /// Centre of the star.
         #[serde(default = "first")]
         #[schemars(extend("default" = 1), range(min = 1))]
         hub: u64,
@@ -37,18 +37,18 @@ pub(super) enum GraphKind {
     Ring {},
     /// Each vehicle with the next.
     Path {},
-    /// A random tree, and as many random pairs more as it takes.
+    /// A random tree, and random pairs up to the given degree.
     Random {
-        /// Links of a vehicle in the mean, but at least those of a tree; 4 unless given, or as many as there are others.
+        /// Mean number of links of a vehicle, at least that of a tree; 4 unless given, or N - 1 if that is less.
         #[schemars(range(min = 1))]
         degree: Option<u64>,
-        /// Seed of the random numbers (`ChaCha8`, the same on every machine). Every run of a campaign has the same graph unless
-        /// its `[vary]` says `"graph.seed" = "run"`.
+        /// Seed of the random numbers (`ChaCha8`, the same on every machine). All runs of a campaign have the same
+        /// graph, unless its `[vary]` holds `"graph.seed" = "run"`.
         #[serde(default)]
         #[schemars(extend("default" = 0))]
         seed: u64,
     },
-    /// A list of pairs.
+    /// Listed pairs.
     Edges {
         /// Pairs of vehicles, counted from 1.
         edges: Vec<Edge>,
@@ -65,7 +65,7 @@ fn first() -> u64 {
     1
 }
 
-/// Number of edges, at most, that memory will be taken for, without making them.
+/// Returns a bound on the number of edges that need memory.
 pub(super) fn edge_count(kind: &GraphKind, law_keeps_edges: bool, count: usize) -> u128 {
     match kind {
         GraphKind::Complete {} if !law_keeps_edges => 0,
@@ -78,7 +78,7 @@ pub(super) fn edge_count(kind: &GraphKind, law_keeps_edges: bool, count: usize) 
     }
 }
 
-/// The graph of so many vehicles.
+/// Returns the graph of a number of vehicles.
 pub(super) fn graph(kind: &GraphKind, count: usize) -> Result<Graph, ScenarioError> {
     match *kind {
         GraphKind::Complete {} => Ok(Graph::complete(count)),
@@ -90,7 +90,7 @@ pub(super) fn graph(kind: &GraphKind, count: usize) -> Result<Graph, ScenarioErr
     }
 }
 
-/// That of so many links of a vehicle in the mean, rounded up.
+/// Returns the number of edges for a mean number of links of a vehicle, rounded up.
 fn random_edge_count(degree: u64, count: usize) -> u128 {
     (u128::from(degree) * count as u128).div_ceil(2)
 }
@@ -101,9 +101,9 @@ fn index(number: u64) -> Option<usize> {
 
 fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
-        ScenarioError::new(format!("there is no vehicle {hub}: they are counted from 1 to {count}"))
+        ScenarioError::new(format!("the hub must be a vehicle from 1 to {count}, got {hub}"))
             .coded("scenario/unknown-vehicle")
-            .with_help("name a vehicle of the swarm as the middle of the star")
+            .with_help("vehicles are counted from 1")
             .at("graph.hub")
     })
 }
@@ -112,10 +112,9 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     let most = count.saturating_sub(1).max(1) as u64;
     let degree = degree.unwrap_or(DEFAULT_DEGREE.min(most));
     if !(1..=most).contains(&degree) {
-        let others = if most == 1 { "1 other".to_owned() } else { format!("{most} others") };
-        return Err(ScenarioError::new(format!("{degree} links of a vehicle in the mean, where each has {others}"))
+        return Err(ScenarioError::new(format!("the mean number of links must be from 1 to {most}, got {degree}"))
             .coded("scenario/out-of-range")
-            .with_help(format!("it is from 1 to {most}; a graph has at least the links of a tree, about 2 in the mean"))
+            .with_help(format!("a connected graph has a mean of about 2 links or more"))
             .at("graph.degree"));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);

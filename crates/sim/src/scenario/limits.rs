@@ -1,4 +1,4 @@
-//! What numbers a scenario may hold, and how much of them.
+//! Limits of the numbers, the size and the memory of a scenario.
 
 use std::fmt::Display;
 
@@ -6,63 +6,63 @@ use super::error::ScenarioError;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::Spaced;
 
-/// Largest magnitude of a number, in SI units: a million kilometres, where doubles are 0.1 um apart.
+/// Largest magnitude of a number, in SI units; in metres a million kilometres, where doubles are 0.1 um apart.
 pub const LARGEST: f64 = 1e9;
 
 /// Smallest magnitude of a number that must be positive, in SI units.
 pub const SMALLEST: f64 = 1e-9;
 
-/// Most steps of a flight. Up to here the product of step number, step and recording rate is known to better than the
-/// 1e-6 that decides whether a step is recorded ([`super::TimeSpec::records`]); at a microsecond a step it takes 17 minutes.
+/// Largest number of steps of a flight. Up to here, the rounding of step number times step times recording rate stays
+/// below the tolerance 1e-6 of [`super::TimeSpec::records`]. With steps of 1 us this is a flight of 17 minutes.
 pub const MAX_STEPS: f64 = 1e9;
 
-/// Most halvings of a step. Up to here doubles tell the times of its parts apart to the end of the longest flight.
+/// Largest number of halvings of a step. Up to here, doubles distinguish the times of substeps to the end of the
+/// longest flight.
 pub const MAX_HALVINGS: u32 = 20;
 
-/// Distance at which the engine begins to act on two hulls that are about to touch \[m\]: hulls must stay so far from
-/// touching while no pair is closer than delta.
+/// Distance at which the engine begins to act on two hulls that are about to touch \[m\]. Hulls of vehicles that are
+/// delta apart must be farther apart than this.
 pub const CONTACT_PREDICTION_M: f64 = 0.02;
 
-/// A desired distance exceeds delta by at least this part of it: less is rounding, and its tension too stiff for any
-/// step.
+/// Smallest relative excess of a desired distance over delta. A smaller excess is rounding, and its tension is too
+/// stiff for any step.
 pub(super) const SLOT_MARGIN: f64 = 1e-9;
 
-/// Distance of the nearest slots unless given, as a multiple of delta.
+/// Default smallest distance of slots, as a multiple of delta.
 pub(super) const DEFAULT_SPACING: f64 = 1.5;
 
-/// Longest name \[characters\].
+/// Length limit of a name \[characters\].
 pub const MAX_NAME_CHARS: usize = 64;
 
-/// Whether a name may hold this.
+/// Returns whether a name may contain the character.
 pub(super) fn may_be_in_a_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '-' || c == '_'
 }
 
-/// Memory that a flight may be expected to take \[bytes\].
+/// Limit of the expected memory of a flight \[bytes\].
 pub const MAX_MEMORY_BYTES: u128 = 8 << 30;
 
-/// Memory expected for a vehicle: state, rigid body, two colliders and their places in the engine's and the audit's
-/// bounding volumes \[bytes\].
+/// Expected memory of a vehicle \[bytes\]: state, rigid body, two colliders, and leaves in the bounding volume
+/// hierarchies of the engine and the audit.
 pub const BYTES_PER_VEHICLE: u128 = 4096;
 
-/// Memory expected for an edge: its parameters in the law and its place in the graph \[bytes\].
+/// Expected memory of an edge \[bytes\]: its parameters in the law and its entry in the graph.
 pub const BYTES_PER_EDGE: u128 = 16;
 
 /// Bytes of a GiB.
 const GIB: f64 = (1_u64 << 30) as f64;
 
-/// Refuses a swarm in which nothing can be kept apart.
+/// Refuses a swarm of fewer than two vehicles.
 pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
     if count >= 2 {
         return Ok(());
     }
-    let vehicles = if count == 1 { "vehicle" } else { "vehicles" };
-    Err(ScenarioError::out_of_range(format!("{count} {vehicles} cannot form a formation"))
-        .with_help("a swarm has at least 2 vehicles")
+    Err(ScenarioError::out_of_range(format!("a swarm needs at least 2 vehicles, got {count}"))
+        .with_help("add vehicles")
         .at("swarm.count"))
 }
 
-/// Refuses the first list, by its key and what it holds, that is there and not as long as there are vehicles.
+/// Refuses lists whose length is not the number of vehicles. Each list has a key, a description and a length.
 pub(super) fn check_lengths<const N: usize>(
     count: usize,
     lists: [(&'static str, &str, Option<usize>); N],
@@ -76,7 +76,7 @@ pub(super) fn check_lengths<const N: usize>(
     }
 }
 
-/// Refuses a swarm that would take more memory than [`MAX_MEMORY_BYTES`].
+/// Refuses a swarm that needs more memory than [`MAX_MEMORY_BYTES`].
 pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioError> {
     let bytes = (count as u128 * BYTES_PER_VEHICLE).saturating_add(edges.saturating_mul(BYTES_PER_EDGE));
     if bytes <= MAX_MEMORY_BYTES {
@@ -93,13 +93,13 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
     .at_keys(["swarm.count", "graph.kind"]))
 }
 
-/// Number of pairs of `count` vehicles.
+/// Returns the number of pairs of `count` vehicles.
 pub(super) fn pair_count(count: usize) -> u128 {
     let count = count as u128;
     count * count.saturating_sub(1) / 2
 }
 
-/// The next number upwards with four digits, or itself where there is none.
+/// Rounds up to four significant digits; returns the number itself if that overflows.
 pub(super) fn rounded_up(number: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(number)) - 3.0);
     let digits = (number / unit).ceil();
@@ -110,21 +110,21 @@ pub(super) fn rounded_up(number: f64) -> f64 {
         .unwrap_or(number)
 }
 
-/// The first vehicle, and the first before it, that are at most `distance_m` apart.
+/// Returns the first pair of rows that are at most `distance_m` apart, and their distance.
 pub(super) fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
     let mut spaced = Spaced::new(distance_m);
     (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
 }
 
-/// Refuses a number that is not finite, or too large to compute with.
+/// Refuses a number that is not finite, or larger in magnitude than [`LARGEST`].
 pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
     if number.abs() <= LARGEST {
         return Ok(number);
     }
     Err(match not_finite(number) {
         Some(shown) => ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("give a finite number"),
-        None => ScenarioError::out_of_range(format!("{what} is {number:e}, too large to compute with"))
-            .with_help(format!("the most is {LARGEST:e} in either direction")),
+        None => ScenarioError::out_of_range(format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"))
+            .with_help(format!("give a smaller number")),
     })
 }
 

@@ -1,9 +1,9 @@
-//! What is to be flown: the validated scenario.
+//! Scenarios: validated descriptions of a flight.
 //!
-//! A [`Scenario`] is plain data, complete and checked: everything downstream may rely on what [`Scenario::validate`]
-//! promises. It is read from TOML by [`Scenario::read`], or built in code from [`Scenario::new`]. `document` holds the
-//! keys of the TOML; [`Scenario::resolved_toml`] writes the same document with nothing left to be derived. `builtin`
-//! holds the embedded scenarios.
+//! A [`Scenario`] is plain data that holds a whole flight; [`Scenario::validate`] lists its invariants.
+//! [`Scenario::read`] reads it from TOML, [`Scenario::new`] builds it in code. Data flow of a file: `source` -> `text`
+//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved_toml`]
+//! writes a scenario back as TOML with every default and random number written out.
 
 mod build;
 pub mod builtin;

@@ -1,4 +1,4 @@
-//! `[[obstacle]]`: a solid that is in the way, in a scenario and in a file of obstacles.
+//! `[[obstacle]]`: obstacles of a scenario and of a file for `tautline audit --obstacles`.
 //!
 //! ```toml
 //! [[obstacle]]
@@ -31,40 +31,42 @@ use super::spec::Scenario;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::space::{Obstacle, Shape, least_room};
 
-/// What an obstacle is made of, for messages.
-pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and a place \
-                                        at_m = [x, y, z] or, in a file for an audit, a path = [[t, x, y, z], ...]";
+/// Remedy for a wrong obstacle: the format of the table.
+pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and at_m = [x, y, \
+ z]. In \
+                                        a file for an audit, path = [[t, x, y, z], ...] may replace at_m";
 
-/// A solid that is in the way: a name, one shape and where it is.
+/// Obstacle: a name, one shape, and a position.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleTable {
-    /// What it is called.
+    /// Name of the obstacle.
     pub name: String,
-    /// A ball around its place.
+    /// A ball around the position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Ball")]
     ball: Option<Ball>,
-    /// A box around its place, upright.
+    /// An upright box around the position.
     #[serde(rename = "box", default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Cuboid")]
     cuboid: Option<Cuboid>,
-    /// Everything within a radius of a straight line.
+    /// All points within a radius of a line segment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Capsule")]
     capsule: Option<Capsule>,
-    /// Everything behind a plane through its place.
+    /// All points behind a plane through the position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "HalfSpace")]
     half_space: Option<HalfSpace>,
-    /// Its place in m; the origin for a capsule or a half-space unless given.
+    /// Position in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_m: Option<[f64; 3]>,
-    /// Path of an obstacle that moves, a row `[t, x, y, z]` for each instant: for `tautline audit --obstacles` alone.
+    /// Path of a moving obstacle: a row `[t, x, y, z]` for each instant, in s and m. Only for `tautline audit
+    /// --obstacles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     path: Option<Vec<[f64; 4]>>,
-    /// Distance in m that the centre of a vehicle must keep from its surface; unless given, half of `law.delta_m`, or 0.02
-    /// m more than the radius of the largest hull where that is more.
+    /// Smallest distance in m of the centre of a vehicle from the surface. Unless given, half of `law.delta_m`, or 0.02
+    /// m more than the radius of the largest hull if that is more.
     #[serde(skip_serializing_if = "Option::is_none")]
     clearance_m: Option<f64>,
 }
@@ -73,7 +75,7 @@ pub struct ObstacleTable {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Ball {
-    /// Its radius in m.
+    /// Radius in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     radius_m: f64,
 }
@@ -82,50 +84,50 @@ struct Ball {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Cuboid {
-    /// Its lengths along x, y and z in m, before it is turned.
+    /// Lengths along x, y and z in m, before the rotation.
     size_m: [f64; 3],
-    /// How far it is turned about the vertical in degrees, counterclockwise seen from above.
+    /// Rotation about the vertical in degrees, counterclockwise seen from above.
     #[serde(default)]
     yaw_deg: f64,
 }
 
-/// A line with a radius.
+/// A line segment with a radius.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[expect(clippy::struct_field_names, reason = "each is in metres")]
 struct Capsule {
-    /// One end of the line, from its place, in m.
+    /// First end of the segment relative to the position, in m.
     from_m: [f64; 3],
-    /// The other end in m.
+    /// Second end of the segment relative to the position, in m.
     to_m: [f64; 3],
-    /// The radius in m.
+    /// Radius in m.
     #[schemars(extend("exclusiveMinimum" = 0))]
     radius_m: f64,
 }
 
-/// What lies behind a plane.
+/// All points behind a plane.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct HalfSpace {
-    /// Points out of it; of any length but zero.
+    /// Normal that points out of the half-space, of any length except 0.
     normal: [f64; 3],
 }
 
-/// What an `[[obstacle]]` table means.
+/// Content of an `[[obstacle]]` table.
 pub struct Solid {
-    /// Its shape, around its place.
+    /// Shape relative to the position.
     pub shape: Shape,
-    /// Times \[s\] and places \[m\]; one entry where it stands still.
+    /// Times \[s\] and positions \[m\]; one entry for an obstacle at rest.
     pub path: Vec<(f64, Vector3<f64>)>,
-    /// Distance \[m\] that the centre of a vehicle must keep from its surface, if given.
+    /// Smallest distance \[m\] of the centre of a vehicle from the surface, if given.
     pub clearance_m: Option<f64>,
 }
 
 impl ObstacleTable {
-    /// The solid that it describes.
+    /// Returns the shape, the path and the clearance.
     ///
     /// # Errors
-    /// What is wrong with the table, in one sentence.
+    /// A message about a wrong table, one sentence.
     pub fn solid(self) -> Result<Solid, String> {
         let Self { name, ball, cuboid, capsule, half_space, at_m, path, clearance_m } = self;
         let in_space = capsule.is_some() || half_space.is_some();
@@ -141,27 +143,26 @@ impl ObstacleTable {
         ];
         let mut shapes = shapes.into_iter().flatten();
         let (Some(shape), None) = (shapes.next(), shapes.next()) else {
-            return Err(format!("obstacle `{name}` needs one shape and no more"));
+            return Err(format!("obstacle `{name}` must have exactly one shape"));
         };
         let path = match (at_m, path) {
             (Some(at_m), None) => vec![(0.0, at_m.into())],
             (None, Some(path)) => path.into_iter().map(|[t, x, y, z]| (t, Vector3::new(x, y, z))).collect(),
             (None, None) if in_space => vec![(0.0, Vector3::zeros())],
-            (None, None) => return Err(format!("obstacle `{name}` has no place")),
-            (Some(_), Some(_)) => return Err(format!("obstacle `{name}` has a place and a path")),
+            (None, None) => return Err(format!("obstacle `{name}` has neither at_m nor path")),
+            (Some(_), Some(_)) => return Err(format!("obstacle `{name}` has both at_m and path")),
         };
         Ok(Solid { shape, path, clearance_m })
     }
 
-    /// The obstacle at rest that it means, with a clearance \[m\] where it has none.
+    /// Returns the obstacle at rest, with a default clearance \[m\].
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
         let wrong = |said: String| ScenarioError::new(said).coded("scenario/obstacle").at_entry("obstacle", number);
         let Solid { shape, path, clearance_m: own_m } =
             self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
-            return Err(wrong(format!("obstacle `{}` moves", self.name)).with_help(
-                "the obstacles of a flight stand: give at_m = [x, y, z]; `tautline audit --obstacles` judges ones that move",
-            ));
+            return Err(wrong(format!("obstacle `{}` moves", self.name))
+                .with_help("give at_m = [x, y, z]; only `tautline audit --obstacles` takes obstacles that move"));
         };
         Ok(Obstacle { name: self.name.clone(), place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
     }
@@ -192,15 +193,15 @@ impl From<&Obstacle> for ObstacleTable {
 }
 
 impl Scenario {
-    /// Solids with a size, a place and a clearance that holds a vehicle's hull; no start within a clearance, and no slot where
-    /// slots are places that stay.
+    /// Checks the shape, the name and the clearance of each obstacle; no start, and no slot at rest, may lie within a
+    /// clearance.
     pub(super) fn check_obstacles(&self) -> Result<(), ScenarioError> {
         for (number, obstacle) in self.obstacles.iter().enumerate() {
             check_solid(obstacle).map_err(|error| error.at_entry("obstacle", number))?;
             if self.obstacles[..number].iter().any(|before| before.name == obstacle.name) {
-                return Err(ScenarioError::new(format!("two obstacles are named `{}`", obstacle.name))
+                return Err(ScenarioError::new(format!("two obstacles have the name `{}`", obstacle.name))
                     .coded("scenario/name")
-                    .with_help("give each a name of its own")
+                    .with_help("give each obstacle its own name")
                     .at_entry("obstacle", number));
             }
             self.check_hulls_beside(number, obstacle)?;
@@ -236,18 +237,19 @@ impl Scenario {
         Ok(())
     }
 
-    /// Who of these has the least room, and which obstacle leaves no more of it than that \[m\].
+    /// Returns the vehicle with the smallest margin to a clearance and the obstacle, if the margin is at most
+    /// `margin_m` \[m\].
     fn too_near(&self, positions_m: &Rows, margin_m: f64) -> Option<(f64, usize, usize)> {
         least_room(&self.obstacles, positions_m).filter(|&(room_m, ..)| room_m <= margin_m)
     }
 
-    fn refuse(&self, point_m: Vector3<f64>, number: usize, who: std::fmt::Arguments<'_>) -> ScenarioError {
+    fn refuse(&self, point_m: Vector3<f64>, number: usize, subject: std::fmt::Arguments<'_>) -> ScenarioError {
         let Obstacle { name, clearance_m, shape, place_m } = &self.obstacles[number];
         let (distance_m, _) = shape.signed_distance_m(point_m - place_m);
         let said = if distance_m <= 0.0 {
-            format!("{who} inside obstacle `{name}`")
+            format!("{subject} inside obstacle `{name}`")
         } else {
-            format!("{who} {distance_m} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
+            format!("{subject} {distance_m} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
         ScenarioError::new(said)
             .coded("scenario/near-obstacle")
@@ -261,8 +263,8 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hull of vehicle {} touches obstacle `{}` at {radius_m} m, not {CONTACT_PREDICTION_M} m before its \
-             clearance of {} m",
+            "the hull of vehicle {} touches obstacle `{}` at {radius_m} m, less than {CONTACT_PREDICTION_M} m before \
+             its clearance of {} m",
             vehicle + 1,
             obstacle.name,
             obstacle.clearance_m
@@ -274,18 +276,18 @@ impl Scenario {
     }
 }
 
-/// A solid with a name that is no vehicle's, and a normal with a direction.
+/// Refuses an empty name, a name that is a number (as of a vehicle), and a normal of length 0.
 fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
     let Obstacle { name, shape, .. } = obstacle;
     if name.trim().is_empty() {
         return Err(ScenarioError::new("the name of an obstacle is empty")
             .coded("scenario/name")
-            .with_help("give it one"));
+            .with_help("name the obstacle"));
     }
     if name.trim().parse::<u64>().is_ok() {
-        return Err(ScenarioError::new(format!("an obstacle is named `{name}`, as a vehicle is"))
+        return Err(ScenarioError::new(format!("the name of an obstacle must not be a number, got `{name}`"))
             .coded("scenario/name")
-            .with_help("give it a name that is no number"));
+            .with_help("add a letter: numbers are names of vehicles"));
     }
     match shape {
         Shape::HalfSpace { normal } if normal.norm() < SMALLEST => {

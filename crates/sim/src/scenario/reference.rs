@@ -1,4 +1,4 @@
-//! `[reference]` of the scenario file: its keys, and the motion that they mean.
+//! `[reference]` of the scenario file: its keys, and the motion that they describe.
 
 use std::path::{Path, PathBuf};
 
@@ -12,24 +12,24 @@ use super::limits::SMALLEST;
 use tautline_laws::graph::Pinning;
 use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
 
-/// Largest speed of a way from rest to rest over its mean.
+/// Ratio of the largest to the mean speed of a motion from rest to rest.
 const PEAK_OVER_MEAN: f64 = 15.0 / 8.0;
 
-/// A step from point to point is a jump where it is this many times as fast as the ones before and after it.
+/// Ratio of the speed between two points to the neighbouring speeds above which the motion counts as a jump.
 const JUMP: f64 = 10.0;
 
-/// A motion that the formations are carried along with, and who knows it.
+/// Motion of the reference, which carries the formations, and the vehicles that know it.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReferenceTable {
-    /// Who knows where the reference is: `"all"`, or a list of vehicles; all unless this or `leader` is given.
+    /// Vehicles that know the reference: `"all"`, or a list of vehicles; all unless this or `leader` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Vehicles")]
     pub(super) known_by: Option<Vehicles>,
-    /// A vehicle that flies the reference and listens to nobody: the others follow it.
+    /// Vehicle that follows only the reference; the other vehicles follow the leader.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) leader: Option<u64>,
-    /// Whether all vehicles are told how the reference accelerates.
+    /// Whether all vehicles know the acceleration of the reference.
     #[serde(default = "yes", skip_serializing_if = "Clone::clone")]
     #[schemars(extend("default" = true))]
     pub(super) feed_forward: bool,
@@ -41,20 +41,20 @@ fn yes() -> bool {
     true
 }
 
-/// A motion.
+/// Motion of the reference.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum ReferenceKind {
-    /// Always in one place: slots are where they are given, moved there.
+    /// A constant position, relative to which slots are absolute.
     Rest {
-        /// The place in m; the origin unless given.
+        /// Position in m; the origin unless given.
         #[serde(default = "origin")]
         position_m: Point,
     },
-    /// Straight on at one speed.
+    /// A constant velocity.
     Velocity {
-        /// Place at time 0 in m; the origin unless given.
+        /// Position at time 0 in m; the origin unless given.
         #[serde(default = "origin")]
         position_m: Point,
         /// Velocity in m/s.
@@ -62,37 +62,37 @@ pub(super) enum ReferenceKind {
     },
     /// Around a circle at constant z, counterclockwise seen from above, from the point of largest x.
     Circle {
-        /// Its middle in m; the origin unless given.
+        /// Centre in m; the origin unless given.
         #[serde(default = "origin")]
         centre_m: Point,
         /// Radius in m.
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius_m: f64,
-        /// Time of one turn in s; below zero clockwise.
+        /// Time of one turn in s; clockwise if negative.
         period_s: f64,
     },
-    /// From rest to rest between points along straight lines.
+    /// Straight lines between points, from rest to rest.
     WayPoints {
-        /// The points in m.
+        /// Points in m.
         points_m: Vec<Point>,
-        /// When it is at each of them in s. Without it each way begins when the one before ends, the first at time 0, and
-        /// takes as long as `speed_m_s` asks.
+        /// Time at each point in s. Without it, the motion starts at time 0, and each line takes the time that
+        /// `speed_m_s` requires.
         times_s: Option<Vec<f64>>,
-        /// Largest speed on a way in m/s, in the place of `times_s`.
+        /// Largest speed between points in m/s, instead of `times_s`.
         #[schemars(extend("exclusiveMinimum" = 0))]
         speed_m_s: Option<f64>,
     },
-    /// Through points without a stop: a natural cubic spline in time, from time 0 or before to the end of the flight.
+    /// A natural cubic spline in time through points, without stops. The times must cover the flight.
     Spline {
-        /// The points in m.
+        /// Points in m.
         points_m: Vec<Point>,
-        /// When it is at each of them in s.
+        /// Time at each point in s.
         times_s: Vec<f64>,
     },
-    /// The same through the points of a file.
+    /// The spline through the points of a file.
     File {
-        /// A text file with a line for each point: t in s, x, y and, unless it is 0, z in m, with commas, semicolons, tabs or
-        /// blanks between; relative to the folder of the scenario file. A first line may name the columns.
+        /// Text file with one line per point: t in s, x, y and optionally z in m, separated by commas, semicolons, tabs
+        /// or blanks. A first line may name the columns. Relative to the folder of the scenario file.
         file: PathBuf,
     },
 }
@@ -102,7 +102,7 @@ fn origin() -> Point {
 }
 
 impl ReferenceTable {
-    /// The motion and who knows it, in a flight of so many vehicles that lasts so long.
+    /// Returns the motion and the vehicles that know it, for the number of vehicles and the duration of the flight.
     pub(super) fn guidance(&self, count: usize, duration_s: f64) -> Result<Guidance, ScenarioError> {
         Ok(Guidance {
             motion: self.kind.motion(duration_s)?,
@@ -111,7 +111,7 @@ impl ReferenceTable {
         })
     }
 
-    /// Puts the points of its file, named relative to a folder, in the place of the file.
+    /// Replaces a file, named relative to a folder, by its points.
     pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
         if let ReferenceKind::File { file } = &self.kind {
             self.kind = ReferenceKind::of_file(&folder.join(file))?;
@@ -119,7 +119,7 @@ impl ReferenceTable {
         Ok(())
     }
 
-    /// Whether it stays in the plane z = 0.
+    /// Returns whether the motion stays in the plane z = 0.
     pub(super) fn is_flat(&self) -> bool {
         let flat = |points: &[Point]| points.iter().all(|point| point.coordinates()[2] == 0.0);
         match &self.kind {
@@ -135,16 +135,16 @@ impl ReferenceTable {
         let index = |number: u64, key: &'static str| {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
-                ScenarioError::new(format!("there is no vehicle {number}: they are counted from 1 to {count}"))
+                ScenarioError::new(format!("the vehicle must be one of 1 to {count}, got {number}"))
                     .coded("scenario/unknown-vehicle")
-                    .with_help("name a vehicle of the swarm")
+                    .with_help("vehicles are counted from 1")
                     .at(key)
             })
         };
         match (&self.known_by, self.leader) {
             (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
                 .coded("scenario/exclusive-keys")
-                .with_help("a leader knows the reference alone: keep one of them")
+                .with_help("keep one of them: only the leader knows its reference")
                 .at_keys(["reference.leader", "reference.known_by"])),
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
             (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
@@ -155,7 +155,7 @@ impl ReferenceTable {
                 listed.dedup();
                 if listed.is_empty() {
                     return Err(ScenarioError::new("no vehicle knows the reference")
-                        .with_help("list at least one, or leave out `known_by`: then all know it")
+                        .with_help("list at least one vehicle, or leave out `known_by`: then all vehicles know it")
                         .at("reference.known_by"));
                 }
                 Ok(if listed.len() == count { Pinning::All } else { Pinning::Listed(listed) })
@@ -179,9 +179,10 @@ impl ReferenceKind {
             },
             &Self::Circle { centre_m, radius_m, period_s } => {
                 if period_s.abs() < SMALLEST {
-                    return Err(ScenarioError::new(format!("one turn in {period_s} s is too fast to compute with"))
+                    let message = format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s");
+                    return Err(ScenarioError::new(message)
                         .coded("scenario/out-of-range")
-                        .with_help(format!("a turn takes at least {SMALLEST:e} s; below zero it is clockwise"))
+                        .with_help("give a longer period; a negative one turns clockwise")
                         .at("reference.period_s"));
                 }
                 ReferenceMotion::Circle { centre_m: centre_m.coordinates().into(), radius_m, period_s }
@@ -189,7 +190,7 @@ impl ReferenceKind {
             Self::WayPoints { points_m, times_s, speed_m_s } => {
                 let mut points_m = places(points_m)?;
                 if times_s.is_none() {
-                    // Two points in one place are one.
+                    // A repeated point would take no time.
                     points_m.dedup();
                 }
                 let times_s = match (times_s, speed_m_s) {
@@ -230,7 +231,7 @@ fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     Ok(points_m.iter().map(|point| point.coordinates().into()).collect())
 }
 
-/// When each point is reached at this largest speed \[s\]: each at another place than the one before.
+/// Returns the time at each point for a largest speed \[s\]; consecutive points must differ.
 fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
     let mut time_s = 0.0;
     let ways = points_m.windows(2).map(|way| PEAK_OVER_MEAN * (way[1] - way[0]).norm() / speed_m_s);
@@ -242,7 +243,7 @@ fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Points with their times, which grow.
+/// Pairs points with their times, which must increase.
 fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vector3<f64>)>, ScenarioError> {
     if points_m.len() != times_s.len() {
         return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
@@ -254,13 +255,13 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
         if k > 0 && time_s <= times_s[k - 1] {
             let (before_s, moves) = (times_s[k - 1], points_m[k] != points_m[k - 1]);
             let said = if time_s == before_s && moves {
-                format!("the reference jumps at {time_s} s: it is in two places, points {k} and {}", k + 1)
+                format!("the reference jumps at {time_s} s from point {k} to point {}", k + 1)
             } else {
-                format!("time {} of the reference is {time_s} s, not after {before_s} s", k + 1)
+                format!("time {} of the reference must be more than {before_s} s, got {time_s} s", k + 1)
             };
             return Err(ScenarioError::new(said)
                 .coded("scenario/reference")
-                .with_help("times must grow from point to point; a formation jumps by a [[leg]]")
+                .with_help("times must increase; for a jump of the formation use a [[leg]]")
                 .at_entry("reference.times_s", k));
         }
     }
@@ -272,7 +273,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(()) };
     if first.0 > 0.0 || last.0 < duration_s {
         return Err(ScenarioError::new(format!(
-            "the reference is given from {} to {} s, and the flight lasts from 0 to {duration_s} s",
+            "the reference must cover the flight from 0 to {duration_s} s, got {} to {} s",
             first.0, last.0
         ))
         .coded("scenario/outside-flight")
@@ -282,7 +283,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
     Ok(())
 }
 
-/// Refuses a step between points that is far faster than its neighbours: a jump that a curve would swing around.
+/// Refuses a speed far above the neighbouring speeds: a jump, around which a spline would oscillate.
 fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
     let speeds_m_s: Vec<f64> =
         points.windows(2).map(|way| (way[1].1 - way[0].1).norm() / (way[1].0 - way[0].0)).collect();
@@ -293,12 +294,14 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
     };
     let Some(k) = (0..speeds_m_s.len()).find(is_jump) else { return Ok(()) };
     Err(ScenarioError::new(format!(
-        "the reference jumps between {} and {} s: it moves at {:.3e} m/s there, more than {JUMP} times as fast as before and after",
+        "the reference jumps between {} and {} s: its speed of {:.3e} m/s is more than {JUMP} times the speeds before \
+         and after",
         points[k].0,
         points[k + 1].0,
         speeds_m_s[k]
-    )).coded("scenario/reference")
-    .with_help("give points in between, or a motion of the kind \"way-points\", which begins and ends each way at rest")
+    ))
+    .coded("scenario/reference")
+    .with_help("add points in between, or set reference.kind to \"way-points\", which rests at each point")
     .at_entry("reference.points_m", k + 1))
 }
 

@@ -1,27 +1,27 @@
-//! Whether the numbers that a plant computes in tell positions apart.
+//! Certificates of a scenario, limited by the resolution of the plant's numbers.
 //!
-//! A plant counts positions from the middle of the start. Whatever moves the swarm as a whole (its mean velocity, which no
-//! force between vehicles brakes, and which rounding alone sets going where a22 > 0) therefore costs digits.
+//! A plant computes positions relative to the centre of the start. A drift of the whole swarm therefore costs digits.
+//! Causes are the mean velocity, which no force between vehicles brakes, and rounding, which grows if a22 > 0.
 
 use super::spec::{PlantSpec, Scenario};
 use crate::link::ImperfectionSpec;
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::law::{Certificate, Law, Void, certificate_through};
-use tautline_laws::target::BreathingMode;
+use tautline_laws::target::DeadlockMode;
 
-/// How far the swarm as a whole is carried.
+/// Drift of the whole swarm until the end of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Speed of its mean at the end \[m/s\].
+    /// Speed of the mean position at the end \[m/s\].
     pub speed_m_s: f64,
-    /// Distance of its mean from the start at the end \[m\].
+    /// Distance of the mean position from the start at the end \[m\].
     pub distance_m: f64,
-    /// Distance between neighbouring numbers there \[m\], for the vehicle farthest out.
+    /// Spacing of doubles there \[m\], for the vehicle farthest from the centre.
     pub spacing_m: f64,
 }
 
 impl PlantSpec {
-    /// Whether the plant holds a command over a step; continuous time chooses its own steps.
+    /// Returns whether the plant holds a command over a step; otherwise it evaluates the law in continuous time.
     #[must_use]
     pub fn holds_commands(self) -> bool {
         matches!(self, Self::Rapier)
@@ -29,8 +29,8 @@ impl PlantSpec {
 }
 
 impl Scenario {
-    /// What the mean velocity, and with it a rounding error of [`f64::EPSILON`] m/s, comes to by the end of the flight
-    /// where it grows at this rate \[1/s\] and the wind adds to it, and how far the reference goes.
+    /// Returns the drift for a growth rate \[1/s\] of the mean velocity. The mean velocity starts with a rounding error
+    /// of [`f64::EPSILON`] m/s; wind and the reference add to the drift.
     #[must_use]
     pub fn drift(&self, rate_per_s: f64) -> Drift {
         let (epsilon, duration_s) = (f64::EPSILON, self.time.duration_s);
@@ -40,14 +40,15 @@ impl Scenario {
         let is_held = self.reference.is_some();
         let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
         let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
-        // The largest number stands for what none counts, be it infinite or nothing times infinity: `min` takes what is a number.
+        // Replaces infinity and NaN (0 times infinity) by the largest number: `min` ignores NaN.
         let counted = |value: f64| value.min(f64::MAX);
         let distance_m = counted(carried_m + seed_m_s * gained_s(rate_per_s) + blown_m_s * duration_s);
         let speed_m_s = counted(seed_m_s * (rate_per_s * duration_s).exp() + blown_m_s);
         Drift { speed_m_s, distance_m, spacing_m: epsilon * (self.extent_m() + distance_m) }
     }
 
-    /// How far from the middle of the start a reference carries the middle of a formation \[m\].
+    /// Returns the largest distance of the centre of a formation, carried by the reference, from the centre of the
+    /// start \[m\].
     fn carried_m(&self, duration_s: f64) -> f64 {
         let Some(guidance) = &self.reference else { return 0.0 };
         let begins_m = guidance.motion.at(0.0).position_m - mean_row(&self.start.positions_m);
@@ -55,8 +56,8 @@ impl Scenario {
         away_m.fold(0.0, f64::max) + guidance.motion.reach_m(duration_s)
     }
 
-    /// What a law promises from the start of this scenario on through all of its legs, as far as the scenario itself lets it: with
-    /// commands that are held, and numbers that do not tell the promise from delta, it promises nothing.
+    /// Returns the certificate of a law from the start through all legs, void where the scenario violates its
+    /// assumptions.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
         let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
@@ -66,18 +67,18 @@ impl Scenario {
             .void_where(is_uncounted, Void::Windblown)
     }
 
-    /// Of every leg, with the breath that it begins with where it does.
+    /// Certificate of all legs, with the spread slots that a leg begins with under `deadlock.mode = "start"`.
     fn promised(&self, law: &dyn Law) -> Certificate {
         let start = self.observation(&self.start);
-        if self.breathing.mode != BreathingMode::Start || law.capabilities().settling.is_none() {
+        if self.deadlock.mode != DeadlockMode::Start || law.capabilities().settling.is_none() {
             let ahead: Vec<_> = self.legs.iter().skip(1).map(|leg| &leg.formation).collect();
             return certificate_through(law, &start, &ahead);
         }
         let leader = self.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.breathing.scale, leader)).collect();
+        let spread: Vec<_> = self.legs.iter().map(|leg| leg.spread(self.deadlock.scale, leader)).collect();
         let ahead: Vec<_> = spread.iter().zip(&self.legs).flat_map(|(spread, leg)| [spread, &leg.formation]).collect();
         let mut promised = certificate_through(law, &start, &ahead);
-        // What holds on a leg is what holds once its slots have come together.
+        // The bound of a leg is that after its slots have come together.
         promised.legs = promised.legs.into_iter().skip(2).step_by(2).collect();
         if self.legs.len() < 2 {
             promised.legs.clear();
@@ -85,8 +86,8 @@ impl Scenario {
         promised
     }
 
-    /// A promise as far as this scenario lets it hold: not with commands that are held, nor where numbers do not tell it from
-    /// delta.
+    /// Voids a certificate that the scenario does not support: with held commands, imperfections or bodies that are not
+    /// points, or if the certified distance cannot be distinguished from delta.
     #[must_use]
     pub fn with_scenario_limits(&self, promised: Certificate) -> Certificate {
         let of_time = self.time.control_hz.map(|_| Void::CommandsHeld);
@@ -98,29 +99,29 @@ impl Scenario {
         promised.void_where(unresolved, Void::Unresolved)
     }
 
-    /// Whether a distance is so near delta that the plant's numbers do not tell the two apart.
+    /// Returns whether a distance is too close to delta for the resolution of the plant's numbers.
     fn is_unresolved(&self, distance_m: f64) -> bool {
         distance_m - self.delta_m <= self.resolution_m()
     }
 
-    /// Distance between neighbouring numbers where the swarm is meant to be \[m\].
+    /// Returns the spacing of doubles at the farthest intended position \[m\].
     fn resolution_m(&self) -> f64 {
         f64::EPSILON * (self.extent_m() + self.carried_m(self.time.duration_s))
     }
 
-    /// A distance from delta that is told for certain \[m\].
-    pub(super) fn told_apart_m(&self) -> f64 {
+    /// Returns the smallest reliable distance from delta \[m\].
+    pub(super) fn smallest_resolved_m(&self) -> f64 {
         2.0 * self.resolution_m()
     }
 
-    /// Largest distance of a start or a slot from the middle of its swarm \[m\].
+    /// Returns the largest distance of a start or a slot from the centre of its swarm \[m\].
     fn extent_m(&self) -> f64 {
         let slots_m = self.legs.iter().map(|leg| extent_m(&leg.formation.slots_m));
         slots_m.fold(extent_m(&self.start.positions_m), f64::max)
     }
 }
 
-/// Largest distance of a row from the mean of all rows \[m\].
+/// Returns the largest distance of a row from the mean of all rows \[m\].
 fn extent_m(rows: &Rows) -> f64 {
     let mean = mean_row(rows);
     (0..rows.nrows()).map(|i| (row(rows, i) - mean).norm()).fold(0.0, f64::max)

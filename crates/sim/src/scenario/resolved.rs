@@ -1,4 +1,4 @@
-//! A scenario as a document with nothing left to be derived: every default written out, every shape as points, random
+//! Converts a scenario to a document without shapes or defaults: every value written out, every shape as points, random
 //! numbers drawn.
 
 use std::fmt::{self, Write as _};
@@ -21,13 +21,13 @@ use tautline_core::swarm::Rows;
 use tautline_laws::target::{Begins, Leg};
 
 impl Scenario {
-    /// The scenario as TOML with every default written out; reading it gives an equal scenario, bit for bit.
+    /// Returns the scenario as TOML with every default written out. Reading it gives an equal scenario, bit for bit.
     ///
-    /// Start and formations are lists of points, so the text depends on no random number, no shape and no version of
-    /// either. Equal scenarios have equal texts.
+    /// Start and formations are lists of points, so the text does not depend on the generators of shapes and random
+    /// numbers. Equal scenarios have equal texts.
     #[must_use]
     pub fn resolved_toml(&self) -> String {
-        // Every key of the document has a form in TOML.
+        // Every key of the document can be written as TOML.
         let tables = Table::try_from(Document::from(self)).unwrap_or_default();
         let mut out = String::new();
         // Writing to a string cannot fail.
@@ -35,7 +35,7 @@ impl Scenario {
         out
     }
 
-    /// SHA-256 of [`Scenario::resolved_toml`] in hexadecimal: what was flown, in 64 characters.
+    /// Returns the SHA-256 of [`Scenario::resolved_toml`] in hexadecimal, 64 characters: the identity of a flight.
     #[must_use]
     pub fn sha256_hex(&self) -> String {
         Sha256::digest(self.resolved_toml()).iter().fold(String::with_capacity(64), |mut hex, byte| {
@@ -108,7 +108,7 @@ impl From<&Scenario> for Document {
             plant: PlantTable { kind: scenario.plant },
             time: scenario.time,
             arrival: scenario.arrival,
-            breathing: scenario.breathing,
+            deadlock: scenario.deadlock,
             sensing: scenario.sensing,
             network: scenario.network.clone(),
             actuation: scenario.actuation,
@@ -119,13 +119,13 @@ impl From<&Scenario> for Document {
     }
 }
 
-/// Slots are in the order in which vehicles were assigned to them.
+/// Returns the assignment; slots are already in the order of their vehicles.
 fn placement(leg: &Leg) -> Placement {
     let assignment = if leg.interchangeable { Assignment::WhenStalled } else { Assignment::Given };
     Placement { assignment, ..Placement::default() }
 }
 
-/// One number if all are the same, otherwise the list.
+/// Returns one number if all are equal, otherwise the list.
 fn per_vehicle(numbers: &[f64]) -> PerVehicle {
     match numbers {
         [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => PerVehicle::All(*first),
@@ -152,7 +152,7 @@ fn write_document(out: &mut String, document: &Table) -> fmt::Result {
     Ok(())
 }
 
-/// Writes the keys of a table, those of a choice after it.
+/// Writes the keys of a table, then those of its choice.
 fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
     for (key, value) in table {
         match value {
@@ -173,7 +173,7 @@ fn write_keys(out: &mut String, table: &Table) -> fmt::Result {
     Ok(())
 }
 
-/// A value in one line; a number as the shortest decimal that reads back to the same bits.
+/// Formats a value in one line; a number as the shortest decimal with the same bits.
 fn inline(value: &Value) -> String {
     match value {
         Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),

@@ -20,7 +20,7 @@ const DEFAULT_KINDS: [(&str, &str); 3] =
 
 static SCHEMA: LazyLock<Value> = LazyLock::new(generate);
 
-/// The JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
+/// Returns the JSON Schema of the scenario file, with descriptions, units, bounds and defaults.
 #[must_use]
 pub fn schema() -> Value {
     SCHEMA.clone()
@@ -36,7 +36,7 @@ fn generate() -> Value {
             }
         }
     }
-    // The name of `[laws.NAME]` is the kind where none is given.
+    // NAME of `[laws.NAME]` is the kind unless one is given.
     if let Some(law) = schema["$defs"]["OtherLaw"].as_object_mut()
         && let Some(mut kinds) = law.remove("oneOf")
     {

@@ -1,4 +1,4 @@
-//! Where a scenario comes from.
+//! Sources of a scenario: built-in scenarios, files, standard input and text in memory.
 
 use std::fs::File;
 use std::io::Read;
@@ -13,14 +13,14 @@ use super::text::Override;
 use super::text::Text;
 use super::{build, builtin, template};
 
-/// Largest scenario file that is read \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge
-/// each. Reading takes about 45 times the length of the file in memory.
+/// Size limit of a scenario file \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge each.
+/// Reading takes about 45 times the size of the file in memory.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
-/// What standard input is called in messages.
+/// Name of standard input in messages.
 const STANDARD_INPUT: &str = "standard input";
 
-/// Where the text of a scenario comes from.
+/// Source of the text of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A built-in scenario, by name.
@@ -29,29 +29,29 @@ pub enum Source {
     File(PathBuf),
     /// TOML in memory.
     Text {
-        /// What to call it in messages.
+        /// Name in messages.
         name: String,
         /// The TOML.
         text: String,
     },
-    /// TOML in memory that was a file's, whose paths count from a folder.
+    /// TOML in memory, read from a file; paths in it are relative to a folder.
     Embedded {
-        /// What to call it in messages.
+        /// Name in messages.
         name: String,
         /// The TOML.
         text: String,
-        /// The folder.
+        /// Folder that paths are relative to.
         folder: PathBuf,
     },
 }
 
 impl Source {
-    /// The built-in scenario of this name, or else the file at this path; standard input, which is read to its end, for
-    /// `-`.
+    /// Returns the built-in scenario with this name, or else the file at this path; `-` reads standard input to its
+    /// end.
     ///
     /// # Errors
-    /// [`ScenarioError`] when it is none of them: a word without `.` or a separator of paths, and no such file; or when
-    /// standard input cannot be read.
+    /// [`ScenarioError`] for a word without `.` or path separator that is neither, and if standard input cannot be
+    /// read.
     pub fn resolve(name_or_path: &str) -> Result<Self, ScenarioError> {
         if name_or_path == "-" {
             return Ok(Self::Text { name: STANDARD_INPUT.to_owned(), text: read(STANDARD_INPUT, std::io::stdin())? });
@@ -66,7 +66,7 @@ impl Source {
         Err(unknown_builtin(name_or_path))
     }
 
-    /// The folder that paths in a scenario count from: the file's own, or else where the program runs.
+    /// Returns the folder that paths in the scenario are relative to: that of the file, or else the current folder.
     #[must_use]
     pub fn folder(&self) -> &Path {
         match self {
@@ -76,10 +76,10 @@ impl Source {
         }
     }
 
-    /// What it is called and its text.
+    /// Returns the name and the text.
     ///
     /// # Errors
-    /// [`ScenarioError`] where it cannot be read.
+    /// [`ScenarioError`] if the source cannot be read.
     pub fn text(&self) -> Result<(String, String), ScenarioError> {
         match self {
             Self::Builtin(name) => {
@@ -92,13 +92,12 @@ impl Source {
 }
 
 impl Scenario {
-    /// Reads, completes and checks a scenario. One without a name has that of its file, in which what a name may not hold
-    /// becomes `-`.
+    /// Reads, builds and validates a scenario. Without a name, it takes that of its file; `-` replaces characters that
+    /// a name may not contain.
     ///
     /// # Errors
-    /// [`ScenarioError`] when the source cannot be read, is not TOML, has a key that is unknown, missing or of the
-    /// wrong type, or says something that cannot be flown (see [`Scenario::validate`]). It names the place, in the
-    /// text or in an override.
+    /// [`ScenarioError`] with its place in the text or in an override. Causes: the source cannot be read or is not
+    /// TOML; a key is unknown, missing or of the wrong type; the scenario is invalid (see [`Scenario::validate`]).
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
         let text = Text { name: &name, toml: &text, overrides };
@@ -106,7 +105,7 @@ impl Scenario {
     }
 }
 
-/// Reads the keys of a text, whose paths count from a folder.
+/// Reads the keys of a text, with paths relative to a folder.
 pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, ScenarioError> {
     let mut document = text.decode()?;
     document.vehicle.found_from(folder).map_err(|error| text.place(error))?;
@@ -114,7 +113,7 @@ pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, Scenar
     Ok(document)
 }
 
-/// Completes and checks what was read from a text.
+/// Builds and validates the scenario of a document.
 pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario, ScenarioError> {
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
@@ -124,7 +123,7 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
     Ok(scenario)
 }
 
-/// Finds the files that shapes of the scenario and its reference name, from a folder.
+/// Resolves the files of shapes and of the reference relative to a folder.
 fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
     super::formation::found_from(folder, &mut document.formation.shape)?;
     if let Some(reference) = &mut document.reference {
@@ -145,12 +144,12 @@ fn unknown_builtin(name: &str) -> ScenarioError {
         .with_help(suggest(name, &names))
 }
 
-/// What a name may not hold becomes `-`.
+/// Replaces characters that a name may not contain by `-`.
 fn as_name(text: &str) -> String {
     text.chars().take(MAX_NAME_CHARS).map(|c| if may_be_in_a_name(c) { c } else { '-' }).collect()
 }
 
-/// The text of a file that is small enough and UTF-8.
+/// Reads a UTF-8 file of at most [`MAX_FILE_BYTES`].
 fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
@@ -168,15 +167,15 @@ fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
         .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
 }
 
-/// What a source, shown by this name, holds to its end: not too much, and UTF-8.
+/// Reads a source to its end, as UTF-8 of at most [`MAX_FILE_BYTES`]; `shown` is its name in messages.
 fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     let mut bytes = Vec::new();
-    // A device or a pipe does not say how long it is.
+    // The size of a device or a pipe is unknown in advance.
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
             .coded("scenario/too-large")
-            .with_help("no scenario is that long: is it the right file?"));
+            .with_help("name a smaller file"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();

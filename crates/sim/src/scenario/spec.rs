@@ -1,4 +1,4 @@
-//! A complete flight as plain data.
+//! [`Scenario`]: a complete flight as plain data.
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, Law, LawContext, LawSpec, ParameterError, WindExposure};
 use tautline_laws::observation::Observation;
 use tautline_laws::space::{Metric, Obstacle};
-use tautline_laws::target::{Arrival, Breathing, Guidance, Leg, Reference, Target};
+use tautline_laws::target::{Arrival, DeadlockOptions, Guidance, Leg, Reference, Target};
 use tautline_laws::wind::{Wind, WindSpec};
 
 /// Default mass of a vehicle \[kg\].
@@ -25,13 +25,13 @@ pub const DEFAULT_HULL_RADIUS_M: f64 = 0.25;
 /// A complete flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
-    /// Name: letters, digits, `-` and `_`; it names the run's folder.
+    /// Name of the scenario and of the folder of its runs: letters, digits, `-` and `_`.
     pub name: String,
     /// Positions \[m\] and velocities \[m/s\] at time 0.
     pub start: Swarm,
-    /// What kind of body each vehicle is; [`Scenario::set_airframe`] changes what depends on it too.
+    /// Model of the vehicles; [`Scenario::set_airframe`] also changes the fields that depend on it.
     pub airframe: Airframe,
-    /// Whether the swarm lives in the plane z = 0 or in space.
+    /// Plane z = 0, or all three axes.
     pub space: Space,
     /// Mass of each vehicle \[kg\].
     pub mass_kg: Vec<f64>,
@@ -41,61 +41,60 @@ pub struct Scenario {
     pub a22_per_s: f64,
     /// Drag of a point over its mass, linear in the velocity of the air past it \[1/s\].
     pub drag_per_s: f64,
-    /// What blows.
+    /// Wind.
     pub wind: WindSpec,
-    /// The formations to be reached, one after the other and at least one, up to a rigid motion for laws that control
-    /// distances only.
+    /// Formations of the flight, in order, at least one. Laws that control distances reach them up to a rigid motion.
     pub legs: Vec<Leg>,
-    /// Solids at rest that are in the way.
+    /// Obstacles at rest.
     pub obstacles: Vec<Obstacle>,
-    /// The motion that formations are carried along with, and who knows it; a formation without one is reached wherever it
-    /// comes to be.
+    /// Motion that carries the formations, and the vehicles that know it. A formation without a reference may be
+    /// reached anywhere.
     pub reference: Option<Guidance>,
-    /// Which vehicles sense each other.
+    /// Pairs of vehicles that sense each other.
     pub graph: Graph,
     /// The control law and its parameters.
     pub law: LawSpec,
-    /// Safety distance delta \[m\] that the audit judges by, whatever the law: the width of what must stay empty around a vehicle.
+    /// Safety distance delta \[m\] of the audit: the width of the space around a vehicle that must stay empty.
     pub delta_m: f64,
-    /// The shape of that.
+    /// Shape of that space.
     pub safety: Safety,
-    /// The body that carries out the commands.
+    /// Equations of motion that are solved.
     pub plant: PlantSpec,
     /// Duration and rates.
     pub time: TimeSpec,
-    /// What counts as reached.
+    /// Criteria of a reached formation.
     pub arrival: Arrival,
-    /// When slots are spread to let vehicles past each other, under laws that allow it.
-    pub breathing: Breathing,
-    /// What vehicles measure.
+    /// Deadlock recovery, under laws that support it.
+    pub deadlock: DeadlockOptions,
+    /// Measurements by the vehicles.
     pub sensing: SensingSpec,
-    /// What they hear of each other.
+    /// Messages between the vehicles.
     pub network: NetworkSpec,
-    /// How commands become accelerations.
+    /// Conversion of commands into accelerations.
     pub actuation: ActuationSpec,
-    /// Vehicles of which a part fails.
+    /// Vehicles with a failed part.
     pub failures: Vec<Failure>,
-    /// Seed of every random number that is drawn in flight.
+    /// Seed of all random numbers in flight.
     pub noise_seed: u64,
 }
 
-/// What must stay empty around a vehicle, delta wide.
+/// Space around a vehicle that must stay empty, delta wide.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub enum Safety {
-    /// A ball of half of `law.delta_m`.
+    /// A ball with the diameter `law.delta_m`.
     #[default]
     Ball,
     /// An upright ellipsoid. Separation above and below counts for more, for example because of downwash.
     Ellipsoid {
-        /// Half axes in m. The two level ones are the same, and `law.delta_m`, if given, is twice that.
+        /// Half axes in m. The two horizontal ones are equal; `law.delta_m`, if given, is twice that.
         #[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
         half_axes_m: [f64; 3],
     },
 }
 
-/// The space that a swarm lives in.
+/// Space of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     /// The plane z = 0, kept exactly: translation along z is locked.
@@ -105,7 +104,7 @@ pub enum Space {
 }
 
 impl Space {
-    /// Number of its axes.
+    /// Returns the number of axes.
     #[must_use]
     pub fn dimensions(self) -> usize {
         match self {
@@ -115,20 +114,20 @@ impl Space {
     }
 }
 
-/// Which plant flies.
+/// Plant that moves the vehicles.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantSpec {
-    /// Rapier rigid bodies, the command held over each step.
+    /// Rigid bodies of the physics engine Rapier, under a command that is held over each step.
     #[default]
     Rapier,
-    /// The equation p'' = a22 v + u solved to 12 digits in continuous time: what Rapier is measured against.
+    /// The equation p'' = a22 v + u, solved to 12 digits in continuous time; a reference for Rapier.
     Ideal,
 }
 
 impl Scenario {
-    /// A flight with the defaults of the scenario file: the edge-tension law on the complete graph, in the plane if start
-    /// and formation lie in it. Change the fields as needed, then [`Scenario::validate`].
+    /// Returns a flight with the defaults of the scenario file: the edge-tension law on the complete graph, in the
+    /// plane if start and formation lie in it. Call [`Scenario::validate`] after changing fields.
     #[must_use]
     pub fn new(name: &str, start: Swarm, formation: Formation, delta_m: f64, duration_s: f64) -> Self {
         let count = start.count();
@@ -150,7 +149,7 @@ impl Scenario {
             plant: PlantSpec::Rapier,
             time: TimeSpec::lasting(duration_s),
             arrival: Arrival::default(),
-            breathing: Breathing::default(),
+            deadlock: DeadlockOptions::default(),
             sensing: SensingSpec::default(),
             network: NetworkSpec::default(),
             actuation: ActuationSpec::default(),
@@ -163,30 +162,29 @@ impl Scenario {
         }
     }
 
-    /// Whether the physics engine moves the vehicles: on straight lines within steps, and off what they hit.
+    /// Returns whether the physics engine moves the vehicles: along straight lines within a step, with contacts.
     #[must_use]
     pub fn has_engine(&self) -> bool {
         matches!((&self.airframe, self.plant), (Airframe::Point | Airframe::Quadrotor(_), PlantSpec::Rapier))
     }
 
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {
         self.start.count()
     }
 
-    /// The formation of the first leg; one without slots where there is no leg, which a validated scenario has.
+    /// Returns the formation of the first leg; without legs, which validation refuses, a formation without slots.
     #[must_use]
     pub fn formation(&self) -> &Formation {
         static NOWHERE: LazyLock<Formation> = LazyLock::new(|| Formation::line(0, 1.0));
         self.legs.first().map_or(&NOWHERE, |leg| &leg.formation)
     }
 
-    /// The law that this scenario asks for, ready to fly.
+    /// Returns the law, ready to fly.
     ///
     /// # Errors
-    /// [`ParameterError`] when the law does not exist for these parameters, which a validated scenario rules out, or
-    /// its memory cannot be had.
+    /// [`ParameterError`] if the parameters give no law, which validation rules out, or if memory cannot be allocated.
     pub fn law(&self) -> Result<Box<dyn Law>, ParameterError> {
         let guidance = self.reference.as_ref();
         let later = self.legs.get(1..).unwrap_or_default();
@@ -195,7 +193,7 @@ impl Scenario {
             wind: &self.wind,
             drag_per_s: self.drag_per_s,
             until_s: self.time.duration_s,
-            resolution_m: self.told_apart_m(),
+            resolution_m: self.smallest_resolved_m(),
         });
         self.law.build(&LawContext {
             later,
@@ -207,14 +205,13 @@ impl Scenario {
         })
     }
 
-    /// What a vehicle's own velocity accelerates it by, a22 less the drag of the air \[1/s\]: with the wind W,
-    /// p'' = (a22 - drag) v + u + drag W.
+    /// Returns a22 less the drag of the air \[1/s\]: in the wind W, p'' = (a22 - drag) v + u + drag W.
     #[must_use]
     pub fn velocity_coefficient_per_s(&self) -> f64 {
         self.a22_per_s - self.drag_per_s
     }
 
-    /// The lengths that distances between vehicles are judged in, of which delta is one: metres for balls.
+    /// Returns the metric of separations, in which the safety distance is delta: Euclidean for balls.
     #[must_use]
     pub fn metric(&self) -> Metric {
         match self.safety {
@@ -225,7 +222,7 @@ impl Scenario {
         }
     }
 
-    /// Half axes of the ellipsoid that must stay empty around a vehicle \[m\]; none for a ball.
+    /// Returns the half axes of the ellipsoid that must stay empty around a vehicle \[m\]; `None` for a ball.
     #[must_use]
     pub fn half_axes_m(&self) -> Option<[f64; 3]> {
         match self.safety {
@@ -236,25 +233,25 @@ impl Scenario {
         }
     }
 
-    /// The wind at time 0, as it blows in flight.
+    /// Returns the wind at time 0.
     #[must_use]
     pub fn air(&self) -> Wind {
         Wind::new(&self.wind, self.count(), self.noise_seed)
     }
 
-    /// Where the reference is at a time of the flight \[s\]; at rest at the origin where there is none.
+    /// Returns the reference at a time of the flight \[s\]; at rest at the origin without one.
     #[must_use]
     pub fn reference_at(&self, time_s: f64) -> Reference {
         self.reference.as_ref().map_or_else(Reference::at_rest, |guidance| guidance.motion.at(time_s))
     }
 
-    /// What a law is told of a true state at the beginning of the first leg, by sensors and radio without fault.
+    /// Returns the observation of a true state at the beginning of the first leg, without imperfections.
     #[must_use]
     pub fn observation<'a>(&'a self, swarm: &'a Swarm) -> Observation<'a> {
         self.observation_at(swarm, 0.0)
     }
 
-    /// The same at a time of the first leg \[s\].
+    /// Returns the observation of a true state at a time of the first leg \[s\], without imperfections.
     #[must_use]
     pub fn observation_at<'a>(&'a self, swarm: &'a Swarm, time_s: f64) -> Observation<'a> {
         let exact = Observation::exact(swarm, &self.graph, self.formation());

@@ -1,4 +1,4 @@
-//! Start positions from a shape and from random numbers.
+//! Start positions of shapes and random starts.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
@@ -11,13 +11,13 @@ use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::space::Spaced;
 
-/// Smallest distance of random positions unless given, as a multiple of delta.
+/// Default smallest separation of random positions, as a multiple of delta.
 const DEFAULT_SEPARATION: f64 = 1.5;
 
-/// Random positions tried for one vehicle before the square or cube is called full.
+/// Number of random positions tried for a vehicle before an error.
 const TRIES: u32 = 1000;
 
-/// Positions \[m\] of a shape.
+/// Returns the positions \[m\] of a shape.
 pub(super) fn positions(
     shape: &StartShape,
     count: usize,
@@ -34,7 +34,7 @@ pub(super) fn positions(
             let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
             if min_separation_m <= delta_m {
                 return Err(ScenarioError::new(format!(
-                    "a smallest separation of {min_separation_m} m is not more than delta = {delta_m} m"
+                    "the smallest separation must be more than delta = {delta_m} m, got {min_separation_m} m"
                 ))
                 .coded("scenario/within-delta")
                 .with_help("enlarge start.min_separation_m or reduce law.delta_m")
@@ -57,7 +57,7 @@ pub(super) fn jitter(positions_m: &mut Rows, jitter_m: f64, space: Space, random
     }
 }
 
-/// Puts the vehicles into a random order, every one as likely as any other, each with its position and velocity.
+/// Puts the vehicles into a uniformly random order, each with its position and velocity.
 pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
     for last in (1..swarm.count()).rev() {
         let other = below(last as u64 + 1, random);
@@ -66,11 +66,11 @@ pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
     }
 }
 
-/// Uniform positions \[m\], `count` x 3 within `half_extent_m` of the origin along each axis, drawn one after the other,
-/// each again until it is at least `min_separation_m` from those before it.
+/// Returns uniform positions \[m\], `count` x 3 within `half_extent_m` of the origin along each axis. Positions are
+/// drawn in order; each is drawn again until it is at least `min_separation_m` from those before it.
 ///
 /// # Errors
-/// [`ScenarioError`] where no place was found for a vehicle in many tries.
+/// [`ScenarioError`] if no position was found for a vehicle in [`TRIES`] tries.
 pub fn scatter(
     count: usize,
     space: Space,
@@ -97,20 +97,20 @@ pub fn scatter(
     Ok(positions_m)
 }
 
-/// Uniform in the square or cube of half side `half_extent_m` around the origin.
+/// Returns a uniform point in the square or cube with half side `half_extent_m` around the origin.
 pub fn offset(half_extent_m: f64, space: Space, random: &mut ChaCha8Rng) -> Vector3<f64> {
     let mut along = || half_extent_m * (2.0 * unit(random) - 1.0);
     let (x, y) = (along(), along());
     Vector3::new(x, y, if space == Space::Volume { along() } else { 0.0 })
 }
 
-/// The random numbers of a seed.
+/// Returns the random generator of a seed.
 #[must_use]
 pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// A whole number below `end`, each as likely as any other: words that would favour the smaller ones are drawn again.
+/// Returns a uniform integer below `end`; words that would bias the result are drawn again.
 #[expect(clippy::cast_possible_truncation, reason = "it is below a number of vehicles")]
 pub(super) fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
     let fair = u64::MAX - u64::MAX % end;
@@ -122,7 +122,7 @@ pub(super) fn below(end: u64, random: &mut ChaCha8Rng) -> usize {
     }
 }
 
-/// Uniform in \[0, 1), a multiple of 2^-53.
+/// Returns a uniform number in \[0, 1), a multiple of 2^-53.
 pub(super) fn unit(random: &mut ChaCha8Rng) -> f64 {
     const SCALE: f64 = 1.0 / (1_u64 << 53) as f64;
     (random.next_u64() >> 11) as f64 * SCALE

@@ -1,4 +1,4 @@
-//! A scenario file as the pattern of many flights: under other laws, from other starts.
+//! Templates: a scenario file from which many flights are made, under other laws or from other starts.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -17,9 +17,8 @@ use super::text::Override;
 use super::text::Text;
 use tautline_laws::law::LawSpec;
 
-/// A scenario file that has been read and found right, to be flown many times: [`Template::scenario`] makes each flight from
-/// the file anew, so that whatever depends on the law or the start (an assignment, the step) is that of a file which
-/// says so itself.
+/// Validated scenario file from which many flights are made. [`Template::scenario`] builds each flight from the file,
+/// so that values that depend on the law or the start (assignment, step) are derived anew.
 #[derive(Clone, Debug)]
 pub struct Template {
     name: String,
@@ -31,35 +30,35 @@ pub struct Template {
     laws: Vec<(String, LawSpec)>,
 }
 
-/// A law to be flown, under the name that it has in a comparison.
+/// Law of a comparison, with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedLaw {
-    /// That of its kind, or of its table `[laws.NAME]`.
+    /// Name: that of its kind, or of its table `[laws.NAME]`.
     pub name: String,
-    /// The law and its keys, with nothing left to be derived.
+    /// Law with all keys, defaults included.
     pub law: LawSpec,
 }
 
 impl NamedLaw {
-    /// The name of its kind.
+    /// Returns the name of its kind.
     #[must_use]
     pub fn kind(&self) -> String {
         kind(&self.law)
     }
 
-    /// The overrides that fly it, one for its kind and one for each key.
+    /// Returns the overrides that select the law: one for its kind and one for each key.
     #[must_use]
     pub fn overrides(&self) -> Vec<String> {
         law_overrides(&self.law)
     }
 }
 
-/// What is drawn for one flight.
+/// Random draw of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
-    /// In the place of `start.seed`, and where the flight is random, of `noise.seed`.
+    /// Replaces `start.seed`, and `noise.seed` if the flight is random.
     pub seed: u64,
-    /// In the place of `start.jitter_m` \[m\], where given.
+    /// Replaces `start.jitter_m` \[m\], if given.
     pub jitter_m: Option<f64>,
 }
 
@@ -81,31 +80,31 @@ impl Template {
         Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), folder, name, toml })
     }
 
-    /// The scenario as the file has it.
+    /// Returns the unchanged scenario of the file.
     #[must_use]
     pub fn own(&self) -> &Scenario {
         &self.own
     }
 
-    /// Whether another seed gives another start.
+    /// Returns whether the start depends on its seed.
     #[must_use]
     pub fn start_is_random(&self) -> bool {
         self.start_is_random
     }
 
-    /// Whether another seed of noise gives another flight.
+    /// Returns whether the flight depends on the seed of noise.
     #[must_use]
     pub fn flight_is_random(&self) -> bool {
         self.own.is_random_in_flight()
     }
 
-    /// The file's own law.
+    /// Returns the law of the file.
     #[must_use]
     pub fn own_law(&self) -> NamedLaw {
         NamedLaw { name: kind(&self.own.law), law: self.own.law.clone() }
     }
 
-    /// Names of all laws that can be flown: those of `[laws.NAME]`, then every kind that is not among them.
+    /// Returns the names of all available laws: those of `[laws.NAME]`, then the kinds that are not among them.
     #[must_use]
     pub fn law_names(&self) -> Vec<String> {
         let named: Vec<_> = self.laws.iter().map(|(name, _)| name.clone()).collect();
@@ -113,17 +112,18 @@ impl Template {
         named.into_iter().chain(kinds).collect()
     }
 
-    /// Names of the laws that are compared where none are named: those of `[laws.NAME]`, and where there are none, every kind.
+    /// Returns the names of the laws to compare by default: those of `[laws.NAME]`, or else every kind.
     #[must_use]
     pub fn compared(&self) -> Vec<String> {
         let listed: Vec<_> = self.laws.iter().map(|(name, _)| name.clone()).collect();
         if listed.is_empty() { self.law_names() } else { listed }
     }
 
-    /// The law of `[laws.NAME]`; else the file's own, if that is its kind; else the law of this kind with its default keys.
+    /// Returns the law of `[laws.NAME]`; else that of the file, if its kind has this name; else the law of this kind
+    /// with default keys.
     ///
     /// # Errors
-    /// [`ScenarioError`] where there is no law of that name.
+    /// [`ScenarioError`] if no law has this name.
     pub fn law(&self, name: &str) -> Result<NamedLaw, ScenarioError> {
         let listed = self.laws.iter().find(|(listed, _)| listed == name).map(|(_, law)| law.clone());
         let own = || (kind(&self.own.law) == name).then(|| self.own.law.clone());
@@ -131,21 +131,18 @@ impl Template {
         let Some(law) = listed.or_else(own).or_else(default) else {
             let known = self.law_names();
             let known: Vec<_> = known.iter().map(String::as_str).collect();
-            let help = format!(
-                "{}; a law of another name has its kind and its keys in a table [laws.NAME] of the scenario",
-                suggest(name, &known)
-            );
-            return Err(ScenarioError::new(format!("there is no law named `{name}`"))
+            let help = format!("{}; give other names in tables [laws.NAME] of the scenario", suggest(name, &known));
+            return Err(ScenarioError::new(format!("no law has the name `{name}`"))
                 .coded("scenario/unknown-choice")
                 .with_help(help));
         };
         Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
     }
 
-    /// The scenario under this law, from this start.
+    /// Returns the scenario under a law, from a drawn start.
     ///
     /// # Errors
-    /// [`ScenarioError`] where that cannot be flown, such as a start of two vehicles too near each other.
+    /// [`ScenarioError`] if that scenario is invalid, for example because two starts are within delta.
     pub fn scenario(&self, law: &NamedLaw, draw: Draw) -> Result<Scenario, ScenarioError> {
         let text = Text { name: &self.name, toml: &self.toml, overrides: &self.overrides };
         let mut document = decoded(&text, &self.folder)?;
@@ -164,10 +161,10 @@ fn is_random(document: &Document) -> bool {
     shuffle || jitter_m != 0.0 || matches!(document.start.shape, Some(StartShape::Random { .. }))
 }
 
-/// `[laws.NAME]` by name.
+/// Tables `[laws.NAME]` by name.
 pub(super) type Laws = BTreeMap<String, OtherLaw>;
 
-/// A law beside that of `[law]`, flown by `tautline compare` alone: the keys of its kind.
+/// Law of `[laws.NAME]`, which only `tautline compare` flies: the keys of its kind.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OtherLaw {
@@ -175,21 +172,21 @@ pub(super) struct OtherLaw {
     pub(super) kind: LawSpec,
 }
 
-/// The name of a law's kind, as `law.kind` gives it.
+/// Returns the name of the kind of a law, as in `law.kind`.
 pub(super) fn kind(law: &LawSpec) -> String {
     keys(law).0
 }
 
-/// What sets a law in a scenario, whatever it says: an override for its kind and for each of its keys.
+/// Returns the overrides that select a law in any scenario: one for its kind and one for each key.
 pub(super) fn law_overrides(law: &LawSpec) -> Vec<String> {
     let (kind, keys) = keys(law);
     let of_kind = format!("law.kind={kind}");
     std::iter::once(of_kind).chain(keys.iter().map(|(key, value)| format!("law.{key}={value}"))).collect()
 }
 
-/// The kind of a law and its keys.
+/// Returns the kind of a law and its keys.
 fn keys(law: &LawSpec) -> (String, Table) {
-    // Every law has a form in TOML: a table with the name of its kind, which holds its keys.
+    // A law serializes to a table with one entry: its kind, with the keys as value.
     let choice = Table::try_from(law).unwrap_or_default().into_iter().next();
     choice.map_or_else(Default::default, |(kind, keys)| match keys {
         Value::Table(keys) => (kind, keys),
@@ -197,16 +194,16 @@ fn keys(law: &LawSpec) -> (String, Table) {
     })
 }
 
-/// Checks the laws of a file, whether they are flown or not; what is wrong comes with the law's name.
+/// Checks all laws of a file; an error comes with the name of its law.
 pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
     let kinds: Vec<_> = LawSpec::all().iter().map(kind).collect();
     for (name, OtherLaw { kind: law }) in laws {
         check_name(name).map_err(|error| (&**name, error))?;
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
-            let error = ScenarioError::new(format!("the law named {name} is of the kind {kind}"))
+            let error = ScenarioError::new(format!("the law {name} has the name of a kind, but is of the kind {kind}"))
                 .coded("scenario/name")
-                .with_help("give it a name that is no kind of law")
+                .with_help("give it a name that is not a kind of law")
                 .at("law.kind");
             return Err((name, error));
         }
@@ -217,7 +214,7 @@ pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
 fn check_name(name: &str) -> Result<(), ScenarioError> {
     let help = format!("use 1 to {MAX_NAME_CHARS} letters, digits, `-` and `_`");
     let said = match name.chars().find(|&c| !may_be_in_a_name(c)) {
-        Some(c) => format!("the name of a law holds {c:?}"),
+        Some(c) => format!("the name of a law contains {c:?}"),
         None if name.is_empty() => "the name of a law is empty".to_owned(),
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
         None => return Ok(()),

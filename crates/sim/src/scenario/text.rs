@@ -1,7 +1,7 @@
-//! A scenario's text with its overrides, and the way back from a value to its place.
+//! Text of a scenario with its overrides, and the mapping from values to places in the text.
 //!
-//! Spans live in one address space: the file's bytes first, then each override's. A value therefore knows where it was
-//! written, whichever text that was.
+//! Spans share one address space: the bytes of the file, then those of each override. A span therefore identifies the
+//! text that holds a value.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use super::check::conform;
 use super::document::{Document, Given};
 use super::error::{Field, Place, ScenarioError};
 
-/// Keys that give a missing key its value, in order: an error at one of these keys stands where its value comes from.
+/// Keys from which a missing key takes its value, in order. An error about the missing key is placed at one of these.
 const ORIGINS: [(&str, &[&str]); 7] = [
     (
         "start.positions_m",
@@ -40,7 +40,7 @@ const ORIGINS: [(&str, &[&str]); 7] = [
     ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
 ];
 
-/// A named text and the overrides on top of it.
+/// Named text with overrides.
 pub(super) struct Text<'a> {
     pub(super) name: &'a str,
     pub(super) toml: &'a str,
@@ -48,7 +48,7 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Reads the keys of the scenario, without those of a choice that an override has left.
+    /// Reads the keys of the scenario. Drops keys of a choice that an override has replaced.
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
         let mut root = self.tree()?;
         if root.get_ref().as_table().is_some_and(Map::is_empty) {
@@ -71,8 +71,7 @@ impl<'a> Text<'a> {
         Ok(Document { given, ..document })
     }
 
-    /// Gives an error about keys its place in the text: at the first key that an override touched, or else at the
-    /// first key.
+    /// Adds the place in the text to an error about keys: the first key that an override sets, or else the first key.
     pub(super) fn place(&self, error: ScenarioError) -> ScenarioError {
         let (None, Ok(root)) = (error.place(), self.tree()) else { return error };
         let spans = error.fields().iter().map(|field| find(&root, field, self.toml.len() + 1));
@@ -88,7 +87,7 @@ impl<'a> Text<'a> {
         }
     }
 
-    /// Gives an error about a law of `[laws.NAME]` its place: at the key, or else at the law's table.
+    /// Adds the place to an error about a law of `[laws.NAME]`: its key, or else its table.
     pub(super) fn place_in_law(&self, law: &str, error: ScenarioError) -> ScenarioError {
         let Ok(root) = self.tree() else { return error };
         let Some((name, keys)) = laws(&root).and_then(|laws| laws.get_key_value(law)) else { return error };
@@ -101,7 +100,7 @@ impl<'a> Text<'a> {
     /// Returns the text as a tree with its overrides applied.
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
-            ScenarioError::new(format!("this is not TOML: {}", error.message()))
+            ScenarioError::new(format!("the text is not TOML: {}", error.message()))
                 .coded("scenario/syntax")
                 .with_help("a scenario is `key = value` lines below `[table]` headers")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
@@ -136,8 +135,8 @@ fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
     root.get_ref().get("laws")?.get_ref().as_table()
 }
 
-/// Returns the span of a field's value: of its entry if it is a list, of what it comes from if it is not there, of its
-/// table if nothing is. A part of it that was overridden, with a span from `overridden` on, stands for all of it.
+/// Returns the span of the value of a field, or of its entry in a list. A missing key has the span of its origin, or
+/// else of its table. An overridden part, with a span from `overridden` on, replaces the whole.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
     let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
@@ -157,7 +156,7 @@ fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<
     first_span_from(value, overridden).unwrap_or_else(|| value.span())
 }
 
-/// Returns the first span within a list, or of the value, that starts at `least` or later.
+/// Returns the span of the value, or of the first part of a list, that starts at `least` or later.
 fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<usize>> {
     if value.span().start >= least {
         return Some(value.span());
@@ -165,17 +164,16 @@ fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<u
     value.get_ref().as_array()?.iter().find_map(|entry| first_span_from(entry, least))
 }
 
-/// What the text of an override is called in messages.
+/// Name of the text of an override in messages.
 const SOURCE: &str = "--set";
 
-/// One key of the scenario set to another value, whatever the file says.
+/// Override: a key of the scenario set to another value.
 ///
-/// The path is dotted: `law.delta_m=1.5`. Keys and tables that the file does not have are made:
-/// `plant.kind=ideal`. Entries of a list are counted from 1, as vehicles are, and `x`, `y`, `z` are other names
-/// for 1, 2, 3: `start.positions_m.4.x=-1` moves vehicle 4. The value is TOML, and a bare word is a string. A whole
-/// table is replaced by an inline table: `formation={shape="circle", radius_m=3}`. Another `kind` or `shape` leaves the
-/// keys behind that it does not have: `law.kind=laplacian` is enough where the file gives `law.alpha`. The
-/// JSON Schema lists the keys of each `kind` and `shape`.
+/// The path is dotted: `law.delta_m=1.5`. Missing keys and tables are created: `plant.kind=ideal`. Entries of lists are
+/// counted from 1, as vehicles are; `x`, `y`, `z` stand for 1, 2, 3: `start.positions_m.4.x=-1` moves vehicle 4. The
+/// value is TOML; a bare word is a string. An inline table replaces a whole table: `formation={shape="circle",
+/// radius_m=3}`. A new `kind` or `shape` drops the keys that it does not have: `law.kind=laplacian` suffices if the
+/// file gives `law.alpha`. The JSON Schema lists the keys of each `kind` and `shape`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Override {
     text: String,
@@ -183,15 +181,15 @@ pub struct Override {
     value: Range<usize>,
 }
 
-/// Most parts of a path: `start.positions_m.2.x` has four.
+/// Length limit of a path; `start.positions_m.2.x` has four parts.
 const MAX_DEPTH: usize = 8;
 
 impl Override {
-    /// Reads `key.path=value`.
+    /// Parses `key.path=value`.
     ///
     /// # Errors
-    /// [`ScenarioError`] when there is no `=`, a part of the path is empty or is no key, or the value is neither TOML
-    /// nor a bare word.
+    /// [`ScenarioError`] if `=` is missing, a part of the path is not a key, or the value is neither TOML nor a bare
+    /// word.
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
         let place = |span: Range<usize>| Place::new(SOURCE, text, span);
         let Some(equals) = text.find('=') else {
@@ -214,9 +212,9 @@ impl Override {
             start += part.len() + 1;
         }
         if path.len() > MAX_DEPTH {
-            return Err(ScenarioError::new(format!("the path has {} parts", path.len()))
+            return Err(ScenarioError::new(format!("a path must have at most {MAX_DEPTH} parts, got {}", path.len()))
                 .coded("scenario/override")
-                .with_help(format!("no key of a scenario has more than {MAX_DEPTH}"))
+                .with_help("`tautline schema` lists the keys of a scenario")
                 .with_place(place(0..equals)));
         }
         let value = trimmed(text, equals + 1..text.len());
@@ -234,19 +232,18 @@ impl Override {
         }
     }
 
-    /// The override as it was written.
+    /// Returns the override as written.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The place of a span of bytes of the override.
+    /// Returns the place of a span of bytes of the override.
     pub(super) fn place(&self, span: Range<usize>) -> Place {
         Place::new(SOURCE, &self.text, span)
     }
 
-    /// Sets the key in a document, and makes it and its tables where they are not there. Spans of what is set count from
-    /// `base`.
+    /// Sets the key in a document and creates missing tables. Spans of the new value count from `base`.
     pub(super) fn apply<'a>(&'a self, root: &mut Spanned<DeValue<'a>>, base: usize) -> Result<(), ScenarioError> {
         let value = self.value().map_err(|error| self.refuse(&self.value, error.message()))?;
         let mut target = root;
@@ -259,12 +256,12 @@ impl Override {
                     table.entry(Spanned::new(span, Cow::Borrowed(name))).or_insert(below)
                 }
                 DeValue::Array(list) => {
-                    let what = format!("the list has entries 1 to {}, not {name}", list.len());
+                    let what = format!("the entry must be one of 1 to {}, got {name}", list.len());
                     let entry = self.entry(part)?.checked_sub(1).and_then(|entry| list.get_mut(entry));
                     entry.ok_or_else(|| self.refuse(part, &what))?
                 }
                 other => {
-                    let what = format!("there is nothing below a {}", other.type_str());
+                    let what = format!("a value of the type {} has no keys", other.type_str());
                     return Err(self.refuse(part, &what));
                 }
             };
@@ -273,7 +270,7 @@ impl Override {
         Ok(())
     }
 
-    /// The value, with spans from its own first byte.
+    /// Parses the value, with spans from its own first byte.
     fn value(&self) -> Result<Spanned<DeValue<'_>>, toml::de::Error> {
         let text = &self.text[self.value.clone()];
         DeValue::parse(text).or_else(|error| {
@@ -285,7 +282,7 @@ impl Override {
         })
     }
 
-    /// The number of a list's entry, from 1.
+    /// Returns the number of an entry of a list, from 1.
     fn entry(&self, segment: &Range<usize>) -> Result<usize, ScenarioError> {
         match &self.text[segment.clone()] {
             "x" => Ok(1),
@@ -305,7 +302,7 @@ impl Override {
     }
 }
 
-/// The span without white space at its ends.
+/// Shortens a span by white space at its ends.
 fn trimmed(text: &str, span: Range<usize>) -> Range<usize> {
     let part = &text[span.clone()];
     let start = span.start + (part.len() - part.trim_start().len());
@@ -316,7 +313,7 @@ fn is_word(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || c == '-'
 }
 
-/// A value with all its spans moved.
+/// Returns a value with all spans shifted.
 fn shifted(value: Spanned<DeValue<'_>>, by: usize) -> Spanned<DeValue<'_>> {
     let moved = |span: Range<usize>| span.start + by..span.end + by;
     let span = moved(value.span());

@@ -1,4 +1,4 @@
-//! Duration and rates of a flight.
+//! `[time]` of the scenario file: duration and rates of a flight.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,38 +7,39 @@ use super::limits::{MAX_HALVINGS, MAX_STEPS};
 use super::spec::Scenario;
 use tautline_laws::law::{Law, LawSpec, RateQuery};
 
-/// Numbers of a recording whose rate is not given, at most \[bytes\].
+/// Size limit of a recording whose rate is not given \[bytes of numbers\].
 const RECORDING_BYTES: f64 = (1_u64 << 30) as f64;
 
 /// Duration and rates.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSpec {
-    /// Length of the flight in s.
+    /// Duration of the flight in s.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub duration_s: f64,
-    /// Physics step in s; the law is evaluated once a step. A step that is too long for the law is flown in parts. Unless given
-    /// 1/240, and 1/500 for quadrotors, halved until its parts can be as short as the law's links require, if the law is
-    /// evaluated that often and a flight of such parts has at most 1e9.
+    /// Time step in s, with one evaluation of the law. Steps that are too long for the law are divided. Default: 1/240,
+    /// or 1/500 for quadrotors. The default is halved until `max_halvings` reaches the step that the law's links
+    /// require. It stays if the law is evaluated less often, or if the flight would have more than 1e9 substeps.
     #[serde(default = "default_dt_s")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub dt_s: f64,
-    /// Samples recorded per second of flight in Hz, at most one a step. Unless given 60, or less for a large swarm, so that its
-    /// recording holds at most 1 GiB of numbers; arrivals are still detected.
+    /// Recorded samples per second in Hz, at most one per step. Default: 60, or less for a large swarm: the recording
+    /// then holds at most 1 GiB of numbers, and arrivals are still detected.
     #[serde(default = "default_record_hz")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub record_hz: f64,
-    /// How often a step that is too long for the law, or takes more than half of a clearance, may be halved; 0 takes every
-    /// step as it is. Under `potential` the default rises up to 20, as the rate of the law at the certified distance requires.
+    /// Largest number of halvings of a step that is too long for the law or takes more than half of a clearance; 0
+    /// never divides steps. Under `potential` the default rises up to 20, as the rate of the law at the certified
+    /// distance requires.
     #[serde(default = "default_max_halvings")]
     #[schemars(range(max = 20))]
     pub max_halvings: u32,
-    /// Largest product of a step and the law's fastest rate at the present state; a step that is longer is flown in halves.
+    /// Largest product of a step and the law's fastest rate in the current state; longer steps are halved.
     #[serde(default = "default_max_rate_dt")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_rate_dt: f64,
-    /// How often the law is evaluated in Hz, at most once a step; vehicles hold each command in between, as a real
-    /// controller makes them do. Unless given, commands of points stand for continuous control, and quadrotors get 100 a
+    /// Rate in Hz at which the law is evaluated, at most once per step. Vehicles hold each command in between, as under
+    /// a digital controller. Unless given, the law of points acts in continuous time, and quadrotors get 100 commands a
     /// second.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -64,21 +65,21 @@ fn default_max_rate_dt() -> f64 {
 impl TimeSpec {
     /// Default step \[s\].
     pub const DEFAULT_DT_S: f64 = 1.0 / 240.0;
-    /// Default recording rate \[Hz\]; a scenario file of many vehicles has a lower one, which keeps its recording bounded.
+    /// Default recording rate \[Hz\]; scenario files of large swarms have a lower default.
     pub const DEFAULT_RECORD_HZ: f64 = 60.0;
-    /// Numbers of a vehicle in a sample: position, velocity and command \[bytes\].
+    /// Size of a vehicle in a sample \[bytes\]: position, velocity and command.
     pub const BYTES_PER_VEHICLE: u64 = 72;
     /// Default number of halvings.
     pub const DEFAULT_MAX_HALVINGS: u32 = 10;
 
-    /// Default of [`TimeSpec::max_rate_dt`]: it keeps the energy of second-order integration below its start to a part in a
-    /// thousand, also where vehicles bounce hard off their barriers.
+    /// Default of [`TimeSpec::max_rate_dt`]. It keeps the energy of the second-order integration below its initial
+    /// value within 0.1 %, also if vehicles bounce hard off barriers.
     pub const DEFAULT_MAX_RATE_DT: f64 = 0.3;
 
-    /// Part of a step, or of a recording period, that is rounding: two products of the same times differ by less.
+    /// Relative rounding of a step or a recording period: two products of the same times differ by less.
     const ROUNDING: f64 = 1e-6;
 
-    /// A flight of this length \[s\] with the default rates.
+    /// Returns the default rates for a duration \[s\].
     #[must_use]
     pub fn lasting(duration_s: f64) -> Self {
         Self {
@@ -91,7 +92,7 @@ impl TimeSpec {
         }
     }
 
-    /// Number of steps: the fewest that cover the duration.
+    /// Returns the number of steps: the fewest that cover the duration.
     #[must_use]
     pub fn steps(&self) -> u64 {
         let steps = (self.duration_s / self.dt_s - Self::ROUNDING).ceil().max(1.0);
@@ -100,29 +101,29 @@ impl TimeSpec {
         steps
     }
 
-    /// When a step ends \[s\]; the last ends with the flight, and is shorter where steps do not divide the duration.
+    /// Returns the end of a step \[s\]. The last step ends with the flight, so it may be shorter.
     #[must_use]
     pub fn end_s(&self, step: u64) -> f64 {
         let end_s = step as f64 * self.dt_s;
         if end_s - self.duration_s > Self::ROUNDING * self.dt_s { self.duration_s } else { end_s }
     }
 
-    /// Length of a step, from 1 \[s\].
+    /// Returns the length of a step \[s\]; steps are counted from 1.
     #[must_use]
     pub fn length_s(&self, step: u64) -> f64 {
         let (end_s, whole_s) = (self.end_s(step), step as f64 * self.dt_s);
         if end_s < whole_s { end_s - (step - 1) as f64 * self.dt_s } else { self.dt_s }
     }
 
-    /// Whether step `k` (its end) is recorded: the start, the first step at or after each recording period, and the last
-    /// step.
+    /// Returns whether the end of a step is recorded: the start, the first step at or after each recording period, and
+    /// the last step.
     #[must_use]
     pub fn records(&self, step: u64) -> bool {
         step == self.steps() || self.begins_period(step, self.record_hz)
     }
 
-    /// Number of samples that are recorded, the start among them, where no step is shorter than a recording period: else one a
-    /// step.
+    /// Returns the number of recorded samples with the start, if no step is shorter than a recording period; otherwise
+    /// one per step.
     #[must_use]
     pub fn samples(&self) -> u64 {
         let periods = (self.steps() as f64 * (self.dt_s * self.record_hz).min(1.0) + Self::ROUNDING).floor();
@@ -131,8 +132,8 @@ impl TimeSpec {
         1 + periods + u64::from(!self.begins_period(self.steps(), self.record_hz))
     }
 
-    /// Whether the law is asked at the end of step `k`: after every step, or at the first at or after each period of
-    /// `control_hz`.
+    /// Returns whether the law is evaluated at the end of a step: at every step, or at the first at or after each
+    /// period of `control_hz`.
     #[must_use]
     pub fn commands(&self, step: u64) -> bool {
         self.control_hz.is_none_or(|control_hz| self.begins_period(step, control_hz))
@@ -144,14 +145,14 @@ impl TimeSpec {
         step == 0 || periods(step) > periods(step - 1)
     }
 
-    /// What a step times the law's fastest rate may be where the flight is the law's motion: as asked, and no more than keeps its
-    /// energy.
+    /// Returns the largest product of a step and the law's fastest rate that keeps the energy: `max_rate_dt`, at most
+    /// its default.
     #[must_use]
     pub fn stable_rate_dt(&self) -> f64 {
         self.max_rate_dt.min(Self::DEFAULT_MAX_RATE_DT)
     }
 
-    /// The shortest part of a step \[s\].
+    /// Returns the length of the shortest substep \[s\].
     #[must_use]
     pub fn shortest_step_s(&self) -> f64 {
         self.dt_s * 0.5_f64.powi(i32::try_from(self.max_halvings).unwrap_or(i32::MAX))
@@ -159,7 +160,7 @@ impl TimeSpec {
 }
 
 impl Scenario {
-    /// Longest step that a law's links ask for, wherever vehicles are \[s\]. Continuous time chooses its own.
+    /// Returns the longest step that the links of a law allow at any distances \[s\]; `None` in continuous time.
     #[must_use]
     pub fn links_step_s(&self, law: &dyn Law) -> Option<f64> {
         let rate_per_s =
@@ -167,9 +168,9 @@ impl Scenario {
         (self.plant.holds_commands() && rate_per_s > 0.0).then(|| self.time.stable_rate_dt() / rate_per_s)
     }
 
-    /// Halves a step that nobody gave until it can be made as short as the links of the law ask for. It stays where shorter ones are
-    /// of no use: where the law is asked less often than that, and where a flight may not have so many parts of steps. What is wrong
-    /// with law or times is left for [`super::validate`] to refuse.
+    /// Halves the default time step until `max_halvings` reaches the step that the links of the law require. Keeps the
+    /// step if the law is evaluated less often, or if the flight would have too many substeps. Invalid laws and times
+    /// are left to [`super::validate`].
     pub(super) fn choose_step(&mut self) {
         let Ok(law) = self.law() else { return };
         let Some(needed_s) = self.links_step_s(law.as_ref()).filter(|&needed_s| needed_s > 0.0) else { return };
@@ -186,10 +187,10 @@ impl Scenario {
         }
     }
 
-    /// Raises the number of halvings until the shortest part of a step resolves the potential field at the certified distance.
+    /// Raises `max_halvings` until the shortest substep resolves the potential field at the certified distance.
     ///
-    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to the
-    /// certified distance.
+    /// The certificate assigns the whole energy of the start to one pair. Links of a large gain drive pairs close to
+    /// the certified distance.
     pub(super) fn choose_halvings(&mut self) {
         let LawSpec::Potential(_) = self.law else { return };
         let Ok(law) = self.law() else { return };
@@ -204,14 +205,14 @@ impl Scenario {
     }
 }
 
-/// Recording rate \[Hz\] that keeps the recording of so many vehicles bounded: whole hertz where that is one or more; at least
-/// two samples while an arrival is held.
+/// Returns the recording rate \[Hz\] that bounds the recording: an integer if at least 1; at least two samples while an
+/// arrival is held.
 pub(super) fn bounded_record_hz(count: usize, duration_s: f64, hold_s: f64) -> f64 {
     const SAMPLES_HELD: f64 = 2.0;
     let most_hz = RECORDING_BYTES / (TimeSpec::BYTES_PER_VEHICLE as f64 * count as f64 * duration_s);
     let bounded_hz = if most_hz >= 1.0 { most_hz.floor() } else { most_hz };
     let told_hz = if hold_s > 0.0 { SAMPLES_HELD / hold_s } else { 0.0 };
-    // A duration that is refused later on may be anything.
+    // An invalid duration, which is refused later, may give NaN.
     if bounded_hz.max(told_hz) < TimeSpec::DEFAULT_RECORD_HZ {
         bounded_hz.max(told_hz)
     } else {
@@ -252,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_ends_when_it_shall_and_its_last_step_is_what_is_left() {
+    fn a_flight_ends_at_its_duration_with_a_shorter_last_step() {
         let time = TimeSpec { dt_s: 3.0, ..TimeSpec::lasting(10.0) };
         assert_eq!((time.steps(), time.end_s(3), time.end_s(4)), (4, 9.0, 10.0));
         assert_eq!((time.length_s(3), time.length_s(4)), (3.0, 1.0));
@@ -261,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_is_asked_every_step_or_once_a_period_of_its_own() {
+    fn the_law_is_evaluated_every_step_or_once_a_control_period() {
         let time = TimeSpec { dt_s: 0.01, ..TimeSpec::lasting(1.0) };
         assert!((0..=100).all(|step| time.commands(step)));
         let held = TimeSpec { control_hz: Some(25.0), ..time };
@@ -269,13 +270,13 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_above_the_steps_records_every_step_and_no_more() {
+    fn a_rate_above_that_of_the_steps_records_every_step() {
         let time = TimeSpec { dt_s: 0.1, record_hz: 1e9, ..TimeSpec::lasting(1.0) };
         assert_eq!(recorded(time), (0..=10).collect::<Vec<_>>());
     }
 
     #[test]
-    fn rounding_adds_no_step_and_drops_none() {
+    fn rounding_neither_adds_nor_drops_a_step() {
         for dt_s in [1.0 / 240.0, 1.0 / 60.0, 0.1, 0.001, 1.0 / 3.0] {
             for steps in [1_u32, 3, 10, 999, 1_000_000] {
                 let time = TimeSpec { dt_s, ..TimeSpec::lasting(dt_s * f64::from(steps)) };

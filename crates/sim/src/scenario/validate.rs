@@ -1,4 +1,4 @@
-//! What a scenario must be for it to be flown.
+//! Validates a scenario: conditions on several keys.
 
 use nalgebra::Vector3;
 
@@ -14,31 +14,30 @@ use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
-use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg};
+use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg};
 use tautline_laws::wind::Gust;
 
-/// Rounding of a leader's place \[m\] and velocity \[m/s\] relative to those of the reference.
+/// Relative rounding of the position \[m\] and velocity \[m/s\] of a leader on the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
 
-/// Steps that a reference takes for any of its turns at least: it is followed from step to step.
+/// Smallest number of steps of a turn of the reference, which is followed step by step.
 const STEPS_A_TURN: f64 = 10.0;
 
-/// Vehicles that a message names before it counts the rest.
+/// Number of vehicles that a message names before it counts the rest.
 const NAMED_VEHICLES: usize = 8;
 
 impl Scenario {
-    /// Checks that the scenario can be flown. [`Scenario::read`] has done so; a scenario built or changed in code is
-    /// to be checked before it is flown.
+    /// Checks that the scenario can be flown. [`Scenario::read`] has done so; scenarios that are built or changed in
+    /// code must be validated.
     ///
-    /// What holds afterwards: at least two vehicles, and one row or entry for each everywhere; expected memory, steps
-    /// and magnitudes within [`MAX_MEMORY_BYTES`](super::MAX_MEMORY_BYTES), [`MAX_STEPS`](super::MAX_STEPS),
-    /// [`SMALLEST`](super::SMALLEST) and [`LARGEST`](super::LARGEST); all numbers finite;
-    /// every two starts and every two slots more than delta apart; any two hulls fit within delta; the graph
-    /// connected; z = 0 everywhere in the plane.
+    /// A valid scenario has at least two vehicles, and one row or entry per vehicle everywhere. Expected memory, steps
+    /// and magnitudes are within [`MAX_MEMORY_BYTES`](super::MAX_MEMORY_BYTES), [`MAX_STEPS`](super::MAX_STEPS),
+    /// [`SMALLEST`](super::SMALLEST) and [`LARGEST`](super::LARGEST). All numbers are finite. All pairs of starts and
+    /// of slots are more than delta apart, and two hulls fit within delta. The graph is connected. In the plane z = 0
+    /// everywhere.
     ///
     /// # Errors
-    /// [`ScenarioError`] for the first that does not hold, with the key that says so and the remedy, and without a
-    /// place in a text.
+    /// [`ScenarioError`] for the first violated condition, with its keys and the remedy, without a place in a text.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         let resolved = self.resolved_toml();
@@ -48,7 +47,7 @@ impl Scenario {
         self.check()
     }
 
-    /// Checks what depends on several keys. The schema has checked each by itself.
+    /// Checks conditions on several keys; the schema checks single keys.
     pub(super) fn check(&self) -> Result<(), ScenarioError> {
         check_name(&self.name)?;
         check_count(self.count())?;
@@ -67,7 +66,7 @@ impl Scenario {
         self.check_time()?;
         self.check_wind()?;
         self.check_arrival()?;
-        self.check_breathing()?;
+        self.check_deadlock()?;
         self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))
     }
 
@@ -75,9 +74,9 @@ impl Scenario {
         if i64::try_from(self.noise_seed).is_ok() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!("a seed of {}, which a scenario file cannot hold", self.noise_seed))
+        Err(ScenarioError::new(format!("noise.seed is too large for a scenario file, got {}", self.noise_seed))
             .coded("scenario/out-of-range")
-            .with_help(format!("it is at most {}", i64::MAX))
+            .with_help(format!("give a seed of at most {}", i64::MAX))
             .at("noise.seed"))
     }
 
@@ -85,7 +84,7 @@ impl Scenario {
         let (arrival, time) = (self.arrival, self.time);
         if arrival.hold_s > time.duration_s {
             return Err(ScenarioError::new(format!(
-                "the formation is to be held for {} s in a flight of {} s",
+                "the formation must be held for {} s, longer than the flight of {} s",
                 arrival.hold_s, time.duration_s
             ))
             .coded("scenario/outside-flight")
@@ -97,7 +96,7 @@ impl Scenario {
 
     fn check_legs(&self) -> Result<(), ScenarioError> {
         if self.legs.is_empty() {
-            return Err(ScenarioError::new("there is no formation to fly to")
+            return Err(ScenarioError::new("the scenario has no formation")
                 .coded("scenario/missing-key")
                 .with_help("give one")
                 .at("formation"));
@@ -120,7 +119,7 @@ impl Scenario {
                 return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
                     .coded("scenario/outside-flight")
                     .with_help(format!(
-                        "legs begin one after the other, from {from_s} s on and before the end of the flight at {} s",
+                        "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
                         self.time.duration_s
                     ))
                     .at_leg(number, "formation.start_s")
@@ -131,7 +130,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// A reference that its law follows and that begins where its leader is.
+    /// Checks that the law follows the reference, and that the leader starts on it.
     fn check_reference(&self) -> Result<(), ScenarioError> {
         let Some(guidance) = &self.reference else { return Ok(()) };
         self.check_followed(guidance)?;
@@ -139,7 +138,7 @@ impl Scenario {
         let shortest_s = STEPS_A_TURN * self.time.dt_s;
         if guidance.motion.shortest_s() < shortest_s {
             return Err(ScenarioError::new(format!(
-                "the reference turns within {} s, too fast to be followed in steps of {} s",
+                "the reference turns within {} s, too fast for steps of {} s",
                 guidance.motion.shortest_s(),
                 self.time.dt_s
             ))
@@ -148,7 +147,7 @@ impl Scenario {
             .at_keys(["reference.kind", "time.dt_s"]));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
-            return Err(ScenarioError::new("the reference leaves the plane z = 0 that the swarm lives in")
+            return Err(ScenarioError::new("the reference leaves the plane z = 0 of the swarm")
                 .coded("scenario/plane")
                 .with_help("set its z to 0, or swarm.dimensions to 3")
                 .at_keys(["reference.kind", "swarm.dimensions"]));
@@ -160,23 +159,23 @@ impl Scenario {
             (row(&self.start.positions_m, leader) - slot_m).norm()
         });
         let off_m = off_m.fold(0.0, f64::max);
-        // Not by more than rounding: what is certified is certified around a leader that is on the reference.
+        // Certificates assume that the leader is on the reference.
         let rounding = LEADER_ROUNDING * (1.0 + start.position_m.norm() + start.velocity_m_s.norm());
         if off_m_s.norm() <= rounding && off_m <= rounding {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "vehicle {} leads, and does not start on the reference: {off_m} m and {} m/s off",
+            "the leader {} must start on the reference, got an offset of {off_m} m and {} m/s",
             leader + 1,
             off_m_s.norm()
         ))
         .coded("scenario/reference")
-        .with_help("leave out its start velocity: it then starts as the reference does")
+        .with_help("leave out its start velocity: the default is that of the reference")
         .at_entry("start.velocities_m_s", leader)
         .at("reference.leader"))
     }
 
-    /// A reference that the law follows, known by whom it must be.
+    /// Checks that the law follows a reference that these vehicles know.
     fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
         let refuse = |said: String, help: &str, key: &'static str| {
             Err(ScenarioError::new(said).coded("scenario/unsupported-by-law").with_help(help).at(key).at("law.kind"))
@@ -201,10 +200,10 @@ impl Scenario {
             }
             Err(error @ ParameterError::ReferenceNotHeard) => {
                 let key = if guidance.known_by.leader().is_some() { "reference.leader" } else { "reference.known_by" };
-                let help = "leave it out: then all know the reference; or set law.kind to \"displacement\"";
+                let help = "leave it out: then all vehicles know the reference; or set law.kind to \"displacement\"";
                 refuse(error.to_string(), help, key)
             }
-            // What is wrong with a law is told of its keys.
+            // An invalid law is refused at its own keys.
             _ => Ok(()),
         }
     }
@@ -239,7 +238,7 @@ impl Scenario {
                 if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
                     let z = rows[(i, 2)];
                     return Err(ScenarioError::new(format!(
-                        "z of {what} of vehicle {} is {z}, but the swarm lives in the plane z = 0",
+                        "z of {what} of vehicle {} must be 0 in the plane, got {z}",
                         i + 1
                     ))
                     .coded("scenario/plane")
@@ -270,7 +269,7 @@ impl Scenario {
             } else {
                 format!("vehicles {pair} start {separation_m} m {apart} not more than delta = {delta_m} m")
             };
-            let help = "move one of them away, or reduce law.delta_m: starts must be more than delta apart";
+            let help = "move one of the vehicles away, or reduce law.delta_m";
             return refuse(said, help, (0, "start.positions_m"), pair);
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
@@ -289,7 +288,7 @@ impl Scenario {
                      billionth of it"
                 )
             };
-            let help = "enlarge the formation, or reduce law.delta_m: slots must be more than delta apart";
+            let help = "enlarge the formation, or reduce law.delta_m";
             return refuse(said, help, (leg, "formation.points_m"), pair);
         }
         Ok(())
@@ -305,8 +304,8 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hulls of vehicles {} touch at {touching_m} m, not {CONTACT_PREDICTION_M} m before the safety distance \
-             delta = {} m, and would disturb the flight",
+            "the hulls of vehicles {} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety \
+             distance delta = {} m",
             Pair::new(i, j),
             self.delta_m
         ))
@@ -341,7 +340,7 @@ impl Scenario {
         let steps = duration_s / dt_s;
         if steps > MAX_STEPS {
             return Err(ScenarioError::new(format!(
-                "{duration_s} s in steps of {dt_s} s are {steps:.2e} steps; at most {MAX_STEPS:e} are flown"
+                "a flight has at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
             ))
             .coded("scenario/too-many-steps")
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
@@ -360,7 +359,7 @@ impl Scenario {
             && control_hz * dt_s > 1.0 + 1e-6
         {
             return Err(ScenarioError::new(format!(
-                "a control rate of {control_hz} Hz asks the law more than once in a step of {dt_s} s"
+                "a control rate of {control_hz} Hz evaluates the law more than once in a step of {dt_s} s"
             ))
             .coded("scenario/step-too-long")
             .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
@@ -376,7 +375,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     } else if name.chars().count() > MAX_NAME_CHARS {
         format!("the name has more than {MAX_NAME_CHARS} characters")
     } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
-        format!("the name holds {bad:?}")
+        format!("the name contains {bad:?}")
     } else {
         return Ok(());
     };
@@ -404,67 +403,67 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
 }
 
 impl Scenario {
-    pub(super) fn check_breathing(&self) -> Result<(), ScenarioError> {
-        let hold_s = self.breathing.hold_s;
+    pub(super) fn check_deadlock(&self) -> Result<(), ScenarioError> {
+        let hold_s = self.deadlock.hold_s;
         if hold_s >= self.time.duration_s {
             let duration_s = self.time.duration_s;
             return Err(ScenarioError::new(format!(
-                "spread slots are held for {hold_s} s of a flight of {duration_s} s"
+                "spread slots must be held for less than the flight of {duration_s} s, got {hold_s} s"
             ))
             .coded("scenario/outside-flight")
-            .with_help("shorten breathing.hold_s or lengthen time.duration_s: slots must come together again")
-            .at_keys(["breathing.hold_s", "time.duration_s"]));
+            .with_help("reduce deadlock.hold_s or increase time.duration_s: the slots must come together again")
+            .at_keys(["deadlock.hold_s", "time.duration_s"]));
         }
-        if self.breathing.mode == BreathingMode::Start
+        if self.deadlock.mode == DeadlockMode::Start
             && let Ok(law) = self.law()
             && law.capabilities().settling.is_none()
         {
-            return Err(ScenarioError::new(format!("the law `{}` is never given spread slots", law.name()))
+            return Err(ScenarioError::new(format!("the law `{}` does not support deadlock recovery", law.name()))
                 .coded("scenario/unsupported-by-law")
-                .with_help("leave out breathing.mode, or set law.kind to \"displacement\"")
-                .at_keys(["breathing.mode", "law.kind"]));
+                .with_help("leave out deadlock.mode, or set law.kind to \"displacement\"")
+                .at_keys(["deadlock.mode", "law.kind"]));
         }
         Ok(())
     }
 }
 
-/// Two safety distances that differ by less than this part are the same.
+/// Relative difference below which two safety distances are equal.
 const ROUNDING: f64 = 1e-9;
 
 impl Scenario {
-    /// An ellipsoid of revolution as wide as delta, under a law that keeps ellipsoids apart.
+    /// Checks that the ellipsoid is one of revolution, as wide as delta, and that the law keeps ellipsoids apart.
     pub(super) fn check_safety(&self) -> Result<(), ScenarioError> {
         let Safety::Ellipsoid { half_axes_m: [a_m, b_m, _] } = self.safety else { return Ok(()) };
         let key = "safety.half_axes_m";
         if a_m != b_m {
-            return Err(ScenarioError::new(format!("an ellipsoid with level half axes of {a_m} m and {b_m} m"))
-                .with_help("vehicles turn: give both the same, the larger one")
+            return Err(ScenarioError::new(format!("the horizontal half axes must be equal, got {a_m} m and {b_m} m"))
+                .with_help("vehicles turn: set both to the larger one")
                 .at(key));
         }
         let (delta_m, width_m) = (self.delta_m, 2.0 * a_m);
         if (delta_m - width_m).abs() > ROUNDING * width_m {
             return Err(ScenarioError::new(format!(
-                "a safety distance of {delta_m} m, and ellipsoids that touch side by side at {width_m} m"
+                "the safety distance must be the width of the ellipsoid, {width_m} m, got {delta_m} m"
             ))
-            .with_help("leave law.delta_m out: it is twice the level half axes")
+            .with_help("leave out law.delta_m: it is twice the horizontal half axes")
             .at_keys(["law.delta_m", key]));
         }
         let Ok(law) = self.law() else { return Ok(()) };
         if law.capabilities().uses_ellipsoid_metric {
             return Ok(());
         }
-        Err(ScenarioError::new(format!("the law `{}` keeps balls from each other, not ellipsoids", law.name()))
+        Err(ScenarioError::new(format!("the law `{}` does not support ellipsoids", law.name()))
             .coded("scenario/unsupported-by-law")
             .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
             .at_keys(["safety.shape", "law.kind"]))
     }
 }
 
-/// Steps that a slope of a gust takes at least: it is followed from step to step.
+/// Smallest number of steps of the rise or fall of a gust, which is followed step by step.
 const STEPS_A_SLOPE: f64 = 10.0;
 
 impl Scenario {
-    /// A wind that the vehicles feel.
+    /// Checks that the wind acts on the vehicles, and its velocities and gusts.
     pub(super) fn check_wind(&self) -> Result<(), ScenarioError> {
         let drag_per_s = self.drag_per_s;
         if drag_per_s * self.time.dt_s > 1.0 {
@@ -478,26 +477,22 @@ impl Scenario {
             .at_keys(["vehicle.drag_per_s", "time.dt_s"]));
         }
         if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
-            return Err(ScenarioError::new(format!("a drag of {drag_per_s} 1/s on vehicles that are no points"))
+            return Err(ScenarioError::new(format!("only points have vehicle.drag_per_s, got {drag_per_s} 1/s"))
                 .coded("scenario/unsupported-by-vehicle")
-                .with_help("leave it out: the drag of a quadrotor is that of its rotors and its body, in its model")
+                .with_help("leave it out: the drag of a quadrotor is part of its model")
                 .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
         }
         if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
-            return Err(ScenarioError::new(
-                "a wind blows and the vehicles are points without drag, which do not feel it",
-            )
-            .coded("scenario/unsupported-by-vehicle")
-            .with_help(
-                "set vehicle.drag_per_s to what a vehicle loses of its velocity through still air, for example 0.3",
-            )
-            .at_keys(["wind", "vehicle.drag_per_s"]));
+            return Err(ScenarioError::new("the wind has no effect on points without drag")
+                .coded("scenario/unsupported-by-vehicle")
+                .with_help("set vehicle.drag_per_s, for example to 0.3")
+                .at_keys(["wind", "vehicle.drag_per_s"]));
         }
         self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
         self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
     }
 
-    /// A velocity of the air \[m/s\], level where the swarm lives in the plane.
+    /// Checks a velocity of the air \[m/s\], which must be horizontal in the plane.
     fn check_air(&self, key: &'static str, what: &str, air_m_s: Vector3<f64>) -> Result<(), ScenarioError> {
         if self.space == Space::Plane && air_m_s.z != 0.0 {
             return Err(ScenarioError::new(format!(
@@ -518,7 +513,7 @@ impl Scenario {
         for (what, slope_s) in [("the rise of a gust", rise_s), ("the fall of a gust", gust.fall_s())] {
             if slope_s < shortest_s {
                 return Err(ScenarioError::new(format!(
-                    "{what} takes {slope_s} s, too short to be followed in steps of {} s",
+                    "{what} takes {slope_s} s, too short for steps of {} s",
                     self.time.dt_s
                 ))
                 .coded("scenario/step-too-long")
@@ -528,7 +523,7 @@ impl Scenario {
         }
         if at_s >= self.time.duration_s {
             return Err(ScenarioError::new(format!(
-                "a gust begins at {at_s} s, after the flight of {} s",
+                "a gust must begin within the flight of {} s, got {at_s} s",
                 self.time.duration_s
             ))
             .coded("scenario/outside-flight")
@@ -536,11 +531,11 @@ impl Scenario {
             .at_keys(["wind.gust", "time.duration_s"]));
         }
         match vehicles.as_deref() {
-            Some([]) => Err(ScenarioError::new("a gust meets no vehicle")
-                .with_help("leave out `vehicles`: it then meets all")
+            Some([]) => Err(ScenarioError::new("the list of vehicles of a gust is empty")
+                .with_help("leave out `vehicles`: the gust then acts on all vehicles")
                 .at("wind.gust")),
             Some(met) if !met.is_sorted() || met.last().is_some_and(|&last| last >= self.count()) => {
-                Err(ScenarioError::new("a gust meets a vehicle that the swarm does not have")
+                Err(ScenarioError::new("a gust names a vehicle that the swarm does not have")
                     .coded("scenario/unknown-vehicle")
                     .with_help(format!("vehicles are counted from 1 to {}", self.count()))
                     .at("wind.gust"))

@@ -1,4 +1,4 @@
-//! The table `[vehicle]`: what kind of body a vehicle is.
+//! `[vehicle]` of the scenario file: the model of the vehicles.
 
 use std::path::Path;
 
@@ -17,49 +17,51 @@ const MODEL: &str = "vehicle.model";
 const POINT: &str = "point";
 const UNICYCLE: &str = "unicycle";
 
-/// What kind of body a vehicle is.
+/// Model of the vehicles.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct VehicleTable {
-    /// `point`, which carries out accelerations exactly; `unicycle`, which goes where it looks and cannot stop; a quadrotor: `crazyflie`, `crazyflie-brushless`, `hummingbird`, a file
-    /// in TOML that holds one, or its keys as a table.
+    /// Model of the vehicles; `point` unless given. `point` executes accelerations exactly; `unicycle` moves along its
+    /// heading and cannot stop. A quadrotor is `crazyflie`, `crazyflie-brushless`, `hummingbird`, the path of a TOML
+    /// file with a model, or a table with the keys of a model.
     model: ModelKey,
-    /// How often a quadrotor's attitude loop runs in Hz, at most once a step: 500 unless given.
+    /// Rate of the attitude loop of quadrotors in Hz, at most once per step; 500 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_hz: Option<f64>,
-    /// Frequency that its attitude loop asks for in rad/s, in the place of the model's.
+    /// Natural frequency of the attitude loop in rad/s; that of the model unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_rad_s: Option<f64>,
-    /// Damping ratio that it asks for, in the place of the model's.
+    /// Damping ratio of the attitude loop; that of the model unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     attitude_damping: Option<f64>,
-    /// Whether a quadrotor's thrust grows near a ground: a half-space among the obstacles. Not unless given.
+    /// Whether the thrust of quadrotors grows near the ground, which is a half-space among the obstacles; false unless
+    /// given.
     #[serde(skip_serializing_if = "Option::is_none")]
     ground_effect: Option<bool>,
-    /// Whether its rotors blow on vehicles below. Not unless given.
+    /// Whether the downwash of quadrotors acts on vehicles below; false unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     downwash: Option<bool>,
-    /// Least speed of a unicycle in m/s, which cannot stop: 0.2 unless given.
+    /// Smallest speed of unicycles in m/s, more than 0; 0.2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     min_speed_m_s: Option<f64>,
-    /// Its largest speed in m/s: 3 unless given. At the least one its speed never changes.
+    /// Largest speed of unicycles in m/s; 3 unless given. If it equals the smallest speed, the speed is constant.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     max_speed_m_s: Option<f64>,
-    /// Largest rate of its heading in rad/s: 2 unless given.
+    /// Largest turn rate of unicycles in rad/s; 2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     max_turn_rad_s: Option<f64>,
-    /// Its largest acceleration along its heading in m/s^2: 2 unless given.
+    /// Largest acceleration of unicycles along their heading in m/s^2; 2 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     max_accel_m_s2: Option<f64>,
-    /// Drag of a point over its mass in 1/s, linear in the velocity W of the air past it:
-    /// p'' = a22 v + u + drag (W - v). None unless given; quadrotors have their own.
+    /// Drag of points over mass in 1/s, linear in the velocity relative to the air; 0 unless given. In a wind W,
+    /// p'' = a22 v + u + drag (W - v). The drag of quadrotors is part of their model.
     #[serde(skip_serializing_if = "is_none")]
     #[schemars(extend("minimum" = 0))]
     pub(super) drag_per_s: f64,
@@ -70,13 +72,13 @@ fn is_none(drag_per_s: &f64) -> bool {
     *drag_per_s == 0.0
 }
 
-/// A model by name, by file, or with all of its keys.
+/// Model by name, by file, or with all of its keys.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 enum ModelKey {
-    /// A built-in model, or the path of a file.
+    /// Name of a built-in model, or path of a file.
     Named(String),
-    /// Its keys.
+    /// Keys of the model.
     Given(Box<Model>),
 }
 
@@ -87,7 +89,7 @@ impl Default for ModelKey {
 }
 
 impl VehicleTable {
-    /// Reads the file of a model that is named by one, relative to a folder.
+    /// Reads the file of a model, named relative to a folder.
     pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
         if let ModelKey::Named(name) = &self.model
             && name.contains(['/', '\\', '.'])
@@ -97,12 +99,12 @@ impl VehicleTable {
         Ok(())
     }
 
-    /// Whether vehicles are points.
+    /// Returns whether vehicles are points.
     pub(super) fn is_point(&self) -> bool {
         matches!(&self.model, ModelKey::Named(name) if name == POINT)
     }
 
-    /// The body that it describes.
+    /// Returns the airframe that the table describes.
     pub(super) fn airframe(&self) -> Result<Airframe, ScenarioError> {
         match &self.model {
             ModelKey::Named(name) if name == POINT => {
@@ -140,8 +142,8 @@ impl VehicleTable {
                     MODELS.iter().find(|(known, _)| known == name).and_then(|(_, text)| vehicle::read(text).ok());
                 found.ok_or_else(|| {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
-                    let help = format!("{}; a model of your own is the path of a file in TOML", suggest(name, &known));
-                    ScenarioError::new(format!("there is no model `{name}`"))
+                    let help = format!("{}; for another model give the path of a TOML file", suggest(name, &known));
+                    ScenarioError::new(format!("no model has the name `{name}`"))
                         .coded("scenario/unknown-choice")
                         .with_help(help)
                         .at(MODEL)
@@ -182,7 +184,7 @@ impl VehicleTable {
     }
 }
 
-/// Refuses the first key that is given although the model has no use for it.
+/// Refuses the first given key that the model does not use.
 fn refuse_given<const N: usize>(
     keys: [(&'static str, bool); N],
     said: &str,
@@ -195,7 +197,7 @@ fn refuse_given<const N: usize>(
         .at_keys([key, MODEL]))
 }
 
-/// What was read stands there: a built-in model by its name, another one with its keys.
+/// Converts the airframe back: a built-in model to its name, any other model to its keys.
 impl From<&Scenario> for VehicleTable {
     fn from(scenario: &Scenario) -> Self {
         let drag_per_s = scenario.drag_per_s;
@@ -255,14 +257,14 @@ fn read(path: &Path) -> Result<Model, ScenarioError> {
 pub const DEFAULT_ATTITUDE_HZ: f64 = 500.0;
 /// Default step of quadrotors \[s\].
 pub const QUADROTOR_DT_S: f64 = 1.0 / 500.0;
-/// Default rate at which quadrotors are given commands \[Hz\].
+/// Default rate of commands to quadrotors \[Hz\].
 pub const QUADROTOR_CONTROL_HZ: f64 = 100.0;
 
-/// A step may be longer than a period by this part of it, which is rounding.
+/// Relative rounding by which a step may exceed a period.
 const ROUNDING: f64 = 1e-6;
 
 impl Scenario {
-    /// Its quadrotors at the start, trimmed for hover; none where vehicles are points.
+    /// Returns the quadrotors at the start, trimmed for hover; `None` for other vehicles.
     #[must_use]
     pub fn fleet(&self) -> Option<Fleet> {
         let ground = |obstacle: &Obstacle| match obstacle.shape {
@@ -275,8 +277,8 @@ impl Scenario {
         Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
     }
 
-    /// Makes every vehicle one of these, with the mass, the hull and the default rates of its kind. Points of a quadrotor's mass
-    /// have no drag of their own.
+    /// Sets the airframe of all vehicles, and the mass, hull and default rates that belong to it. Quadrotors have no
+    /// point drag.
     pub fn set_airframe(&mut self, airframe: Airframe) {
         if let Some(quadrotor) = airframe.quadrotor() {
             self.mass_kg.fill(quadrotor.model.mass_kg);
@@ -288,7 +290,7 @@ impl Scenario {
         self.airframe = airframe;
     }
 
-    /// A body that can be flown, and an attitude loop that steps can follow.
+    /// Checks that the airframe can be flown and that steps resolve the attitude loop.
     pub(super) fn check_airframe(&self) -> Result<(), ScenarioError> {
         self.check_unicycle()?;
         let Some(Quadrotor { model, attitude_hz, .. }) = self.airframe.quadrotor() else { return Ok(()) };
@@ -318,31 +320,31 @@ impl Scenario {
     }
 }
 
-/// A start may be off a limit of speed by this part of it, which is rounding.
+/// Relative rounding by which the speed at the start may exceed a limit.
 const SPEED_ROUNDING: f64 = 1e-9;
 
 impl Scenario {
-    /// Limits that are some, and a start in the plane that keeps to them.
+    /// Checks the limits of unicycles, and that their start in the plane satisfies them.
     pub(super) fn check_unicycle(&self) -> Result<(), ScenarioError> {
         let Some(unicycle) = self.airframe.unicycle() else { return Ok(()) };
         let Unicycle { min_speed_m_s, max_speed_m_s, .. } = *unicycle;
         if min_speed_m_s > max_speed_m_s {
             return Err(ScenarioError::new(format!(
-                "the least speed of {min_speed_m_s} m/s is more than the largest of {max_speed_m_s} m/s"
+                "the smallest speed must be at most the largest, {max_speed_m_s} m/s, got {min_speed_m_s} m/s"
             ))
             .with_help("reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s")
             .at_keys(["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"]));
         }
         if self.space != Space::Plane {
-            return Err(ScenarioError::new("unicycles move in the plane z = 0, and this swarm lives in space")
+            return Err(ScenarioError::new("unicycles need the plane z = 0, but the swarm has three dimensions")
                 .coded("scenario/plane")
                 .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
                 .at_keys(["vehicle.model", "swarm.dimensions"]));
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
-            return Err(ScenarioError::new("the ideal plant flies points and quadrotors, no unicycles")
+            return Err(ScenarioError::new("the ideal plant does not support unicycles")
                 .coded("scenario/unsupported-by-plant")
-                .with_help("leave out plant.kind: the way of a unicycle is solved in closed form")
+                .with_help("leave out plant.kind: the motion of a unicycle is solved in closed form")
                 .at_keys(["plant.kind", "vehicle.model"]));
         }
         if self.a22_per_s != 0.0 {
@@ -353,7 +355,7 @@ impl Scenario {
         }
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
-            return Err(ScenarioError::new("a unicycle does not feel the air")
+            return Err(ScenarioError::new("wind and drag do not act on unicycles")
                 .coded("scenario/unsupported-by-vehicle")
                 .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
                 .at_keys([key, "vehicle.model"]));
@@ -363,9 +365,10 @@ impl Scenario {
             let (least, most) = (min_speed_m_s * (1.0 - SPEED_ROUNDING), max_speed_m_s * (1.0 + SPEED_ROUNDING));
             if !(least..=most).contains(&speed_m_s) {
                 return Err(ScenarioError::new(format!(
-                    "vehicle {} starts at {speed_m_s} m/s, and a unicycle here goes at {min_speed_m_s} to {max_speed_m_s} m/s",
+                    "the start speed of vehicle {} must be {min_speed_m_s} to {max_speed_m_s} m/s, got {speed_m_s} m/s",
                     i + 1
-                )).coded("scenario/out-of-range")
+                ))
+                .coded("scenario/out-of-range")
                 .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
                 .at_entry("start.velocities_m_s", i)
                 .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));

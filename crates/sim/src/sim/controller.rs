@@ -1,4 +1,4 @@
-//! From the true state to the accelerations that reach the vehicles: sense, supervise, command, actuate.
+//! Maps the true state to accelerations: sense, supervise, command, actuate.
 
 use super::ending::SimError;
 use crate::link::Imperfections;
@@ -11,7 +11,7 @@ use tautline_laws::observation::{Observation, Others};
 use tautline_laws::space::{KeptPairs, Metric, Obstacle};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 
-/// Everything between the true state and the vehicles' actuators, with all of its memory.
+/// Control loop between the true state and the actuators, with all of its memory.
 #[derive(Clone)]
 pub(super) struct Controller {
     pub(super) law: Box<dyn Law>,
@@ -21,10 +21,10 @@ pub(super) struct Controller {
     guidance: Option<Guidance>,
     pub(super) links: Graph,
     pub(super) obstacles: Vec<Obstacle>,
-    /// Lengths in which vehicles are kept apart.
+    /// Metric of separations.
     metric: Metric,
     near: KeptPairs,
-    /// What the law commanded last, N x 3 \[m/s^2\].
+    /// Last command of the law, N x 3 \[m/s^2\].
     commanded: Rows,
 }
 
@@ -43,8 +43,8 @@ impl Controller {
         Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, commanded })
     }
 
-    /// What happens at an instant of the flight: everything is sensed once, the supervisor looks at it and may change the
-    /// target, which the law follows; then the law is asked, where there is a `command` to be written.
+    /// Senses at an instant of the flight, lets the supervisor change the target, and writes the law's command if
+    /// `command` is given.
     pub(super) fn act(&mut self, time_s: f64, truth: &Swarm, command: Option<&mut Rows>) -> Result<(), LawError> {
         self.respond(time_s, truth, true, command)
     }
@@ -88,34 +88,34 @@ impl Controller {
         Ok(())
     }
 
-    /// Writes what becomes at a time \[s\] of the law's last command.
+    /// Writes the accelerations at a time \[s\] that result from the law's last command.
     pub(super) fn actuate(&mut self, time_s: f64, command: &mut Rows) {
         command.copy_from(&self.commanded);
         self.link.actuate(time_s, command);
     }
 
-    /// What the supervisor has changed within a leg, and what the law promises anew from this true state on.
+    /// Returns the supervisor's last change within a leg, and the new certificate from this true state.
     pub(super) fn change(&mut self, time_s: f64, truth: &Swarm) -> Option<(Change, Certificate)> {
         let change = self.supervisor.take_change()?;
         let target = self.target.view();
         let exact = Observation::exact(truth, &self.links, target.formation);
         let mut ahead = self.supervisor.ahead(&target);
         if matches!(change, Change::Assigned { .. }) {
-            // The slots of the leg, which are still to come where they are spread, are there.
+            // The slots of the leg follow after the spread ones.
             ahead.insert(0, target.formation);
         }
         let start = Observation { time_s, target, obstacles: &self.obstacles, ..exact };
         Some((change, certificate_through(self.law.as_ref(), &start, &ahead)))
     }
 
-    /// All random numbers begin anew.
+    /// Restarts all random numbers.
     pub(super) fn reseed(&mut self, seed: u64) {
         self.law.reseed(seed);
         self.link.reseed(seed);
         self.supervisor.reseed(seed);
     }
 
-    /// The law's energy of a true state, against the target that was looked at last.
+    /// Returns the law's energy of a true state, for the current target.
     pub(super) fn energy(&self, time_s: f64, truth: &Swarm) -> Option<f64> {
         let exact = Observation::exact(truth, &self.links, self.target.view().formation);
         let (target, obstacles) = (self.target.view(), self.obstacles.as_slice());

@@ -1,56 +1,59 @@
-//! How a flight ends, and what it leaves behind.
+//! Result and ending of a flight, and errors of a simulation.
 
 use std::time::Duration;
 
 use crate::link::Traffic;
 use tautline_audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
-use tautline_core::record::{Breath, EnergyRise, Reassignment, RecordError};
+use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordError};
 use tautline_core::swarm::{Bounce, Pair, Swarm};
 use tautline_laws::law::{Certificate, LawError, ParameterError};
 
-/// A path may bend away from the straight line that is swept by this much \[m\]; two vehicles by twice as much. A step
-/// that bends more is flown in halves.
+/// Largest distance of a path from the swept straight line \[m\]; of two vehicles twice that. Steps with larger bends
+/// are halved.
 pub(super) const MAX_BEND_M: f64 = 1e-5;
-/// Largest acceleration that is flown, along any axis \[m/s^2\]. What it leads to within any flight stays within what judges and
-/// readers of recordings take.
+/// Largest acceleration along any axis \[m/s^2\]. Motions up to this limit stay within the range of the audit and of
+/// readers of recordings.
 pub(super) const MAX_COMMAND_M_S2: f64 = 1e30;
 
-/// What a flight left behind besides its recording.
+/// Result of a flight, besides its recording.
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// Name of the law that was flown.
+    /// Name of the law.
     pub law: String,
-    /// How it ended.
+    /// Ending of the flight.
     pub ending: Ending,
     /// Time flown \[s\].
     pub duration_s: f64,
-    /// Whole steps flown.
+    /// Number of whole steps.
     pub steps: u64,
-    /// Those of them that were flown in parts.
+    /// Number of steps that were divided.
     pub refined_steps: u64,
-    /// Those of which even the shortest part was longer than the law allows: from the first on it is not the law's motion.
+    /// Number of steps whose shortest substep was longer than the law allows. From the first one on, the motion is not
+    /// that of the law.
     pub overlong_steps: u64,
-    /// The law's promise, made before the first step; void where the steps were too long for it.
+    /// Certificate before the first step; void if steps were too long for it.
     pub certificate: Certificate,
-    /// What the independent judge found. Its status is undecided where integration may have made all violations: where steps were too
-    /// long for the law, and no violation is deeper than the bound of their error or began before the first of them.
+    /// Result of the audit. Its status is undecided if integration errors may explain all violations. This is so if
+    /// steps were too long for the law, no violation is deeper than the error bound, and none began before the first
+    /// such step.
     pub audit: AuditOutcome,
-    /// Where that was of scaled lengths ([`tautline_laws::space::Metric`]): what it found in metres, by the widest hulls.
+    /// Result of the audit in metres, by the widest hulls, if the audit uses scaled separations
+    /// ([`tautline_laws::space::Metric`]).
     pub in_metres: Option<AuditOutcome>,
-    /// What it found of the ways past obstacles, where there are any.
+    /// Result of the audit of obstacles, if the scenario has any.
     pub clearance: Option<ClearanceOutcome>,
-    /// Pairs whose keep-out balls the plant's own collision detection saw overlap, in index order.
+    /// Pairs whose keep-out balls overlapped in the collision detection of the plant, in index order.
     pub engine_contacts: Vec<Pair>,
-    /// Every time that two hulls hit, in order of time: from then on a bounce is flown and not the law's motion alone.
+    /// Collisions of hulls, in order of time. After the first, the motion is not governed by the law alone.
     pub bounces: Vec<Bounce>,
-    /// By how much the law's energy rose between two changes of its target, at most: the rise that integration
-    /// explains least; none for a law without energy.
+    /// Largest rise of the law's energy between two changes of its target: the one that integration explains least.
+    /// `None` for a law without energy.
     pub energy_rise: Option<EnergyRise>,
-    /// Every time that slots were spread, in the order of time.
-    pub breaths: Vec<Breath>,
-    /// Every time that vehicles were given other slots, in the order of time.
+    /// Deadlock recoveries, in order of time.
+    pub deadlock_recoveries: Vec<DeadlockRecovery>,
+    /// Reassignments of slots, in order of time.
     pub assignments: Vec<Reassignment>,
-    /// What was sent over its network, where messages were sent one by one.
+    /// Counts of messages, if the network sends single messages.
     pub traffic: Option<Traffic>,
     /// State at the end.
     pub last: Swarm,
@@ -73,42 +76,42 @@ impl Flight {
     }
 }
 
-/// How a flight ended.
+/// Ending of a flight.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ending {
-    /// At the scenario's duration.
+    /// The flight reached its duration.
     Completed,
-    /// The caller asked for it.
+    /// The caller interrupted the flight.
     Interrupted,
-    /// The law had no answer for the state that was reached.
+    /// The law is undefined for the state.
     LawUndefined(LawError),
-    /// The motion could not be carried on.
+    /// The motion cannot be continued.
     BrokeDown(Breakdown),
 }
 
-/// Wall-clock time by kind of work. Work done side by side counts in each kind.
+/// Wall-clock time by kind of work. Concurrent work counts in each kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Performance {
-    /// From first to last step.
+    /// From the first to the last step.
     pub wall: Duration,
-    /// In the law.
+    /// Law.
     pub law: Duration,
-    /// In the law's energy, which every step is looked at for.
+    /// Energy of the law, evaluated at every step.
     pub energy: Duration,
-    /// In the plant.
+    /// Plant.
     pub physics: Duration,
-    /// Of that, in the forces, rotors and attitude loops of vehicles that have them.
+    /// Part of the plant's time for forces, rotors and attitude loops.
     pub airframe: Duration,
-    /// In the audit.
+    /// Audit.
     pub audit: Duration,
-    /// In what receives the recording.
+    /// Recording.
     pub record: Duration,
 }
 
-/// Why a motion could not be carried on. The state before is the last.
+/// Reason why a motion cannot be continued. The flight ends with the state before.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Breakdown {
-    /// The law commanded something that is not a number.
+    /// A command of the law is not finite.
     #[error("step {step}: the law's command for vehicle {} is not a finite number", vehicle + 1)]
     CommandNotFinite {
         /// The step, from 1; 0 is the start.
@@ -116,7 +119,7 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// The law commanded an acceleration that no flight comes back from, and that no judge can follow.
+    /// A command of the law is beyond [`MAX_COMMAND_M_S2`].
     #[error("step {step}: the law's command for vehicle {} is beyond {MAX_COMMAND_M_S2:e} m/s^2", vehicle + 1)]
     CommandOutOfRange {
         /// The step, from 1; 0 is the start.
@@ -124,7 +127,7 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// A vehicle's state left the range of numbers.
+    /// The state of a vehicle is not finite.
     #[error("step {step}: the state of vehicle {} is no longer a finite number", vehicle + 1)]
     StateNotFinite {
         /// The step, from 1; 0 is the start.
@@ -132,9 +135,9 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// Rounding may have moved the vehicles by more than what has to be resolved.
+    /// Rounding may exceed the required position resolution.
     #[error(
-        "step {step}: rounding may have moved vehicles by {rounding_m:.1e} m, and {required_m} m has to be resolved: positions or \
+        "step {step}: rounding may have moved vehicles by {rounding_m:.1e} m; {required_m} m is required: positions or \
          velocities are too large for steps this short"
     )]
     Unresolved {
@@ -142,62 +145,60 @@ pub enum Breakdown {
         step: u64,
         /// Upper bound of the accumulated rounding error of a coordinate \[m\].
         rounding_m: f64,
-        /// The position error that counts as reached \[m\].
+        /// Required position resolution: the tolerance of arrival \[m\].
         required_m: f64,
     },
-    /// The plant could not be solved any further.
+    /// The solver of the plant cannot continue.
     #[error("step {step}: the equation of motion cannot be solved to its tolerances")]
     Stalled {
         /// The step, from 1.
         step: u64,
     },
-    /// A path bends too far from the straight line that is swept, however often the step is halved.
-    #[error(
-        "step {step}: a path bends by {bend_m:.1e} m from the straight line that is audited, and {MAX_BEND_M:e} m are allowed"
-    )]
+    /// A path bends too far from the swept straight line even in the shortest substep.
+    #[error("step {step}: a path bends by {bend_m:.1e} m from the audited line; at most {MAX_BEND_M:e} m are allowed")]
     Bent {
         /// The step, from 1.
         step: u64,
-        /// By how much at most \[m\].
+        /// Largest bend \[m\].
         bend_m: f64,
     },
-    /// The judge refused what it was shown.
+    /// The audit refused a step.
     #[error("step {step}: {why}")]
     Audit {
         /// The step, from 1; 0 is the start.
         step: u64,
-        /// The judge's reason.
+        /// Reason of the audit.
         why: AuditError,
     },
 }
 
-/// Why there is no flight to report on.
+/// Error that prevents a flight.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
-    /// There is no judge for the scenario.
+    /// The audit does not support the scenario.
     #[error(transparent)]
     Audit(#[from] AuditError),
-    /// An obstacle cannot be judged.
+    /// The audit does not support an obstacle.
     #[error(transparent)]
     Obstacle(#[from] ObstacleError),
-    /// The recording could not be kept.
+    /// The recording cannot be written.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// The law does not exist.
+    /// The parameters give no law.
     #[error(transparent)]
     Law(#[from] ParameterError),
-    /// The scenario has no formation to fly to.
+    /// The scenario has no formation.
     #[error("the scenario has no leg")]
     NoLeg,
-    /// Vehicles that are not those of the scenario.
+    /// The number of vehicles differs from that of the scenario.
     #[error("the scenario has {expected} vehicles, and what moves them has {found}")]
     Vehicles {
         /// Number of vehicles of the scenario.
         expected: usize,
-        /// Number of vehicles that are moved.
+        /// Number of vehicles of the component.
         found: usize,
     },
-    /// Accelerations from outside that are not a finite row for each vehicle.
+    /// Given accelerations do not have one finite row per vehicle.
     #[error(
         "{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite or beyond \
          {MAX_COMMAND_M_S2:e} m/s^2"
@@ -211,7 +212,7 @@ pub enum SimError {
 }
 
 impl Ending {
-    /// Why a flight ended before its time, in a sentence.
+    /// Returns the reason of an early ending, one sentence.
     #[must_use]
     pub fn reason(&self) -> Option<String> {
         match self {

@@ -1,4 +1,4 @@
-//! The judge's place in the loop: every way is swept, and what it finds is kept for the next sample.
+//! Connects the audit with the simulation loop: sweeps every step and collects findings for the next sample.
 
 use super::ending::SimError;
 use crate::plant::{HullContact, Path, Plant};
@@ -14,44 +14,46 @@ use tautline_laws::graph::Graph;
 use tautline_laws::law::Law;
 use tautline_laws::space::{self, Metric, NearPairs};
 
-/// The auditor with what the loop asks of it from step to step.
+/// Auditor with the state that the loop needs from step to step.
 #[derive(Clone)]
 pub(super) struct Judge {
     auditor: Auditor,
-    /// Where what must stay empty around a vehicle is an ellipsoid: the judge of distances in metres, by the widest hulls.
+    /// Auditor of separations in metres, by the widest hulls, if the safety shape is an ellipsoid.
     in_metres: Option<Auditor>,
     metric: Metric,
-    /// Positions in the lengths that the first is told.
+    /// Positions scaled for the first auditor.
     scaled: Rows,
     delta_m: f64,
-    /// Sweeps that were clear of everything by less than paths may bend away from what was swept.
+    /// Number of sweeps that are clear by less than the bend of the paths.
     bent: u64,
     bent_past_obstacles: u64,
-    /// By how much the motion that is judged may err from the law's \[m\], once a step was too long for the law.
+    /// Bound of the distance between the audited motion and that of the law \[m\], once a step was too long for the
+    /// law.
     error_m: Option<f64>,
-    /// Whether a violation of two vehicles, and one of an obstacle's clearance, is deeper than the error of its time.
+    /// Whether a violation of delta, and one of an obstacle's clearance, is deeper than the integration error at its
+    /// time.
     beyond_error: [bool; 2],
-    /// What judges the way past obstacles, where there are any, and these.
+    /// Auditor of obstacles, if there are any, and the obstacles.
     clearance: Option<ClearanceAuditor>,
     obstacles: Vec<Obstacle>,
-    /// The least that any vehicle has beyond an obstacle's clearance now.
+    /// Smallest present distance of a vehicle beyond the clearance of an obstacle \[m\].
     pub(super) room_m: f64,
     /// Closest approach since the last sample.
     pub(super) closest: Option<ClosestApproach>,
-    /// Smallest separation over the last sweep: bounds from below how near any pair is now.
+    /// Smallest separation over the last sweep: a lower bound of the present separations.
     pub(super) nearest_m: f64,
-    /// Pairs that a step may have brought too near.
+    /// Pairs that a step may bring too close.
     near: NearPairs,
     pub(super) engine_contacts: Vec<Pair>,
     contacts_now: Vec<Pair>,
     pub(super) bounces: Vec<Bounce>,
-    /// Hulls that pushed each other in the last step, and in the one before.
+    /// Hulls in contact in the last step, and in the one before.
     hulls_now: Vec<HullContact>,
     hulls_before: Vec<HullContact>,
 }
 
-/// What is known of a flight in the end.
-pub(super) struct Judged {
+/// Results of the audit of a whole flight.
+pub(super) struct AuditResults {
     pub(super) audit: AuditOutcome,
     pub(super) in_metres: Option<AuditOutcome>,
     pub(super) clearance: Option<ClearanceOutcome>,
@@ -96,12 +98,12 @@ impl Judge {
         if let Some(in_metres) = in_metres {
             in_metres.start(time_s, positions_m)?;
         }
-        let finding = auditor.start(time_s, told(*metric, positions_m, scaled))?;
+        let finding = auditor.start(time_s, in_metric(*metric, positions_m, scaled))?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
         self.clear_of_obstacles(time_s, positions_m, 0.0, events)
     }
 
-    /// Sweeps the straight line to these positions, from which no true path leaves by more than `bend_m` \[m\].
+    /// Sweeps the straight line to these positions; true paths deviate by at most `bend_m` \[m\].
     pub(super) fn sweep(
         &mut self,
         time_s: f64,
@@ -113,10 +115,10 @@ impl Judge {
         if let Some(in_metres) = in_metres {
             in_metres.step(time_s, positions_m)?;
         }
-        let finding = auditor.step(time_s, told(*metric, positions_m, scaled))?;
+        let finding = auditor.step(time_s, in_metric(*metric, positions_m, scaled))?;
         if let Some(closest) = finding.closest {
             let nearer_m = 2.0 * metric.most_scaled(bend_m);
-            self.bent += u64::from(is_open(closest.separation_m, nearer_m, self.delta_m));
+            self.bent += u64::from(is_undecided(closest.separation_m, nearer_m, self.delta_m));
         }
         note(finding, &mut self.closest, &mut self.nearest_m, events);
         self.clear_of_obstacles(time_s, positions_m, bend_m, events)?;
@@ -127,14 +129,14 @@ impl Judge {
         Ok(())
     }
 
-    /// Takes note that what is swept from now on may err from the law's motion by `error_m` \[m\]. Violations up to now are exact.
+    /// Records that later sweeps may differ from the law's motion by `error_m` \[m\]. Earlier violations are exact.
     pub(super) fn may_err_by(&mut self, error_m: f64) {
         if self.error_m.replace(error_m).is_none() {
             self.beyond_error = self.violated();
         }
     }
 
-    /// Whether two vehicles violated delta, and whether one violated an obstacle's clearance.
+    /// Returns whether delta was violated, and whether the clearance of an obstacle was.
     fn violated(&self) -> [bool; 2] {
         let mut past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
         [!self.auditor.violations().is_empty(), past_obstacles.next().is_some()]
@@ -150,7 +152,7 @@ impl Judge {
         if let Some(clearance) = &mut self.clearance {
             let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
             self.room_m = least_room_m;
-            self.bent_past_obstacles += u64::from(is_open(least_room_m, bend_m, 0.0));
+            self.bent_past_obstacles += u64::from(is_undecided(least_room_m, bend_m, 0.0));
             for &Violation { pair, from_s: time_s, .. } in began {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
                     events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });
@@ -166,29 +168,29 @@ impl Judge {
         Ok(())
     }
 
-    /// The smallest clearance so far \[m\], below 0 exactly where there is a violation.
+    /// Returns the smallest clearance so far \[m\]; negative exactly if there is a violation.
     pub(super) fn least_clearance_m(&self) -> Option<f64> {
         let pairs = self.auditor.closest().map(|closest| closest.separation_m - self.delta_m);
         let obstacles = self.clearance.as_ref().and_then(|clearance| clearance.closest().first());
         let beyond = obstacles.map(|approach| approach.upper_m - approach.limit_m);
         let least_m = pairs.into_iter().chain(beyond).reduce(f64::min)?;
-        // Rounding never moves a distance across its limit.
+        // The sign must agree with the violations in spite of rounding.
         Some(if self.violated().contains(&true) { least_m.min(-f64::MIN_POSITIVE) } else { least_m.max(0.0) })
     }
 
-    /// The closest that two vehicles came so far.
+    /// Returns the closest approach of two vehicles so far.
     pub(super) fn least_separation(&self) -> Option<ClosestApproach> {
         self.auditor.closest()
     }
 
-    /// The closest approaches of violations that last to an instant.
+    /// Returns the closest approaches of violations that last until an instant.
     pub(super) fn lasting(&self, time_s: f64) -> impl Iterator<Item = Event> + '_ {
         let pairs = self.auditor.violations().iter().filter(move |violation| violation.to_s == time_s).map(deepest);
         let past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
         pairs.chain(past_obstacles.filter(move |violation| violation.to_s == time_s).filter_map(deepest_past_obstacle))
     }
 
-    /// Who came closest to which obstacle so far.
+    /// Returns the closest approaches of vehicles to obstacles so far.
     pub(super) fn closest_to_obstacles(&self) -> impl Iterator<Item = Event> + '_ {
         let closest = self.clearance.iter().flat_map(ClearanceAuditor::closest);
         closest.filter_map(|approach| match approach.pair {
@@ -200,8 +202,8 @@ impl Judge {
         })
     }
 
-    /// Whether the move from `start` to `end` takes more than half of some pair's clearance above the law's barrier, or of what
-    /// a vehicle has beyond an obstacle's clearance where the law keeps clear of obstacles.
+    /// Returns whether the move from `start` to `end` takes more than half of the clearance of some pair above the
+    /// law's barrier. For a law that avoids obstacles, clearances of vehicles from obstacles count as well.
     pub(super) fn refuses(
         &mut self,
         (law, links): (&dyn Law, &Graph),
@@ -217,7 +219,7 @@ impl Judge {
         {
             return true;
         }
-        // No pair is nearer than `nearest_m` and none closes by more than twice the longest move.
+        // No pair is closer than `nearest_m`, and none approaches by more than twice the longest move.
         if 2.0 * moved_m <= 0.5 * self.metric.shortest_m(self.nearest_m - barrier_m) {
             return false;
         }
@@ -231,13 +233,13 @@ impl Judge {
         if law.capabilities().sensing_range_m.is_none() {
             return links.edges().any(loses_half);
         }
-        // A pair that begins farther apart keeps half of its clearance.
+        // Pairs beyond this distance keep half of their clearance.
         self.near.update(start, metric.longest_m(barrier_m) + 4.0 * metric.ratio().max(1.0 / metric.ratio()) * moved_m);
         self.near.pairs().iter().copied().any(loses_half)
     }
 
-    /// Lower bound of the present separations of the pairs that the law acts on, in the judge's lengths: all pairs where the
-    /// law senses, else those with a link. It costs a look at every edge of a graph that is not complete.
+    /// Returns a lower bound of the separations of the pairs that the law acts on, in the auditor's metric: all pairs
+    /// for a law that senses, otherwise linked pairs. Visits every edge of an incomplete graph.
     pub(super) fn nearest_acted_on_m(&self, law: &dyn Law, links: &Graph, state: &Swarm) -> f64 {
         if law.capabilities().sensing_range_m.is_some() || links.is_complete() {
             return self.nearest_m;
@@ -246,8 +248,9 @@ impl Judge {
         links.edges().map(apart).fold(f64::INFINITY, f64::min)
     }
 
-    /// The smallest separation of any pair that the law joins or senses over the move from `start` to `end`, on which no vehicle
-    /// moves farther than `moved_m`, in the judge's lengths; or a bound of it from below that is `enough`.
+    /// Returns the smallest separation of a pair that the law acts on over the move from `start` to `end`, in the
+    /// auditor's metric. No vehicle moves farther than `moved_m`. A lower bound that is at least `enough` may replace
+    /// the exact value.
     pub(super) fn nearest_over(
         &mut self,
         (law, links): (&dyn Law, &Graph),
@@ -291,7 +294,7 @@ impl Judge {
         })
     }
 
-    /// Keeps the pairs whose keep-out balls the engine sees overlap for the first time, in index order.
+    /// Records the pairs whose keep-out balls begin to overlap in the engine, in index order.
     pub(super) fn note_engine_contacts(&mut self, plant: &dyn Plant, time_s: f64, events: &mut Vec<Event>) {
         self.contacts_now.clear();
         plant.keep_out_contacts(&mut self.contacts_now);
@@ -303,7 +306,7 @@ impl Judge {
         }
     }
 
-    /// Keeps the pairs whose hulls begin to push each other in the step that began at `from_s`, in index order.
+    /// Records the pairs whose hulls begin to touch in the step that began at `from_s`, in index order.
     pub(super) fn note_bounces(&mut self, plant: &dyn Plant, from_s: f64, events: &mut Vec<Event>) {
         std::mem::swap(&mut self.hulls_now, &mut self.hulls_before);
         self.hulls_now.clear();
@@ -316,7 +319,7 @@ impl Judge {
         }
     }
 
-    pub(super) fn finish(self) -> Judged {
+    pub(super) fn finish(self) -> AuditResults {
         let in_doubt = self.beyond_error.map(|is_beyond| self.error_m.is_some() && !is_beyond);
         let unless = |open: u64, is_in_doubt: bool, status: Status| match status {
             Status::Clear if open > 0 => Status::Undecided,
@@ -331,7 +334,7 @@ impl Judge {
             clearance.unresolved += self.bent_past_obstacles;
             clearance.status = unless(self.bent_past_obstacles, in_doubt[1], clearance.status);
         }
-        Judged {
+        AuditResults {
             audit,
             in_metres: self.in_metres.map(Auditor::finish),
             clearance,
@@ -341,7 +344,7 @@ impl Judge {
     }
 }
 
-/// How far any vehicle gets from where it is at `start`, on its way to `end` \[m\].
+/// Returns the largest distance of a vehicle from its position at `start`, on its path to `end` \[m\].
 pub(super) fn longest_move_m(start: &Swarm, path: &Path, end: &Swarm) -> f64 {
     let start = &start.positions_m;
     path.passed()
@@ -351,8 +354,8 @@ pub(super) fn longest_move_m(start: &Swarm, path: &Path, end: &Swarm) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Positions in the lengths that the judge is told: the same where these are metres.
-fn told<'a>(metric: Metric, positions_m: &'a Rows, scaled: &'a mut Rows) -> &'a Rows {
+/// Returns the positions in the auditor's metric; unchanged if that is in metres.
+fn in_metric<'a>(metric: Metric, positions_m: &'a Rows, scaled: &'a mut Rows) -> &'a Rows {
     if metric.is_metres() {
         return positions_m;
     }
@@ -360,17 +363,18 @@ fn told<'a>(metric: Metric, positions_m: &'a Rows, scaled: &'a mut Rows) -> &'a 
     scaled
 }
 
-/// Whether it cannot be told that a limit is kept by what was swept at a distance and may be nearer by so much.
-fn is_open(distance_m: f64, nearer_m: f64, limit_m: f64) -> bool {
+/// Returns whether a limit may be violated: the swept distance keeps it, but the true distance may be smaller by
+/// `nearer_m`.
+fn is_undecided(distance_m: f64, nearer_m: f64, limit_m: f64) -> bool {
     distance_m >= limit_m && distance_m - nearer_m < limit_m
 }
 
-/// The closest that a pair came in a violation.
+/// Returns the closest approach of a violation as an event.
 fn deepest(violation: &Violation) -> Event {
     Event::Approach { pair: violation.pair, time_s: violation.min_at_s, separation_m: violation.min_m }
 }
 
-/// As [`deepest`], of a vehicle and an obstacle.
+/// Returns the closest approach of a violation of an obstacle's clearance as an event.
 fn deepest_past_obstacle(violation: &Violation<ObjectPair>) -> Option<Event> {
     match violation.pair {
         ObjectPair::Obstacle { vehicle, obstacle } => {
@@ -381,7 +385,7 @@ fn deepest_past_obstacle(violation: &Violation<ObjectPair>) -> Option<Event> {
     }
 }
 
-/// Keeps what the judge found in a sweep.
+/// Records the findings of a sweep.
 fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest_m: &mut f64, events: &mut Vec<Event>) {
     if let Some(new) = finding.closest {
         *nearest_m = new.separation_m;
@@ -397,7 +401,7 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
     }
 }
 
-/// An obstacle at rest, as it is judged.
+/// Returns an obstacle at rest in the types of the audit.
 #[must_use]
 pub fn judged(obstacle: &space::Obstacle) -> audit::Obstacle {
     audit::Obstacle {
@@ -408,7 +412,7 @@ pub fn judged(obstacle: &space::Obstacle) -> audit::Obstacle {
     }
 }
 
-/// A shape, as it is judged.
+/// Returns a shape in the types of the audit.
 #[must_use]
 pub fn judged_shape(shape: space::Shape) -> audit::Shape {
     match shape {
@@ -425,7 +429,7 @@ mod tests {
     use tautline_laws::formation::Formation;
 
     #[test]
-    fn a_distance_is_clear_only_beyond_what_paths_may_bend() {
+    fn a_distance_is_clear_only_beyond_the_bend_of_paths() {
         let line = |spacing_m: f64| Formation::line(2, spacing_m).slots_m;
         let judged = |bend_m: f64, past_m: f64| {
             let scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 3.0), 2.0, 1.0);
@@ -436,13 +440,13 @@ mod tests {
             (audit.status, audit.unresolved)
         };
         assert_eq!(judged(0.0, 2.0 + 1e-6), (Status::Clear, 0));
-        assert_eq!(judged(1e-6, 2.0 + 1e-6), (Status::Undecided, 1), "each of the two may be nearer");
+        assert_eq!(judged(1e-6, 2.0 + 1e-6), (Status::Undecided, 1), "both vehicles may deviate");
         assert_eq!(judged(1e-6, 2.0 + 3e-6), (Status::Clear, 0));
         assert_eq!(judged(1e-6, 2.0 - 1e-6).0, Status::Violation);
     }
 
     #[test]
-    fn what_bends_past_an_obstacle_counts_beside_a_violation() {
+    fn a_bend_past_an_obstacle_counts_beside_a_violation() {
         let line = |from_m: f64| Rows::from_row_slice(&[from_m, 0.0, 0.0, from_m + 9.0, 0.0, 0.0]);
         let mut scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 9.0), 2.0, 2.0);
         scenario.obstacles = vec![tautline_laws::space::Obstacle {

@@ -1,9 +1,9 @@
-//! The loop: sense, supervise, command, actuate, move, judge, record.
+//! Simulation loop: sense, supervise, command, actuate, move, audit, record.
 //!
-//! A [`Simulation`] is advanced step by step; [`fly`] takes one to its end and hands everything that is recorded to a
-//! [`Sink`]. The law is asked at the beginning of each step; a [`Plant`](crate::plant::Plant) either holds its command over the step or
-//! is one of continuous time and asks the law all the way along. The audit sweeps every step, the step that a refusal
-//! shortened too. A step allocates nothing.
+//! A [`Simulation`] advances step by step; [`fly`] takes one to its end and passes all samples and events to a
+//! [`Sink`]. The law is evaluated at the beginning of each step. A [`Plant`](crate::plant::Plant) either holds the
+//! command over the step or evaluates the law in continuous time. The audit sweeps every step, also the parts of
+//! divided steps. A step allocates no memory.
 
 mod controller;
 mod ending;
@@ -21,16 +21,15 @@ use std::time::Instant;
 use crate::scenario::Scenario;
 use tautline_core::record::{Event, RecordError, Sink, Step};
 
-/// Flies a scenario with these parts to its end and hands every recorded instant to `sink`.
+/// Flies a scenario with given components to its end and passes every recorded instant to `sink`.
 ///
-/// `carry_on` is asked after each step with the number of steps flown and ends the flight with
-/// [`ControlFlow::Break`].
+/// `carry_on` is called after each step with the number of steps so far; [`ControlFlow::Break`] ends the flight.
 ///
-/// The scenario must be one that [`Scenario::validate`] accepts, and the parts of its number of vehicles.
+/// The scenario must be valid ([`Scenario::validate`]), and the components must have its number of vehicles.
 ///
 /// # Errors
-/// [`SimError`]; what was recorded up to then stays recorded. A motion that cannot be carried on is no error but an
-/// [`Ending`], with the reason as the last event of the recording.
+/// [`SimError`]; earlier records are kept. A motion that cannot be continued is not an error but an [`Ending`]; its
+/// reason is the last event of the recording.
 pub fn fly(
     scenario: &Scenario,
     parts: Parts,
@@ -41,11 +40,11 @@ pub fn fly(
     fly_on(simulation, sink, &mut |simulation| carry_on(simulation.steps()))
 }
 
-/// Flies a simulation on from where it is, as [`fly`] does; `after` is given it after each step, may load it, and ends the flight
-/// with [`ControlFlow::Break`].
+/// Continues a simulation to its end, like [`fly`]. `after` is called after each step; it may load a saved state, and
+/// ends the flight with [`ControlFlow::Break`].
 ///
 /// # Errors
-/// [`SimError`] where what is recorded cannot be kept.
+/// [`SimError`] if the recording cannot be written.
 pub fn fly_on(
     mut simulation: Simulation,
     sink: &mut dyn Sink,
@@ -68,7 +67,7 @@ pub fn fly_on(
     Ok(simulation.finish())
 }
 
-/// Gives what is to be recorded to the sink, in the order in which it happened, and shows it the step.
+/// Passes events and a due sample to the sink in order of time, then the step.
 fn hand_over(simulation: &mut Simulation, sink: &mut dyn Sink) -> Result<(), RecordError> {
     simulation.events().try_for_each(|event| sink.event(&event))?;
     sink.step(&Step { time_s: simulation.time_s(), swarm: simulation.state(), control: simulation.control() });

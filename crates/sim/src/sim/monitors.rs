@@ -1,20 +1,20 @@
-//! How far the flown motion may be from the law's motion, once a step was too long for the law.
+//! Monitors of a flight: integration error, rounding error and energy.
 
 use nalgebra::Vector3;
 
 use super::controller::Controller;
 use super::ending::Breakdown;
 use crate::scenario::Scenario;
-use tautline_core::record::{Breath, EnergyRise, Event, Reassignment};
+use tautline_core::record::{DeadlockRecovery, EnergyRise, Event, Reassignment};
 use tautline_core::swarm::{Rows, Swarm, mean_row};
 use tautline_laws::law::Certificate;
 use tautline_laws::target::Change;
 
-/// Bound of the error of integration in the separation of a pair, from the first overlong part of a step on.
+/// Bound of the integration error of a separation, from the first overlong substep on.
 ///
-/// While the fastest rate of the law is `omega` and no vehicle moves farther than `s`, the acceleration of a vehicle changes by at
-/// most `omega^2 s`, and by at most `2 a` where a limit `a` of accelerations holds. A part of length h that is held to the
-/// accelerations at its ends errs by at most that change over all of it:
+/// While the fastest rate of the law is `omega` and no vehicle moves farther than `s`, the acceleration of a vehicle
+/// changes by at most `omega^2 s`. With a limit `a` of accelerations it changes by at most `2 a`. The error of a
+/// substep of length h with accelerations from its ends is at most that of a constant error of this size:
 ///
 /// ```text
 /// c = min(omega^2 s, 2 a)
@@ -22,40 +22,41 @@ use tautline_laws::target::Change;
 /// position of a pair      h^2 c
 /// ```
 ///
-/// From part to part errors grow as those of `x'' = min(omega^2 x, 4 a)`, the fastest growth of two motions of the same law apart.
-/// Parts that are short enough for the law add nothing: their own error is of second order in the step.
+/// Errors grow from substep to substep as solutions of `x'' = min(omega^2 x, 4 a)`, the fastest divergence of two
+/// motions of the law. Substeps that are short enough for the law add no error of their own: it is of second order in
+/// the step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct IntegrationError {
     position_m: f64,
     velocity_m_s: f64,
 }
 
-/// A part of a step, as far as its error depends on it.
+/// Substep, as far as its error depends on it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
     /// Length \[s\].
     pub(super) length_s: f64,
     /// Fastest rate of the law over it \[1/s\].
     pub(super) rate_per_s: f64,
-    /// The farthest that a vehicle moved \[m\].
+    /// Longest move of a vehicle \[m\].
     pub(super) moved_m: f64,
-    /// Limit of commanded accelerations \[m/s^2\]; infinite where there is none.
+    /// Limit of commanded accelerations \[m/s^2\]; infinite without a limit.
     pub(super) limit_m_s2: f64,
-    /// Whether it is too long for the law.
+    /// Whether the substep is too long for the law.
     pub(super) is_overlong: bool,
 }
 
 impl IntegrationError {
-    /// Bound of the error of a separation \[m\]; infinite where nothing is known.
+    /// Returns the bound of the error of a separation \[m\]; infinite if unbounded.
     pub(super) fn position_m(self) -> f64 {
         self.position_m
     }
 
-    /// Error after one more part of a step.
+    /// Returns the error after one more substep.
     #[must_use]
     pub(super) fn after(self, part: Part) -> Self {
         let Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong } = part;
-        // `min` gives the limit for the product of an infinite rate and no way, which is not a number.
+        // Infinite rate times zero way is NaN, which `min` ignores.
         let change_m_s2 = |way_m: f64, most_m_s2: f64| (rate_per_s * rate_per_s * way_m).min(most_m_s2);
         let own_m_s = if is_overlong { length_s * change_m_s2(moved_m, 2.0 * limit_m_s2) } else { 0.0 };
         let position_m = self.position_m + length_s * (self.velocity_m_s + own_m_s);
@@ -64,28 +65,28 @@ impl IntegrationError {
     }
 }
 
-/// Roundings of a velocity in one step: two half kicks and the drift between them.
+/// Number of roundings of a velocity in one step: two half kicks and the drift between them.
 const VELOCITY_ROUNDINGS: f64 = 3.0;
 
-/// Upper bound of what rounding has moved any coordinate by since the start.
+/// Upper bound of the accumulated rounding error of any coordinate.
 ///
-/// Every step rounds a position x, counted from the middle of the start, to half a unit in the last place, and a velocity v a
-/// few times; what a velocity is off by moves the vehicle from then on:
+/// Every step rounds a position x, relative to the centre of the start, to half a unit in the last place, and a
+/// velocity v a few times. The error of the velocity moves the vehicle in all later steps:
 ///
 /// ```text
 /// e_v' = e_v + 3 (eps/2) |v|        e_x' = e_x + e_v' dt + (eps/2) |x|        eps = 2^-52
 /// ```
 ///
-/// A vehicle whose displacement in a step is below half a unit in the last place of its position stands still: what it does not
-/// move by is part of the bound.
+/// A vehicle whose displacement per step is below half a unit in the last place of its position stands still; the bound
+/// includes this error.
 #[derive(Clone, Copy)]
 pub(super) struct Resolution {
-    /// Middle of the start, from which a plant counts positions \[m\].
+    /// Centre of the start, the origin of a plant's positions \[m\].
     origin_m: Vector3<f64>,
     required_m: f64,
     velocity_m_s: f64,
     position_m: f64,
-    /// Rounding of the present positions, which are counted from the scenario's origin \[m\].
+    /// Rounding of the present positions relative to the origin of the scenario \[m\].
     present_m: f64,
 }
 
@@ -100,10 +101,10 @@ impl Resolution {
         }
     }
 
-    /// Takes a step of `dt_s` \[s\] that ended in a state: O(N).
+    /// Adds the rounding of a step of `dt_s` \[s\] that ended in a state, in O(N).
     ///
     /// # Errors
-    /// [`Breakdown::Unresolved`] where the bound exceeds the position error that counts as reached.
+    /// [`Breakdown::Unresolved`] if the bound exceeds the tolerance of arrival.
     pub(super) fn take(&mut self, swarm: &Swarm, dt_s: f64, step: u64) -> Result<(), Breakdown> {
         let half_unit = 0.5 * f64::EPSILON;
         let far_m = largest_coordinate(&swarm.positions_m, self.origin_m);
@@ -115,32 +116,32 @@ impl Resolution {
         if rounding_m > required_m { Err(Breakdown::Unresolved { step, rounding_m, required_m }) } else { Ok(()) }
     }
 
-    /// The bound for one coordinate \[m\].
+    /// Returns the bound for one coordinate \[m\].
     pub(super) fn rounding_m(&self) -> f64 {
         self.position_m + self.present_m
     }
 }
 
-/// Largest magnitude of a coordinate counted from an origin.
+/// Returns the largest magnitude of a coordinate relative to an origin.
 fn largest_coordinate(rows: &Rows, origin: Vector3<f64>) -> f64 {
     let largest = |axis: usize| rows.column(axis).iter().fold(0.0_f64, |most, x| most.max((x - origin[axis]).abs()));
     largest(0).max(largest(1)).max(largest(2))
 }
 
-/// What the energy did since the target changed, the worst that it ever did, and the changes themselves.
+/// Energy since the last change of the target, the worst rise, and the changes of the target.
 #[derive(Clone, Debug, Default)]
 pub(super) struct EnergyMonitor {
-    /// That of the target \[m^2/s^2\], by its revision.
+    /// Revision of the target, and its first energy \[m^2/s^2\].
     since: Option<(u64, f64)>,
-    /// The rise that integration explains least. What rounding explains is the same for all of them.
+    /// Worst rise: the one that integration explains least. Rounding is the same for all rises.
     worst: Option<EnergyRise>,
     leg: usize,
-    pub(super) breaths: Vec<Breath>,
+    pub(super) deadlock_recoveries: Vec<DeadlockRecovery>,
     pub(super) assignments: Vec<Reassignment>,
 }
 
 impl EnergyMonitor {
-    /// Tells what the supervisor has changed at an instant, and renews what the law promised where it must.
+    /// Records the supervisor's changes at an instant, and renews the certificate if necessary.
     pub(super) fn look(
         &mut self,
         scenario: &Scenario,
@@ -157,8 +158,8 @@ impl EnergyMonitor {
         let certified_m = certificate.certified_m;
         events.push(match change {
             Change::Spread { scale } => {
-                self.breaths.push(Breath { time_s, scale, certified_m });
-                Event::Breath { time_s, scale }
+                self.deadlock_recoveries.push(DeadlockRecovery { time_s, scale, certified_m });
+                Event::DeadlockRecovery { time_s, scale }
             }
             Change::Assigned { slots } => {
                 let vehicles = slots.iter().enumerate().filter(|&(i, &slot)| i != slot).count();
@@ -168,7 +169,7 @@ impl EnergyMonitor {
         });
     }
 
-    /// Takes the energy of the next instant, under the target of this revision.
+    /// Records the energy of the next instant, under the target with this revision.
     pub(super) fn take(&mut self, revision: u64, energy: Option<f64>) {
         let Some(energy) = energy else { return };
         let from = match self.since {
@@ -197,7 +198,8 @@ mod tests {
     const OVERLONG: Part =
         Part { length_s: 0.25, rate_per_s: 2.0, moved_m: 0.5, limit_m_s2: f64::INFINITY, is_overlong: true };
 
-    /// x'' = omega^2 x, the fastest growth, from x = 1 in kicks and drifts of omega h = 0.5, against cosh(omega t).
+    /// Tests x'' = omega^2 x, the fastest growth, from x = 1 in kicks and drifts with omega h = 0.5, against cosh(omega
+    /// t).
     #[test]
     fn the_bound_holds_for_a_motion_that_is_stepped_too_coarsely() {
         let Part { length_s: h, rate_per_s: omega, .. } = OVERLONG;
@@ -230,7 +232,8 @@ mod tests {
         }
     }
 
-    /// How many steps of `dt_s` two vehicles fly at rest or at a speed until the bound is exceeded; at most 100,000.
+    /// Returns the number of steps of `dt_s` that two vehicles fly at a position and speed until the bound is exceeded;
+    /// at most 100,000.
     fn steps(from_m: f64, at_m: f64, speed_m_s: f64, dt_s: f64) -> u64 {
         let rows = |x_m: f64| Rows::from_row_slice(&[x_m, 0.0, 0.0, x_m + 4.0, 0.0, 0.0]);
         let scenario = Scenario::new("pair", Swarm::at_rest(rows(from_m)), Formation::line(2, 3.0), 2.0, 1.0);
@@ -251,22 +254,22 @@ mod tests {
     }
 
     #[test]
-    fn a_swarm_far_from_its_start_is_refused_after_the_steps_that_round_it_away() {
-        // Half a unit of 2^30 m is 1.2e-7 m, of 2^40 m 1.2e-4 m.
+    fn a_swarm_far_from_its_start_ends_when_rounding_exceeds_the_tolerance() {
+        // Half a unit in the last place of 2^30 m is 1.2e-7 m, of 2^40 m 1.2e-4 m.
         assert_eq!(steps(0.0, 2.0_f64.powi(30), 0.0, 0.01), 83_886);
         assert!(steps(0.0, 2.0_f64.powi(40), 0.0, 0.01) < 90);
-        assert_eq!(steps(1e6, 1e6, 0.0, 0.01), 100_000, "it starts there");
+        assert_eq!(steps(1e6, 1e6, 0.0, 0.01), 100_000, "the start is there");
     }
 
     #[test]
-    fn what_velocities_are_off_by_adds_up_with_time() {
+    fn errors_of_velocities_accumulate_with_time() {
         assert_eq!(steps(0.0, 0.0, 1.0, 1.0 / 240.0), 100_000);
-        // 3.3e-16 of 1e6 m/s a step, 1 s each: 0.01 m after some 7,700 steps.
+        // An error of 3.3e-16 of 1e6 m/s per step of 1 s: 0.01 m after about 7,700 steps.
         assert!((7_000..8_500).contains(&steps(0.0, 0.0, 1e6, 1.0)));
     }
 
     #[test]
-    fn a_rise_is_told_within_a_target_and_not_from_one_to_the_next() {
+    fn rises_count_within_a_target_only() {
         let mut energy_monitor = EnergyMonitor::default();
         assert_eq!(energy_monitor.worst(), None);
         energy_monitor.take(0, None);
@@ -280,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_of_next_to_nothing_does_not_hide_a_rise() {
+    fn a_ratio_of_tiny_energies_does_not_hide_a_rise() {
         let mut energy_monitor = EnergyMonitor::default();
         energy_monitor.take(0, Some(0.0));
         energy_monitor.take(0, Some(1e-3));

@@ -1,10 +1,10 @@
-//! A flight that is advanced step by step.
+//! [`Simulation`]: a flight that advances step by step.
 
 mod step;
 
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
-use super::judge::{Judge, Judged};
+use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
 use super::monitors::{IntegrationError, Resolution};
 use crate::link::{self, Imperfections};
@@ -15,10 +15,10 @@ use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 use tautline_laws::law::{Certificate, Law, Void};
 use tautline_laws::target::{Schedule, Supervisor};
 
-/// A flight under way: law, link, supervisor, vehicles and judge, with everything that any of them remembers.
+/// Flight in progress: law, link, supervisor, vehicles and audit, with all of their memory.
 ///
-/// [`Simulation::step`] flies one step; what is to be recorded of it is then handed out by [`Simulation::events`] and
-/// [`Simulation::sample`]. A clone goes on by itself with the same bits, which is what [`Simulation::save`] keeps.
+/// [`Simulation::step`] flies one step; then [`Simulation::events`] and [`Simulation::sample`] return its records. A
+/// clone continues with the same bits; [`Simulation::save`] uses that.
 ///
 /// ```
 /// use tautline_sim::scenario::{Scenario, Source};
@@ -46,23 +46,23 @@ pub struct Simulation {
     next: Swarm,
     path: Path,
     control: Rows,
-    /// Whether `control` was given from outside and the law has not been asked about the present state.
+    /// Whether `control` is from outside and the law has not been evaluated for the present state.
     overruled: bool,
     time_s: f64,
     steps: u64,
     events: Vec<Event>,
-    /// The fewest parts at once in the last step.
+    /// Fewest smallest substeps flown at once in the last step.
     shortest: u64,
-    /// Steps that were flown in parts.
+    /// Number of steps that were divided.
     refined_steps: u64,
-    /// Steps of which even the shortest part was too long for the law.
+    /// Number of steps whose shortest substep was too long for the law.
     overlong_steps: u64,
-    /// Error of integration since the first of them.
+    /// Integration error since the first of them.
     error: Option<IntegrationError>,
     /// Energy of the present state \[m^2/s^2\].
     energy: Option<f64>,
     energy_monitor: EnergyMonitor,
-    /// Since the last sample.
+    /// Peaks since the last sample.
     peaks: Peaks,
     channels: Channels,
     sample_is_due: bool,
@@ -70,24 +70,25 @@ pub struct Simulation {
     pub(super) performance: Performance,
 }
 
-/// A [`Simulation`] as it was at one instant.
+/// State of a [`Simulation`] at one instant.
 #[derive(Clone)]
 pub struct Saved(Simulation);
 
 impl Simulation {
-    /// The scenario at its start, with its own law and vehicles. The scenario must be one that [`Scenario::validate`]
-    /// accepts.
+    /// Creates a flight at its start, with the scenario's own components. The scenario must be valid
+    /// ([`Scenario::validate`]).
     ///
     /// # Errors
-    /// [`SimError`] where law or judge do not exist.
+    /// [`SimError`] if the parameters give no law, or the audit does not support the scenario.
     pub fn new(scenario: &Scenario) -> Result<Self, SimError> {
         Self::with(scenario, Parts::of(scenario)?)
     }
 
-    /// The scenario at its start with other parts, all of its number of vehicles. The start is judged, and the law asked.
+    /// Creates a flight at its start with other components, which must have the scenario's number of vehicles. Audits
+    /// the start and evaluates the law.
     ///
     /// # Errors
-    /// [`SimError`] where there is no judge.
+    /// [`SimError`] if the audit does not support the scenario.
     pub fn with(scenario: &Scenario, parts: Parts) -> Result<Self, SimError> {
         let Parts { law, plant, link, supervisor } = parts;
         let count = scenario.count();
@@ -96,9 +97,9 @@ impl Simulation {
         }
         let certificate =
             scenario.certificate(law.as_ref()).void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges);
-        // A link of the scenario's own is void for reasons of its own.
-        let is_told = !scenario.is_exact() && !certificate.void.is_empty();
-        let certificate = certificate.void_where(!link.is_exact() && !is_told, Void::InexactLink);
+        // The scenario's own imperfections already void the certificate.
+        let is_void = !scenario.is_exact() && !certificate.void.is_empty();
+        let certificate = certificate.void_where(!link.is_exact() && !is_void, Void::InexactLink);
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
@@ -144,14 +145,14 @@ impl Simulation {
         self.judge_and_command(None, true)
     }
 
-    /// Flies one step of the scenario's length, in parts where that is too long; nothing once the flight has ended.
+    /// Flies one step of the scenario's length, divided if necessary. Does nothing after the end of the flight.
     ///
-    /// A step that is too long for the law's fastest rate at the present state
-    /// ([`crate::scenario::TimeSpec::max_rate_dt`]) is flown in halves (at most
-    /// [`crate::scenario::TimeSpec::max_halvings`] times), with the law asked anew in between. A step that
-    /// takes more than half of the clearance above the law's barrier from some pair is refused, undone and flown in halves;
-    /// so is one on which a path bends by more than 1e-5 m from the straight line that the audit sweeps. A step of which even
-    /// the shortest part is too long is flown all the same, counted ([`Flight::overlong_steps`]), and voids the certificate.
+    /// A step that is too long for the law's fastest rate in the present state
+    /// ([`crate::scenario::TimeSpec::max_rate_dt`]) is halved, at most [`crate::scenario::TimeSpec::max_halvings`]
+    /// times; the law is evaluated in between. A step that takes more than half of the clearance of some pair above the
+    /// law's barrier is undone and halved. So is a step on which a path bends by more than 1e-5 m from the straight
+    /// line that the audit sweeps. If even the shortest substep is too long, it is flown and counted
+    /// ([`Flight::overlong_steps`]), and the certificate is void.
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
             let asked = self.ask();
@@ -160,12 +161,12 @@ impl Simulation {
         self.step_on();
     }
 
-    /// Flies one step with accelerations \[m/s^2\], N x 3, from outside in the place of the law's, which is not asked. The step
-    /// is not shortened for the barrier or the rate of the law.
+    /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. The step is not divided
+    /// for the barrier or the rate of the law.
     ///
     /// # Errors
-    /// [`SimError::Commands`] where there is not a finite row for each vehicle; nothing is flown then. After the end nothing
-    /// is flown either. A certificate that the law gave is void from then on.
+    /// [`SimError::Commands`] unless each vehicle has a finite row; then nothing is flown. Does nothing after the end
+    /// of the flight. The law's certificate is void from then on.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
         if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
@@ -192,14 +193,14 @@ impl Simulation {
         self.end_on(flown.and(if is_last { Err(Ending::Completed) } else { Ok(()) }));
     }
 
-    /// Ends the flight here because the caller wants it; one that has ended stays as it ended.
+    /// Ends the flight as interrupted, unless it has ended.
     pub fn interrupt(&mut self) {
         if self.ending.is_none() {
             self.end_on(Err(Ending::Interrupted));
         }
     }
 
-    /// Ends the flight where it is over or cannot go on; its last instant is recorded, unless it has been.
+    /// Ends the flight if it is over or cannot continue. Records its last instant if that is not recorded yet.
     fn end_on(&mut self, flown: Result<(), Ending>) {
         if let Err(ending) = flown {
             self.sample_is_due |= ending != Ending::Completed && self.judge.closest.is_some();
@@ -209,63 +210,63 @@ impl Simulation {
         }
     }
 
-    /// How the flight ended, once it has.
+    /// Returns the ending of the flight; `None` in flight.
     #[must_use]
     pub fn ending(&self) -> Option<&Ending> {
         self.ending.as_ref()
     }
 
-    /// The present state.
+    /// Returns the present state.
     #[must_use]
     pub fn state(&self) -> &Swarm {
         &self.state
     }
 
-    /// The accelerations \[m/s^2\], N x 3, that are held from now on; no rows where the law had no answer.
+    /// Returns the accelerations \[m/s^2\], N x 3, that are held from now on; no rows if the law is undefined.
     #[must_use]
     pub fn control(&self) -> &Rows {
         &self.control
     }
 
-    /// Time flown \[s\].
+    /// Returns the time flown \[s\].
     #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
 
-    /// Whole steps flown.
+    /// Returns the number of whole steps flown.
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// The smallest clearance so far \[m\], between steps included: of two vehicles, their distance less delta in the lengths that
-    /// delta is meant in ([`tautline_laws::space::Metric`]); of a vehicle and an obstacle, its distance less the obstacle's clearance. Below 0
-    /// exactly where the judge has found a violation; none where nothing can come near anything.
+    /// Returns the smallest clearance so far \[m\], also between steps. For two vehicles it is their separation minus
+    /// delta, in the metric of delta ([`tautline_laws::space::Metric`]); for a vehicle and an obstacle their distance
+    /// minus the clearance. Negative exactly if there is a violation; `None` without pairs and obstacles.
     #[must_use]
     pub fn least_clearance_m(&self) -> Option<f64> {
         self.judge.least_clearance_m()
     }
 
-    /// The closest that two vehicles came so far, between steps included \[m\]; in scaled lengths where what must stay empty
-    /// around a vehicle is an ellipsoid ([`tautline_laws::space::Metric`]). None of fewer than two vehicles.
+    /// Returns the closest approach of two vehicles so far \[m\], also between steps; scaled if the safety shape is an
+    /// ellipsoid ([`tautline_laws::space::Metric`]). `None` for fewer than two vehicles.
     #[must_use]
     pub fn closest(&self) -> Option<ClosestApproach> {
         self.judge.least_separation()
     }
 
-    /// The smallest distance of two vehicles over the last step \[m\], in the same lengths; at the start, of the start.
+    /// Returns the smallest separation over the last step \[m\], in the same metric; at the start, that of the start.
     #[must_use]
     pub fn separation_m(&self) -> f64 {
         self.judge.nearest_m
     }
 
-    /// Takes what happened since this was asked last, in its order.
+    /// Takes the events since the last call, in order of time.
     pub fn events(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.events.drain(..)
     }
 
-    /// The present instant where the recording rate, or the end of the flight, asks for it, once.
+    /// Returns the present instant if the recording rate or the end of the flight requires it, once.
     pub fn sample(&mut self) -> Option<Sample<'_>> {
         if !std::mem::take(&mut self.sample_is_due) {
             return None;
@@ -283,15 +284,14 @@ impl Simulation {
         })
     }
 
-    /// Everything as it is now.
+    /// Saves the present state.
     #[must_use]
     pub fn save(&self) -> Saved {
         Saved(self.clone())
     }
 
-    /// Becomes what was saved, of whatever scenario, and goes on with the same bits as if it had never been interrupted;
-    /// with a `noise_seed`, all that is drawn from now on is drawn from it and nothing else changes: the air that vehicles are
-    /// in, a measurement that they hold, a sensor's lasting error and messages under way stay what they are.
+    /// Restores a saved state, of any scenario, and continues with the same bits. A `noise_seed` changes later random
+    /// numbers only: the present wind, a held measurement, constant errors of sensors and messages under way stay.
     pub fn load(&mut self, saved: &Saved, noise_seed: Option<u64>) {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
@@ -300,10 +300,10 @@ impl Simulation {
         }
     }
 
-    /// What the flight left behind besides its recording. One that is under way counts as interrupted here.
+    /// Returns the result of the flight. A flight in progress counts as interrupted.
     #[must_use]
     pub fn finish(self) -> Flight {
-        let Judged { audit, in_metres, clearance, engine_contacts, bounces } = self.judge.finish();
+        let AuditResults { audit, in_metres, clearance, engine_contacts, bounces } = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
             ending: self.ending.unwrap_or(Ending::Interrupted),
@@ -318,7 +318,7 @@ impl Simulation {
             engine_contacts,
             bounces,
             energy_rise: self.energy_monitor.worst(),
-            breaths: self.energy_monitor.breaths,
+            deadlock_recoveries: self.energy_monitor.deadlock_recoveries,
             assignments: self.energy_monitor.assignments,
             traffic: self.controller.link.traffic(),
             last: self.state,
@@ -327,28 +327,28 @@ impl Simulation {
     }
 }
 
-/// What a flight is made of beside its scenario.
+/// Components of a flight, besides its scenario.
 pub struct Parts {
     /// The control law.
     pub law: Box<dyn Law>,
-    /// What moves the vehicles.
+    /// Plant that moves the vehicles.
     pub plant: Box<dyn Plant>,
-    /// What lies between truth and law.
+    /// Imperfections between true state and law.
     pub link: Box<dyn Imperfections>,
-    /// Who changes the target.
+    /// Supervisor that changes the target.
     pub supervisor: Box<dyn Supervisor>,
 }
 
 impl Parts {
-    /// What the scenario asks for.
+    /// Returns the components of a scenario.
     ///
     /// # Errors
-    /// [`SimError::Law`] where its law does not exist, which a validated scenario rules out but for memory.
+    /// [`SimError::Law`] if the parameters give no law; for a valid scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
         Ok(Self::under(scenario, scenario.law()?))
     }
 
-    /// What the scenario asks for, under another law.
+    /// Returns the components of a scenario under another law.
     #[must_use]
     pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
         let link = link::of(scenario, law.capabilities().sensing_range_m.is_some());
@@ -357,7 +357,7 @@ impl Parts {
         let supervisor = match law.capabilities().settling {
             Some(settling) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-                supervisor.breathing(scenario.breathing, settling, leader).blown(!scenario.wind.is_still())
+                supervisor.deadlock_recovery(scenario.deadlock, settling, leader).blown(!scenario.wind.is_still())
             }
             None => supervisor,
         };
@@ -365,11 +365,11 @@ impl Parts {
     }
 }
 
-/// The channels of a flight, vehicles' before link's, in memory that is used again for each sample.
+/// Channels of a flight, those of the vehicles before those of the link. Their memory is reused for each sample.
 #[derive(Clone)]
 pub(super) struct Channels {
     all: Vec<Channel>,
-    /// How many of them are the vehicles'.
+    /// Number of channels of the vehicles.
     vehicles: usize,
 }
 
@@ -381,7 +381,7 @@ impl Channels {
         Self { all, vehicles }
     }
 
-    /// Takes the present values.
+    /// Writes the present values.
     pub(super) fn write(&mut self, plant: &dyn Plant, link: &dyn Imperfections) {
         let (vehicles, links) = self.all.split_at_mut(self.vehicles);
         plant.write_channels(vehicles);

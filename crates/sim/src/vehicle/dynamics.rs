@@ -1,69 +1,69 @@
-//! Forces and torques on a quadrotor, and the two halves of a step of second order.
+//! Forces and torques on a quadrotor, and the two halves of a second-order step.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 use super::model::{GRAVITY_M_S2, Model, Quadrotor};
 use super::rotors::{Downwash, Mixer, RotorCurve, RotorLag};
 
-/// Where a quadrotor is, how it moves and how fast its rotors turn.
+/// State of a quadrotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// Centre of mass \[m\].
     pub position_m: Vector3<f64>,
-    /// Its velocity \[m/s\].
+    /// Velocity of the centre of mass \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// Turns body into world.
+    /// Rotation from body to world.
     pub attitude: UnitQuaternion<f64>,
-    /// Rates about the body's axes \[rad/s\].
+    /// Angular rates about the body axes \[rad/s\].
     pub rates_rad_s: Vector3<f64>,
     /// Speed of each rotor \[rpm\].
     pub rotors_rpm: Vector4<f64>,
-    /// Share of its thrust that each still gives: 1 unless it has failed.
+    /// Share of its thrust that each rotor gives: 1 unless it has failed.
     pub shares: Vector4<f64>,
 }
 
-/// What acts on a quadrotor beside gravity.
+/// Force and torque on a quadrotor, without gravity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// Force in the world \[N\].
+    /// Force in the world frame \[N\].
     pub force_n: Vector3<f64>,
-    /// Torque about the body's axes \[N m\].
+    /// Torque about the body axes \[N m\].
     pub torque_n_m: Vector3<f64>,
 }
 
-/// A plane that thrust feels.
+/// Plane with a ground effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// A point of it \[m\].
+    /// Point of the plane \[m\].
     pub place_m: Vector3<f64>,
-    /// Its outward normal, of length 1.
+    /// Outward unit normal.
     pub normal: Vector3<f64>,
 }
 
-/// A step after its first half: what moves and turns the body over the whole of it.
+/// First half of a step: the motion and rotation of the body over the whole step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     /// Velocity \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// Angular velocity in the world \[rad/s\].
+    /// Angular velocity in the world frame \[rad/s\].
     pub turn_rad_s: Vector3<f64>,
-    /// Angular momentum in the world \[kg m^2/s\].
+    /// Angular momentum in the world frame \[kg m^2/s\].
     momentum: Vector3<f64>,
-    /// What the first half added, of which the end is predicted.
+    /// Kick of the first half, which predicts that of the second.
     kick_m_s: Vector3<f64>,
     twist: Vector3<f64>,
 }
 
-/// The equations of motion of a quadrotor.
+/// Equations of motion of a quadrotor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dynamics {
     model: Model,
     inertia_kg_m2: Vector3<f64>,
-    /// Where each rotor is from the centre of mass \[m\].
+    /// Position of each rotor relative to the centre of mass \[m\].
     arms_m: [Vector3<f64>; 4],
-    /// Torque about z over thrust of each \[m\].
+    /// Torque about z over thrust of each rotor \[m\].
     reactions_m: [f64; 4],
-    /// Drag of a rotor over its speed \[N s/m/rpm\].
+    /// Drag coefficient of a rotor over its speed \[N s/m/rpm\].
     drag: Vector3<f64>,
     parasitic_n_s2_m2: Vector3<f64>,
     curve: RotorCurve,
@@ -75,7 +75,8 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Of a quadrotor, above these planes where it feels any. Rotors of a model that [`Model::check`] refuses are not mixed.
+    /// Creates the equations of a quadrotor above grounds, if it has a ground effect. A model that [`Model::check`]
+    /// refuses gets no mixing of rotors.
     #[must_use]
     pub fn new(quadrotor: &Quadrotor, grounds: &[Ground]) -> Self {
         let (model, curve) = (quadrotor.model.clone(), RotorCurve::of(&quadrotor.model));
@@ -96,25 +97,25 @@ impl Dynamics {
         }
     }
 
-    /// Its numbers.
+    /// Returns the model.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Moments of inertia about the body's axes \[kg m^2\].
+    /// Returns the moments of inertia about the body axes \[kg m^2\].
     #[must_use]
     pub fn inertia_kg_m2(&self) -> Vector3<f64> {
         self.inertia_kg_m2
     }
 
-    /// Speed of a rotor that carries a quarter of the weight \[rpm\].
+    /// Returns the speed of a rotor that carries a quarter of the weight \[rpm\].
     #[must_use]
     pub fn hover_rpm(&self) -> f64 {
         self.hover_rpm
     }
 
-    /// Level at a place \[m\] with a velocity \[m/s\], rotors as in hover.
+    /// Returns a level state at a position \[m\] with a velocity \[m/s\] and rotors at hover speed.
     #[must_use]
     pub fn trimmed(&self, position_m: Vector3<f64>, velocity_m_s: Vector3<f64>) -> State {
         State {
@@ -127,7 +128,7 @@ impl Dynamics {
         }
     }
 
-    /// Thrust of each rotor \[N\], with what the ground adds.
+    /// Returns the thrust of each rotor \[N\] with the ground effect.
     #[must_use]
     pub fn thrusts_n(&self, state: &State) -> Vector4<f64> {
         let thrust_n = |speed_rpm: f64, share: f64| share * self.curve.thrust_n(speed_rpm);
@@ -140,8 +141,8 @@ impl Dynamics {
         thrusts_n
     }
 
-    /// Factor 1 + k (r/4h)^2 of the thrust of a rotor h above a ground, for h from the rotor's radius on; 1 where the rotor is
-    /// below it, or blows away from it.
+    /// Returns the factor 1 + k (r/4h)^2 of the thrust of a rotor at a height h above a ground, with h at least the
+    /// rotor's radius. It is 1 for a rotor below the ground or with its wake away from it.
     fn ground_factor(&self, state: &State, rotor: usize) -> f64 {
         let place_m = state.position_m + state.attitude * self.arms_m[rotor];
         let up = state.attitude * Vector3::z();
@@ -154,7 +155,7 @@ impl Dynamics {
             .fold(1.0, f64::max)
     }
 
-    /// What acts on it beside gravity, in a wind \[m/s\] and in what others blow down on its rotors \[m/s\].
+    /// Returns force and torque without gravity, in a wind \[m/s\] and the downwash on each rotor \[m/s\].
     #[must_use]
     pub fn wrench(&self, state: &State, wind_m_s: Vector3<f64>, down_m_s: [f64; 4]) -> Wrench {
         let body = state.attitude.to_rotation_matrix().into_inner();
@@ -176,7 +177,7 @@ impl Dynamics {
         Wrench { force_n: body * force_n, torque_n_m }
     }
 
-    /// How fast the rotors of others blow down on each rotor of a vehicle, from 0 \[m/s\].
+    /// Returns the downwash of other vehicles' rotors on each rotor of a vehicle, at least 0 \[m/s\].
     #[must_use]
     pub fn down_m_s(&self, vehicle: usize, state: &State, jets: &[Downwash]) -> [f64; 4] {
         if jets.is_empty() {
@@ -189,7 +190,7 @@ impl Dynamics {
         })
     }
 
-    /// Writes the jets of all rotors of these vehicles, four each, where they blow on each other.
+    /// Writes the jets of all rotors of these vehicles, four each, if the model has downwash.
     pub fn jets<'a>(&self, states: impl Iterator<Item = &'a State>, jets: &mut Vec<Downwash>) {
         jets.clear();
         if self.downwash {
@@ -203,7 +204,8 @@ impl Dynamics {
         }
     }
 
-    /// The rotor speeds \[rpm\] that carry out an acceleration \[m/s^2\] in this state, as far as the rotors can.
+    /// Returns the rotor speeds \[rpm\] that execute an acceleration \[m/s^2\] in this state, within the limits of the
+    /// rotors.
     #[must_use]
     pub fn asked_rpm(&self, state: &State, acceleration_m_s2: Vector3<f64>) -> Vector4<f64> {
         let force_n = self.attitude.force_n(acceleration_m_s2);
@@ -211,13 +213,13 @@ impl Dynamics {
         self.mixer.thrusts_n(lift_n, torque_n_m).map(|thrust_n| self.curve.speed_rpm(thrust_n))
     }
 
-    /// How far rotors come towards the speeds that are asked for within a time \[s\].
+    /// Returns the lag of the rotors over a time \[s\].
     #[must_use]
     pub fn rotor_lag(&self, dt_s: f64) -> RotorLag {
         RotorLag::over(&self.model, dt_s)
     }
 
-    /// Rates of change: of the velocity \[m/s^2\], and of the rates about the body's axes \[rad/s^2\].
+    /// Returns the rates of change of the velocity \[m/s^2\] and of the rates about the body axes \[rad/s^2\].
     #[must_use]
     pub fn accelerations(&self, state: &State, wrench: &Wrench) -> (Vector3<f64>, Vector3<f64>) {
         let momentum = self.inertia_kg_m2.component_mul(&state.rates_rad_s);
@@ -229,8 +231,8 @@ impl Dynamics {
         wrench.force_n / self.model.mass_kg - GRAVITY_M_S2 * Vector3::z()
     }
 
-    /// The first half of a step: half of the kick of `wrench`, and the angular velocity in the middle of the step. With no
-    /// torque the angular momentum in the world stays what it is, which is the gyroscopic term.
+    /// Returns the first half of a step: half of the kick of `wrench`, and the angular velocity in the middle of the
+    /// step. Without torque the angular momentum in the world frame is constant, which is the gyroscopic term.
     #[must_use]
     pub fn begin(&self, state: &State, wrench: &Wrench, dt_s: f64) -> Drift {
         let kick_m_s = 0.5 * dt_s * self.acceleration_m_s2(wrench);
@@ -246,26 +248,27 @@ impl Dynamics {
         }
     }
 
-    /// Angular velocity in the world \[rad/s\] of an angular momentum \[kg m^2/s\].
+    /// Returns the angular velocity in the world frame \[rad/s\] of an angular momentum \[kg m^2/s\].
     fn turn_rad_s(&self, attitude: &UnitQuaternion<f64>, momentum: Vector3<f64>) -> Vector3<f64> {
         attitude * attitude.inverse_transform_vector(&momentum).component_div(&self.inertia_kg_m2)
     }
 
-    /// Velocity and rates as they are expected at the end of a drift, where place, attitude and rotors of `state` are.
+    /// Predicts velocity and rates at the end of a drift; position, attitude and rotors of `state` must be those at its
+    /// end.
     pub fn predict(&self, state: &mut State, drift: &Drift) {
         let momentum = drift.momentum + drift.twist;
         state.velocity_m_s = drift.velocity_m_s + drift.kick_m_s;
         state.rates_rad_s = state.attitude.inverse_transform_vector(&momentum).component_div(&self.inertia_kg_m2);
     }
 
-    /// The second half of a step, with what acts at its end.
+    /// Applies the second half of a step, with the wrench at its end.
     pub fn end(&self, state: &mut State, drift: &Drift, wrench: &Wrench, dt_s: f64) {
         state.velocity_m_s = drift.velocity_m_s + 0.5 * dt_s * self.acceleration_m_s2(wrench);
         let momentum = state.attitude.inverse_transform_vector(&drift.momentum) + 0.5 * dt_s * wrench.torque_n_m;
         state.rates_rad_s = momentum.component_div(&self.inertia_kg_m2);
     }
 
-    /// Adds to a drift what a hit changed of its velocity \[m/s\] and its angular velocity \[rad/s\].
+    /// Adds the changes of velocity \[m/s\] and angular velocity \[rad/s\] by a collision to a drift.
     pub fn hit(&self, drift: &mut Drift, attitude: &UnitQuaternion<f64>, by_m_s: Vector3<f64>, by_rad_s: Vector3<f64>) {
         drift.velocity_m_s += by_m_s;
         let by = attitude.inverse_transform_vector(&by_rad_s);
@@ -273,20 +276,20 @@ impl Dynamics {
     }
 }
 
-/// An attitude turned at an angular velocity in the world \[rad/s\] for a time \[s\], as the engine turns its bodies: by
-/// 2 atan(|w| t/2), which is |w| t to second order.
+/// Rotates an attitude by an angular velocity in the world frame \[rad/s\] for a time \[s\], as the engine does. The
+/// angle is 2 atan(|w| t/2), which is |w| t to second order.
 fn turned(attitude: &UnitQuaternion<f64>, turn_rad_s: Vector3<f64>, dt_s: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * dt_s * turn_rad_s;
     UnitQuaternion::new_normalize(Quaternion::new(1.0, half.x, half.y, half.z) * attitude.into_inner())
 }
 
-/// Least share of the weight that a command may ask the rotors to lift: one that asks for less would turn the vehicle over.
+/// Smallest commanded lift as a share of the weight. With less lift, a command would turn the vehicle over.
 pub const LEAST_LIFT: f64 = 0.3;
 
-/// Share of the most thrust that a command leaves to the attitude loop.
+/// Share of the largest thrust that is reserved for the attitude loop.
 pub const THRUST_RESERVE: f64 = 0.1;
 
-/// The attitude loop of a model. The heading it keeps is that of the world's x axis.
+/// Attitude loop of a model. It keeps the heading along the world's x axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {
     mass_kg: f64,
@@ -298,7 +301,7 @@ pub struct Attitude {
 }
 
 impl Attitude {
-    /// Of a model.
+    /// Creates the attitude loop of a model.
     #[must_use]
     pub fn of(model: &Model) -> Self {
         Self {
@@ -311,9 +314,9 @@ impl Attitude {
         }
     }
 
-    /// The force \[N\] that carries out an acceleration \[m/s^2\] against gravity, as far as the rotors can: what lifts comes
-    /// first, from [`LEAST_LIFT`] of the weight to the most thrust less [`THRUST_RESERVE`], then as much sideways as that
-    /// leaves. A vehicle that can barely fly keeps its weight.
+    /// Returns the force \[N\] that executes an acceleration \[m/s^2\] against gravity, within the limits of the
+    /// rotors. Lift has priority, from [`LEAST_LIFT`] of the weight to the largest thrust less [`THRUST_RESERVE`]; the
+    /// horizontal part gets the rest. A vehicle that can barely fly carries its weight.
     #[must_use]
     pub fn force_n(&self, acceleration_m_s2: Vector3<f64>) -> Vector3<f64> {
         let most_n = self.most_n.max(self.weight_n);
@@ -325,8 +328,8 @@ impl Attitude {
         aside_n * share + Vector3::z() * lift_n
     }
 
-    /// Thrust \[N\] and torque about the body's axes \[N m\] that turn the body towards a force \[N\], given its attitude and
-    /// its rates about its own axes \[rad/s\].
+    /// Returns the thrust \[N\] and the torque about the body axes \[N m\] that turn the body towards a force \[N\].
+    /// `rates_rad_s` are about the body axes.
     #[must_use]
     pub fn wrench(
         &self,
@@ -345,7 +348,8 @@ impl Attitude {
     }
 }
 
-/// The attitude whose z axis is along a force and whose x axis heads for the world's, as a matrix of its axes.
+/// Returns the attitude with its z axis along a force and its x axis towards the world's x axis, as a matrix of its
+/// axes.
 fn facing(force_n: Vector3<f64>) -> Matrix3<f64> {
     let up = force_n.normalize();
     let left = up.cross(&Vector3::x()).normalize();

@@ -1,4 +1,4 @@
-//! Quadrotors with everything that they hold from step to step.
+//! [`Fleet`]: a swarm of quadrotors with its memory from step to step.
 
 use nalgebra::{Vector3, Vector4};
 
@@ -9,53 +9,53 @@ use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::wind::Wind;
 
-/// Frequency of the loop that holds the height of a swarm in the plane z = 0 \[rad/s\]; it is critically damped.
+/// Frequency of the critically damped loop that holds the height of a swarm in the plane z = 0 \[rad/s\].
 pub const HEIGHT_RAD_S: f64 = 2.0;
 
-/// Part of a period of the attitude loop that is rounding of a sum of steps.
+/// Relative rounding of a sum of steps in a period of the attitude loop.
 const ROUNDING: f64 = 1e-6;
 
-/// A swarm of quadrotors: states, rotor speeds that are asked for, commands that are held, the wind.
+/// Swarm of quadrotors: states, commanded rotor speeds, held commands and wind.
 ///
-/// Its attitude loops run at instants that are multiples of their period: with the first state at or after each.
+/// Attitude loops run at multiples of their period, with the first state at or after each.
 #[derive(Clone, Debug)]
 pub struct Fleet {
-    /// The equations of their motion.
+    /// Equations of motion.
     pub dynamics: Dynamics,
-    /// A state for each.
+    /// State of each vehicle.
     pub states: Vec<State>,
-    /// Velocity of the air around each, without what rotors blow \[m/s\].
+    /// Velocity of the air at each vehicle, without downwash \[m/s\].
     pub wind_m_s: Rows,
-    /// What makes it, where it is not the same all the time.
+    /// Wind, if it is not constant.
     wind: Option<Wind>,
     asked_rpm: Vec<Vector4<f64>>,
-    /// Accelerations that are commanded \[m/s^2\].
+    /// Commanded accelerations \[m/s^2\].
     commands: Rows,
-    /// Whether the height z = 0 is held whatever is commanded.
+    /// Whether the height z = 0 is held for any command.
     holds_height: bool,
     attitude_hz: f64,
     clock: Clock,
     jets: Vec<Downwash>,
     wrenches: Vec<Wrench>,
     failures: Vec<RotorFailure>,
-    /// As it was before the last [`Fleet::remember`].
+    /// State at the last [`Fleet::remember`].
     before: Before,
 }
 
-/// Rotors of which some or all thrust is lost, for the rest of the flight.
+/// Rotors that lose some or all thrust for the rest of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorFailure {
     /// The vehicle, from 0.
     pub vehicle: usize,
-    /// The rotor, from 0; where none is named all of them stop, as slowly as they follow anything.
+    /// The rotor, from 0; `None` stops all rotors, with their lag.
     pub rotor: Option<usize>,
-    /// From when on \[s\].
+    /// Time of the failure \[s\].
     pub at_s: f64,
-    /// Share of its thrust that a rotor still gives.
+    /// Share of its thrust that a failed rotor still gives.
     pub share: f64,
 }
 
-/// What goes back where a step is taken back.
+/// State to restore when a step is undone.
 #[derive(Clone, Debug, Default)]
 struct Before {
     states: Vec<State>,
@@ -64,7 +64,7 @@ struct Before {
     clock: Clock,
 }
 
-/// Time flown, and how many attitude samples have been taken.
+/// Time flown, and number of runs of the attitude loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Clock {
     time_s: f64,
@@ -72,8 +72,8 @@ struct Clock {
 }
 
 impl Fleet {
-    /// Trimmed for hover: level, rotors at the speed that carries the weight, at the places and velocities of a start. With
-    /// `holds_height` the height z = 0 is held, whatever is commanded.
+    /// Creates quadrotors trimmed for hover at the positions and velocities of a start: level, with rotors that carry
+    /// the weight. With `holds_height`, the height z = 0 is held for any command.
     #[must_use]
     pub fn trimmed(quadrotor: &Quadrotor, grounds: &[Ground], start: &Swarm, holds_height: bool) -> Self {
         let (dynamics, count) = (Dynamics::new(quadrotor, grounds), start.count());
@@ -100,7 +100,7 @@ impl Fleet {
         fleet
     }
 
-    /// The same in a wind that is at the same instant.
+    /// Adds a wind, which must be at the same instant.
     #[must_use]
     pub fn blown(mut self, wind: Wind) -> Self {
         wind.write(&mut self.wind_m_s);
@@ -109,25 +109,25 @@ impl Fleet {
         self
     }
 
-    /// The same with rotors that fail.
+    /// Adds failures of rotors.
     #[must_use]
     pub fn failing(mut self, failures: Vec<RotorFailure>) -> Self {
         self.failures = failures;
         self
     }
 
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {
         self.states.len()
     }
 
-    /// Accelerations \[m/s^2\], N x 3, that are commanded from now on.
+    /// Sets the commanded accelerations \[m/s^2\], N x 3.
     pub fn command(&mut self, accelerations_m_s2: &Rows) {
         self.commands.copy_from(accelerations_m_s2);
     }
 
-    /// Keeps what there is, for [`Fleet::go_back`].
+    /// Saves the state for [`Fleet::go_back`].
     pub fn remember(&mut self) {
         let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
         before.states.clone_from(states);
@@ -136,7 +136,7 @@ impl Fleet {
         before.clock = *clock;
     }
 
-    /// Becomes again what it was at the last [`Fleet::remember`].
+    /// Restores the state of the last [`Fleet::remember`].
     pub fn go_back(&mut self) {
         let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
         states.clone_from(&before.states);
@@ -149,7 +149,7 @@ impl Fleet {
         }
     }
 
-    /// The wind at the end of a step \[s\], which [`Fleet::go_back`] takes back.
+    /// Advances the wind to the end of a step \[s\]; [`Fleet::go_back`] undoes it.
     pub fn blow(&mut self, dt_s: f64) {
         if let Some(wind) = &mut self.wind {
             wind.advance(dt_s);
@@ -157,7 +157,7 @@ impl Fleet {
         }
     }
 
-    /// The wind at an instant of the step that [`Fleet::blow`] came to the end of, so many seconds before it.
+    /// Sets the wind at the vehicles to an instant `before_s` seconds before its present.
     pub fn blow_before(&mut self, before_s: f64) {
         if let Some(wind) = &self.wind {
             let time_s = wind.now_s() - before_s;
@@ -165,7 +165,7 @@ impl Fleet {
         }
     }
 
-    /// How long the wind is smooth from that instant on \[s\].
+    /// Returns the time for which the wind is smooth from that instant on \[s\].
     #[must_use]
     pub fn smooth_s(&self, before_s: f64) -> f64 {
         self.wind.as_ref().map_or(f64::INFINITY, |wind| {
@@ -174,15 +174,15 @@ impl Fleet {
         })
     }
 
-    /// Begins its random numbers anew.
+    /// Restarts the random numbers from another seed.
     pub fn reseed(&mut self, seed: u64) {
         if let Some(wind) = &mut self.wind {
             wind.reseed(seed);
         }
     }
 
-    /// Lets rotors fail whose time has come and the attitude loops run where they are due; says after how many seconds either is
-    /// due again.
+    /// Applies due failures of rotors and runs the attitude loops if they are due. Returns the time until the next of
+    /// either \[s\].
     pub fn run_attitude(&mut self) -> f64 {
         let Clock { time_s, samples } = self.clock;
         let now_s = time_s + ROUNDING / self.attitude_hz;
@@ -200,7 +200,7 @@ impl Fleet {
         next_s.min(self.clock.samples / self.attitude_hz - time_s)
     }
 
-    /// Takes their thrust from rotors that have failed by a time \[s\], and says when the next does.
+    /// Reduces the thrust of rotors that have failed by a time \[s\]. Returns the time of the next failure.
     fn fail(&mut self, time_s: f64) -> f64 {
         let (mut next_s, mut changed) = (f64::INFINITY, false);
         for &RotorFailure { vehicle, rotor, at_s, share } in &self.failures {
@@ -219,13 +219,13 @@ impl Fleet {
         next_s
     }
 
-    /// Asks the rotors of each for these speeds from now on \[rpm\]: attitude loops run no more.
+    /// Commands rotor speeds \[rpm\] and turns the attitude loops off.
     pub fn open_loop(&mut self, asked_rpm: &[Vector4<f64>]) {
         self.asked_rpm.copy_from_slice(asked_rpm);
         self.clock.samples = f64::INFINITY;
     }
 
-    /// What a vehicle's attitude loop is to carry out \[m/s^2\].
+    /// Returns the acceleration for the attitude loop of a vehicle \[m/s^2\].
     fn acceleration_m_s2(&self, i: usize) -> Vector3<f64> {
         let mut command_m_s2 = row(&self.commands, i);
         if self.holds_height {
@@ -235,18 +235,18 @@ impl Fleet {
         command_m_s2
     }
 
-    /// Time has passed \[s\].
+    /// Advances the clock by a time \[s\].
     pub fn pass(&mut self, dt_s: f64) {
         self.clock.time_s += dt_s;
     }
 
-    /// Rotor speeds \[rpm\] that a vehicle's attitude loop asks for.
+    /// Returns the rotor speeds \[rpm\] that the attitude loop of a vehicle commands.
     #[must_use]
     pub fn asked_rpm(&self, vehicle: usize) -> Vector4<f64> {
         self.asked_rpm[vehicle]
     }
 
-    /// What acts on each beside gravity at the present states.
+    /// Computes force and torque on each vehicle, without gravity, in the present states.
     pub fn feel(&mut self) {
         let Self { dynamics, states, wind_m_s, jets, wrenches, .. } = self;
         dynamics.jets(states.iter(), jets);
@@ -255,13 +255,13 @@ impl Fleet {
         }
     }
 
-    /// What acted on a vehicle beside gravity at the last [`Fleet::feel`].
+    /// Returns force and torque on a vehicle from the last [`Fleet::feel`].
     #[must_use]
     pub fn wrench(&self, vehicle: usize) -> &Wrench {
         &self.wrenches[vehicle]
     }
 
-    /// The second half of a step that began with these drifts, with what acts now.
+    /// Completes a step that began with these drifts, with the present forces.
     pub fn complete(&mut self, drifts: &[Drift], dt_s: f64) {
         let Self { dynamics, states, wrenches, .. } = self;
         for ((state, wrench), drift) in states.iter_mut().zip(wrenches).zip(drifts) {
@@ -269,7 +269,7 @@ impl Fleet {
         }
     }
 
-    /// Writes where they are and how fast they move.
+    /// Writes positions and velocities.
     pub fn observe(&self, swarm: &mut Swarm) {
         for (i, state) in self.states.iter().enumerate() {
             set_row(&mut swarm.positions_m, i, state.position_m);
@@ -277,8 +277,8 @@ impl Fleet {
         }
     }
 
-    /// The channels `attitude`, the quaternion that turns body into world, `rotors`, the thrust of each \[N\], and the wind's,
-    /// where one blows.
+    /// Returns the channels `attitude` (quaternion from body to world), `rotors` (thrust of each rotor \[N\]), and that
+    /// of the wind, if any.
     #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
         let attitude = Channel::new("attitude", &["qw", "qx", "qy", "qz"]);
@@ -286,7 +286,7 @@ impl Fleet {
         [attitude, rotors].into_iter().chain(self.wind.as_ref().map(|_| Wind::channel())).collect()
     }
 
-    /// Writes the values of [`Fleet::channels`].
+    /// Writes the values of the channels of [`Fleet::channels`].
     pub fn write_channels(&self, channels: &mut [Channel]) {
         let [attitude, rotors, rest @ ..] = channels else { return };
         attitude.values.clear();

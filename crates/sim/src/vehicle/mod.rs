@@ -1,12 +1,12 @@
-//! Vehicles that are more than points: their models, and the equations of their motion.
+//! Models of vehicles that are not points, and their equations of motion.
 //!
-//! [`Model`] holds the numbers of a quadrotor, [`Quadrotor`] how it is flown. [`Dynamics`] is made of both: forces and
-//! torques of a [`State`], rotors that lag, and the attitude loop that makes rotor speeds of a commanded acceleration.
-//! Nothing here moves anything: that is what a plant does.
+//! [`Model`] holds the parameters of a quadrotor, [`Quadrotor`] adds the options of a flight. [`Dynamics`] is built
+//! from both: forces and torques of a [`State`], lagging rotors, and the attitude loop that converts a commanded
+//! acceleration into rotor speeds. Plants integrate these equations.
 //!
 //! # Frames
-//! World: z up. Body: x ahead, y to the left, z along the thrust. An attitude turns body into world. Rotors are counted in
-//! the order of the model.
+//! World: z up. Body: x ahead, y to the left, z along the thrust. An attitude rotates from body to world. Rotors are
+//! numbered in the order of the model.
 
 mod dynamics;
 mod fleet;
@@ -20,26 +20,26 @@ pub use model::{GRAVITY_M_S2, MODELS, Misread, Model, ModelError, Quadrotor, Tur
 pub use rotors::{AIR_DENSITY_KG_M3, Downwash, Mixer, RotorCurve, RotorLag};
 pub use unicycle::{Heading, Steering, Unicycle};
 
-/// What kind of body a vehicle is.
+/// Kind of body of a vehicle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Airframe {
-    /// A point that carries out accelerations exactly.
+    /// A point that executes accelerations exactly.
     #[default]
     Point,
-    /// A rigid body that four rotors lift.
+    /// A rigid body lifted by four rotors.
     Quadrotor(Box<Quadrotor>),
-    /// A vehicle in the plane that goes where it looks and cannot stop.
+    /// A vehicle in the plane that moves along its heading and cannot stop.
     Unicycle(Unicycle),
 }
 
 impl Airframe {
-    /// Whether it is a point.
+    /// Returns whether the vehicle is a point.
     #[must_use]
     pub fn is_point(&self) -> bool {
         *self == Self::Point
     }
 
-    /// The quadrotor, where it is one.
+    /// Returns the quadrotor, if the vehicle is one.
     #[must_use]
     pub fn quadrotor(&self) -> Option<&Quadrotor> {
         match self {
@@ -48,7 +48,7 @@ impl Airframe {
         }
     }
 
-    /// The unicycle, where it is one.
+    /// Returns the unicycle, if the vehicle is one.
     #[must_use]
     pub fn unicycle(&self) -> Option<&Unicycle> {
         match self {

@@ -1,4 +1,4 @@
-//! The numbers of a quadrotor.
+//! Parameters of a quadrotor, and their checks.
 
 use std::ops::Range;
 
@@ -11,77 +11,78 @@ use super::rotors::Mixer;
 /// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
 pub const GRAVITY_M_S2: f64 = 9.80665;
 
-/// A quadrotor: what its file in TOML holds, for which the files of the built-in models are patterns.
+/// Model of a quadrotor: the keys of a TOML file. The files of the built-in models are examples.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// What it is called.
+    /// Name of the model.
     pub name: String,
     /// Mass in kg.
     pub mass_kg: f64,
-    /// Moments of inertia about the body's axes in kg m^2, rotors included.
+    /// Moments of inertia about the body axes in kg m^2, rotors included.
     pub inertia_kg_m2: [f64; 3],
-    /// Radius of the ball that stands for the hull, propellers included, in m.
+    /// Radius of a ball around the hull, propellers included, in m.
     pub hull_radius_m: f64,
-    /// Where the rotors are from the centre of mass, x ahead and y to the left, in m.
+    /// Positions of the rotors relative to the centre of mass, x ahead and y to the left, in m.
     pub rotor_positions_m: [[f64; 2]; 4],
-    /// Which way each rotor turns, seen from above.
+    /// Direction of rotation of each rotor, seen from above.
     pub rotor_turns: [Turn; 4],
     /// Radius of a rotor in m.
     pub rotor_radius_m: f64,
-    /// a of the thrust a n^2 + b n of a rotor in N, n in revolutions per minute.
+    /// Coefficient a of the thrust a n^2 + b n of a rotor in N, with n in revolutions per minute.
     pub thrust_n_per_rpm2: f64,
-    /// b of it.
+    /// Coefficient b of the thrust a n^2 + b n of a rotor; 0 unless given.
     #[serde(default)]
     pub thrust_n_per_rpm: f64,
-    /// Most thrust of a rotor in N.
+    /// Largest thrust of a rotor in N.
     pub max_thrust_n: f64,
-    /// Torque that turning a rotor takes, over its thrust, in m.
+    /// Reaction torque of a rotor over its thrust, in m.
     pub torque_per_thrust_m: f64,
-    /// Time constant of a rotor's speed where it grows, in s.
+    /// Time constant of a rotor's speed when it increases, in s.
     pub lag_up_s: f64,
-    /// Where it falls, in s.
+    /// Time constant of a rotor's speed when it decreases, in s.
     pub lag_down_s: f64,
-    /// Drag of all rotors in hover along the body's axes in N s/m; a rotor's grows with its speed.
+    /// Drag coefficient of all rotors in hover along the body axes in N s/m; that of a rotor is proportional to its
+    /// speed.
     #[serde(default)]
     pub rotor_drag_n_s_m: [f64; 3],
-    /// Drag of the body along its axes in N s^2/m^2, times the square of the speed.
+    /// Drag coefficient of the body along its axes in N s^2/m^2, for the square of the speed.
     #[serde(default)]
     pub parasitic_drag_n_s2_m2: [f64; 3],
-    /// k of the thrust's factor 1 + k (r/4h)^2 at a height h above a ground.
+    /// Coefficient k of the ground effect: the thrust has the factor 1 + k (r/4h)^2 at a height h above a ground.
     #[serde(default)]
     pub ground_effect: f64,
-    /// Frequency that the attitude loop asks for, in rad/s.
+    /// Natural frequency of the attitude loop in rad/s.
     pub attitude_rad_s: f64,
-    /// Damping ratio that it asks for.
+    /// Damping ratio of the attitude loop.
     pub attitude_damping: f64,
 }
 
-/// Which way a rotor turns, seen from above.
+/// Direction of rotation of a rotor, seen from above.
 #[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Turn {
-    /// Counterclockwise: the body is turned clockwise.
+    /// Counterclockwise; the reaction turns the body clockwise.
     Ccw,
-    /// Clockwise.
+    /// Clockwise; the reaction turns the body counterclockwise.
     Cw,
 }
 
-/// A quadrotor as it is flown.
+/// Quadrotor with the options of a flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quadrotor {
-    /// Its numbers.
+    /// Parameters of the quadrotor.
     pub model: Model,
-    /// How often its attitude loop runs \[Hz\].
+    /// Rate of its attitude loop \[Hz\].
     pub attitude_hz: f64,
-    /// Whether thrust grows near a ground: a half-space among the obstacles.
+    /// Whether thrust grows near the ground, which is a half-space among the obstacles.
     pub ground_effect: bool,
-    /// Whether rotors blow on vehicles below.
+    /// Whether downwash acts on vehicles below.
     pub downwash: bool,
 }
 
 impl Turn {
-    /// Sign of the torque about z that turning the rotor puts on the body.
+    /// Returns the sign of the rotor's reaction torque on the body about z.
     pub(super) fn reaction(self) -> f64 {
         match self {
             Self::Ccw => -1.0,
@@ -91,47 +92,47 @@ impl Turn {
 }
 
 impl Model {
-    /// Most thrust of all rotors \[N\].
+    /// Returns the largest thrust of all rotors \[N\].
     #[must_use]
     pub fn most_thrust_n(&self) -> f64 {
         4.0 * self.max_thrust_n
     }
 
-    /// Weight \[N\].
+    /// Returns the weight \[N\].
     #[must_use]
     pub fn weight_n(&self) -> f64 {
         self.mass_kg * GRAVITY_M_S2
     }
 
-    /// The slower of a rotor's two time constants \[s\].
+    /// Returns the longer of a rotor's two time constants \[s\].
     #[must_use]
     pub fn lag_s(&self) -> f64 {
         self.lag_up_s.max(self.lag_down_s)
     }
 }
 
-/// The built-in models by name, with the text of their files.
+/// Built-in models: names and texts of their files.
 pub const MODELS: [(&str, &str); 3] = [
     ("crazyflie", include_str!("../../../../assets/vehicles/crazyflie.toml")),
     ("crazyflie-brushless", include_str!("../../../../assets/vehicles/crazyflie-brushless.toml")),
     ("hummingbird", include_str!("../../../../assets/vehicles/hummingbird.toml")),
 ];
 
-/// What is wrong with the text of a model, and which of its bytes say so.
+/// Error in the text of a model, with its bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Misread {
-    /// What is wrong, in a sentence.
+    /// Message, one sentence.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub help: String,
-    /// The offending bytes.
+    /// Offending bytes.
     pub span: Range<usize>,
 }
 
 /// Reads and checks a model.
 ///
 /// # Errors
-/// [`Misread`] where the text is not TOML, lacks a key, has another one, or says what cannot be flown.
+/// [`Misread`] if the text is not TOML, has a missing or unknown key, or the model is invalid.
 pub fn read(text: &str) -> Result<Model, Misread> {
     let model: Model = toml::from_str(text).map_err(|error| Misread {
         message: error.message().to_owned(),
@@ -146,27 +147,27 @@ pub fn read(text: &str) -> Result<Model, Misread> {
     Ok(model)
 }
 
-/// Least and largest magnitude of a positive number of a model, in its unit.
+/// Smallest and largest magnitude of a positive number of a model, in its unit.
 const BOUNDS: (f64, f64) = (1e-12, 1e6);
 
-/// What is wrong with a model.
+/// Error of a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct ModelError {
-    /// The key of the model.
+    /// Key of the model.
     pub key: &'static str,
-    /// What is wrong with it, in a sentence.
+    /// Message, one sentence.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub help: String,
 }
 
 impl Model {
-    /// Whether it can be flown: positive numbers, a body that can exist, rotors that lift it, turn it about every axis and
-    /// are fast enough for its attitude loop.
+    /// Checks that a model can fly: positive numbers, a possible inertia, and rotors that lift it, turn it about every
+    /// axis and are fast enough for its attitude loop.
     ///
     /// # Errors
-    /// [`ModelError`] for the first that does not hold.
+    /// [`ModelError`] for the first violated condition.
     pub fn check(&self) -> Result<(), ModelError> {
         self.check_numbers()?;
         self.check_body()?;
@@ -174,25 +175,25 @@ impl Model {
             return Err(refuse(
                 "max_thrust_n",
                 format!(
-                    "the most thrust of four rotors is {} N, not more than the weight of {:.6} N",
+                    "the largest thrust of four rotors is {} N, not more than the weight of {:.6} N",
                     self.most_thrust_n(),
                     self.weight_n()
                 ),
-                format!("it must lift the vehicle: more than {:.6} N a rotor", 0.25 * self.weight_n()),
+                format!("give more than {:.6} N per rotor", 0.25 * self.weight_n()),
             ));
         }
         if Mixer::new(self).is_none() {
             return Err(refuse(
                 "rotor_positions_m",
-                "the rotors cannot lift, roll, pitch and yaw the vehicle each by itself".to_owned(),
-                "stand them around the centre of mass, two of the four turning each way".to_owned(),
+                "the rotors cannot lift, roll, pitch and yaw the vehicle independently".to_owned(),
+                "place them around the centre of mass, two of the four turning each way".to_owned(),
             ));
         }
         self.check_attitude(0.0)
     }
 
-    /// Whether the attitude loop is stable where it waits for `wait_s` on the average before it acts: with a lag tau the
-    /// attitude obeys tau s^3 + s^2 + 2 zeta omega s + omega^2.
+    /// Checks that the attitude loop is stable with a mean delay of `wait_s`. With a lag tau the characteristic
+    /// polynomial is tau s^3 + s^2 + 2 zeta omega s + omega^2.
     ///
     /// # Errors
     /// [`ModelError`] with the inequality.
@@ -204,8 +205,8 @@ impl Model {
         Err(refuse(
             "attitude_rad_s",
             format!(
-                "the attitude loop is unstable: 2 zeta > omega tau is needed, and 2 * {zeta} <= {omega} rad/s * {lag_s} s, \
-                 the lag of the rotors and half of a period of the loop"
+                "the attitude loop is unstable. It needs 2 zeta > omega tau, got 2 * {zeta} <= {omega} rad/s * {lag_s} \
+                 s (lag of the rotors and half a period of the loop)"
             ),
             format!("set attitude_rad_s to about {:.3}, which is 0.4/tau, and attitude_damping to 1", 0.4 / lag_s),
         ))
@@ -213,7 +214,7 @@ impl Model {
 
     fn check_numbers(&self) -> Result<(), ModelError> {
         if self.name.trim().is_empty() {
-            return Err(refuse("name", "the model has no name".to_owned(), "give it one".to_owned()));
+            return Err(refuse("name", "the name is empty".to_owned(), "name the model".to_owned()));
         }
         let [jx, jy, jz] = self.inertia_kg_m2;
         let positive = [
@@ -250,7 +251,7 @@ impl Model {
         }
     }
 
-    /// No mass distribution has a moment of inertia above the sum of the other two.
+    /// Checks that no moment of inertia exceeds the sum of the other two, as for any mass distribution.
     fn check_body(&self) -> Result<(), ModelError> {
         let [x, y, z] = self.inertia_kg_m2;
         let Some((largest, rest)) = [(x, y + z), (y, x + z), (z, x + y)].into_iter().find(|(one, rest)| one > rest)
@@ -260,7 +261,7 @@ impl Model {
         Err(refuse(
             "inertia_kg_m2",
             format!("a moment of inertia of {largest:e} kg m^2 is more than the other two together, {rest:e} kg m^2"),
-            "no body is so: each is at most the sum of the other two".to_owned(),
+            "reduce it: each is at most the sum of the other two".to_owned(),
         ))
     }
 }
@@ -274,14 +275,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_built_in_model_is_right_and_has_its_name() {
+    fn every_built_in_model_is_valid_and_has_its_name() {
         for (name, text) in MODELS {
             assert_eq!(read(text).expect("a model").name, name);
         }
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn errors_of_a_model_have_their_place() {
         let (_, text) = MODELS[0];
         for (before, after, said) in [
             ("mass_kg = 0.0328", "mass_kg = -1.0", "mass_kg is -1"),
@@ -289,7 +290,7 @@ mod tests {
             ("16.8e-6, 16.8e-6, 29.8e-6", "16.8e-6, 16.8e-6, 39.8e-6", "more than the other two together"),
             ("max_thrust_n = 0.12", "max_thrust_n = 0.08", "not more than the weight of 0.321658 N"),
             ("attitude_rad_s = 6.0", "attitude_rad_s = 31.0", "2 zeta > omega tau"),
-            ("\"ccw\", \"cw\", \"ccw\", \"cw\"", "\"cw\", \"cw\", \"cw\", \"cw\"", "each by itself"),
+            ("\"ccw\", \"cw\", \"ccw\", \"cw\"", "\"cw\", \"cw\", \"cw\", \"cw\"", "independently"),
             ("lag_up_s = 0.065", "lag_up_s = nan", "lag_up_s is NaN"),
             ("ground_effect = 11", "ground_effects = 11", "unknown field `ground_effects`"),
         ] {

@@ -1,4 +1,4 @@
-//! A rotor: its thrust at a speed, and the speed that lags behind what is asked for.
+//! Rotors: thrust curve, lag, mixing and downwash.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -12,19 +12,19 @@ pub struct RotorCurve {
 }
 
 impl RotorCurve {
-    /// Of a model.
+    /// Creates the curve of a model.
     #[must_use]
     pub fn of(model: &Model) -> Self {
         Self { a: model.thrust_n_per_rpm2, b: model.thrust_n_per_rpm }
     }
 
-    /// Thrust at a speed \[N\].
+    /// Returns the thrust at a speed \[N\].
     #[must_use]
     pub fn thrust_n(self, speed_rpm: f64) -> f64 {
         (speed_rpm * (self.a * speed_rpm + self.b)).max(0.0)
     }
 
-    /// Speed that gives a thrust of 0 or more \[rpm\]: n = (-b + sqrt(b^2 + 4 a f))/(2 a).
+    /// Returns the speed of a thrust \[rpm\]: n = (-b + sqrt(b^2 + 4 a f))/(2 a).
     #[must_use]
     pub fn speed_rpm(self, thrust_n: f64) -> f64 {
         let Self { a, b } = self;
@@ -32,7 +32,7 @@ impl RotorCurve {
     }
 }
 
-/// How far rotors come towards the speeds that are asked for within a time: exp(-dt/lag) of the difference is left.
+/// Lag of rotors over a time: the difference from the commanded speed shrinks by exp(-dt/lag).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorLag {
     up: f64,
@@ -44,7 +44,7 @@ impl RotorLag {
         Self { up: libm::exp(-dt_s / model.lag_up_s), down: libm::exp(-dt_s / model.lag_down_s) }
     }
 
-    /// The speeds \[rpm\] after this time where `asked_rpm` are held: exact, for a speed does not pass what is asked for.
+    /// Returns the exact speeds \[rpm\] after this time with constant `asked_rpm`; a speed never crosses its command.
     #[must_use]
     pub fn after(self, rotors_rpm: Vector4<f64>, asked_rpm: Vector4<f64>) -> Vector4<f64> {
         rotors_rpm.zip_map(&asked_rpm, |speed_rpm, asked_rpm| {
@@ -54,21 +54,22 @@ impl RotorLag {
     }
 }
 
-/// Determinant, with lengths in arms, from which four rotors set thrust and torques each by itself.
+/// Smallest determinant of the mixing matrix, with lengths relative to the arms, for independent thrust and torques.
 const LEAST_DETERMINANT: f64 = 1e-3;
 
-/// The shares of each rotor in a thrust and in the torques about the body's axes; by default none.
+/// Mixing of rotors: their shares in thrust and torques about the body axes; all 0 by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mixer {
-    /// Thrust of each rotor for a unit of all thrust, with no torque.
+    /// Thrust of each rotor for a unit of total thrust, without torque.
     lift: Vector4<f64>,
-    /// Thrust \[N\] of each rotor for a torque of 1 N m about x, y and z, without thrust.
+    /// Thrust \[N\] of each rotor for a torque of 1 N m about x, y and z, without total thrust.
     turns: [Vector4<f64>; 3],
     most_n: f64,
 }
 
 impl Mixer {
-    /// Of a model; none where its rotors cannot set thrust and torques each by itself, all pushing.
+    /// Creates the mixing of a model; `None` if its rotors, which only push, cannot set thrust and torques
+    /// independently.
     #[must_use]
     pub fn new(model: &Model) -> Option<Self> {
         let places = model.rotor_positions_m.map(|[x, y]| [x, y]);
@@ -86,8 +87,8 @@ impl Mixer {
         (lift.min() > 0.0).then_some(Self { lift, turns, most_n: model.max_thrust_n })
     }
 
-    /// The thrust of each rotor \[N\], from 0 to its most, that gives a thrust \[N\] and a torque about the body's axes \[N m\]
-    /// as far as they go: roll and pitch as much as there is, then yaw, then thrust.
+    /// Returns the thrust of each rotor \[N\], from 0 to its largest, for a total thrust \[N\] and a torque about the
+    /// body axes \[N m\]. Where rotors saturate, roll and pitch have priority, then yaw, then thrust.
     #[must_use]
     pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
         let [roll, pitch, yaw] = &self.turns;
@@ -108,13 +109,14 @@ impl Mixer {
         (turning + self.lift * lift_n).map(|thrust_n| thrust_n.clamp(0.0, self.most_n))
     }
 
-    /// The largest share of `more`, up to all of it, for which some thrust keeps every rotor within its limits; for none of it
-    /// there is one.
+    /// Returns the largest share of `more`, at most 1, for which some total thrust keeps every rotor within its limits.
+    /// For a share of 0 there must be such a thrust.
     fn largest_share(&self, base: &Vector4<f64>, more: &Vector4<f64>) -> f64 {
         let mut share = 1.0_f64;
         for i in 0..4 {
             for j in 0..4 {
-                // The thrust that rotor i needs for its least must not be more than rotor j allows for its most.
+                // The total thrust that rotor i needs for its minimum must not exceed that at which rotor j reaches its
+                // maximum.
                 let spread = |of: &Vector4<f64>| of[j] / self.lift[j] - of[i] / self.lift[i];
                 let (room, grows) = (self.most_n / self.lift[j] - spread(base), spread(more));
                 if grows > 0.0 {
@@ -129,23 +131,23 @@ impl Mixer {
 /// Density of air at sea level \[kg/m^3\].
 pub const AIR_DENSITY_KG_M3: f64 = 1.225;
 
-/// Speed of a round jet on its axis: 6.6 sqrt(T/rho)/z in its far field.
+/// Coefficient of the speed of a round jet on its axis in its far field: 6.6 sqrt(T/rho)/z.
 const FAR_FIELD: f64 = 6.6;
 
-/// Farther from a jet's axis than so many of its widths nothing is felt.
+/// Distance from the axis of a jet, in jet widths, beyond which it is neglected.
 const WIDTHS: f64 = 4.0;
 
-/// Farther below a rotor nothing is felt \[m\].
+/// Distance below a rotor beyond which its jet is neglected \[m\].
 const REACH_M: f64 = 20.0;
 
-/// The jet of one rotor, which blows straight down.
+/// Vertical jet of one rotor.
 ///
-/// Momentum theory and a textbook's round jet: the induced speed v = sqrt(T/(2 rho A)) becomes 2 v in the wake, and the speed
-/// on the axis falls as U1 = min(2 v, 6.6 sqrt(T/rho)/z), over a width b = sqrt(2 T/(pi rho))/U1 that keeps the momentum.
-/// Jets add up by their squares: U^2 = sum U1^2 exp(-2 r^2/b^2).
+/// Momentum theory and a textbook round jet: the induced speed v = sqrt(T/(2 rho A)) becomes 2 v in the wake. The speed
+/// on the axis falls as U1 = min(2 v, 6.6 sqrt(T/rho)/z), over a width b = sqrt(2 T/(pi rho))/U1 that conserves
+/// momentum. Jets add by squares: U^2 = sum U1^2 exp(-2 r^2/b^2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Downwash {
-    /// Where the rotor is \[m\].
+    /// Position of the rotor \[m\].
     place_m: Vector3<f64>,
     /// sqrt(T/rho) \[m^2/s\].
     strength: f64,
@@ -153,7 +155,7 @@ pub struct Downwash {
 }
 
 impl Downwash {
-    /// Below a rotor at a place \[m\], of a radius \[m\] and a thrust \[N\].
+    /// Creates the jet of a rotor with a position \[m\], a radius \[m\] and a thrust \[N\].
     #[must_use]
     pub fn new(place_m: Vector3<f64>, radius_m: f64, thrust_n: f64) -> Self {
         let strength = (thrust_n.max(0.0) / AIR_DENSITY_KG_M3).sqrt();
@@ -161,7 +163,7 @@ impl Downwash {
         Self { place_m, strength, wake_m_s }
     }
 
-    /// Square of the speed at which it blows downwards at a point \[m^2/s^2\].
+    /// Returns the square of the downward speed at a point \[m^2/s^2\].
     #[must_use]
     pub fn squared_m2_s2(&self, point_m: Vector3<f64>) -> f64 {
         let from_m = point_m - self.place_m;

@@ -1,17 +1,17 @@
-//! A vehicle in the plane that goes where it looks and cannot stop: a unicycle, and at a constant speed Dubins' vehicle.
+//! Unicycles: vehicles in the plane that move along their heading and cannot stop; at constant speed, Dubins vehicles.
 
 use nalgebra::Vector3;
 
-/// What a unicycle can do: p' = s (cos psi, sin psi), s' = a, psi' = omega.
+/// Limits of a unicycle: p' = s (cos psi, sin psi), s' = a, psi' = omega.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unicycle {
-    /// Least speed \[m/s\], more than 0: it cannot stop.
+    /// Smallest speed \[m/s\], more than 0.
     pub min_speed_m_s: f64,
-    /// Largest speed \[m/s\]; at the least it is Dubins' vehicle.
+    /// Largest speed \[m/s\]; equal to the smallest for a Dubins vehicle.
     pub max_speed_m_s: f64,
-    /// Largest rate of its heading \[rad/s\].
+    /// Largest turn rate \[rad/s\].
     pub max_turn_rad_s: f64,
-    /// Largest acceleration along its heading \[m/s^2\].
+    /// Largest acceleration along the heading \[m/s^2\].
     pub max_accel_m_s2: f64,
 }
 
@@ -21,7 +21,7 @@ impl Default for Unicycle {
     }
 }
 
-/// Where a unicycle looks and how fast it goes.
+/// Heading and speed of a unicycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heading {
     /// Heading psi, counterclockwise from x \[rad\].
@@ -30,18 +30,18 @@ pub struct Heading {
     pub speed_m_s: f64,
 }
 
-/// How they change.
+/// Rates of change of heading and speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Steering {
     /// Acceleration a along the heading \[m/s^2\].
     pub accel_m_s2: f64,
-    /// Rate omega of the heading \[rad/s\].
+    /// Turn rate omega \[rad/s\].
     pub turn_rad_s: f64,
 }
 
 impl Unicycle {
-    /// What it makes of a commanded acceleration u \[m/s^2\]: a = u . e and omega = u . n/s as far as its limits let it, with e
-    /// along its heading and n to its left. Over `dt_s` seconds its speed stays within its limits.
+    /// Returns the steering for a commanded acceleration u \[m/s^2\]: a = u . e and omega = u . n/s within the limits.
+    /// Unit vector e is along the heading, n to its left. The speed stays within its limits over `dt_s` seconds.
     #[must_use]
     pub fn steering(&self, of: Heading, command_m_s2: Vector3<f64>, dt_s: f64) -> Steering {
         let (sin, cos) = libm::sincos(of.psi_rad);
@@ -55,7 +55,7 @@ impl Unicycle {
         }
     }
 
-    /// Its heading and speed after `dt_s` seconds, within its limits.
+    /// Returns heading and speed after `dt_s` seconds, within the limits.
     #[must_use]
     pub fn after(&self, of: Heading, by: Steering, dt_s: f64) -> Heading {
         let speed_m_s = of.speed_m_s + by.accel_m_s2 * dt_s;
@@ -67,21 +67,22 @@ impl Unicycle {
 }
 
 impl Heading {
-    /// The heading of a velocity \[m/s\] in the plane.
+    /// Returns the heading and speed of a velocity \[m/s\] in the plane.
     #[must_use]
     pub fn of(velocity_m_s: Vector3<f64>) -> Self {
         let speed_m_s = libm::hypot(velocity_m_s.x, velocity_m_s.y);
         Self { psi_rad: libm::atan2(velocity_m_s.y, velocity_m_s.x), speed_m_s }
     }
 
-    /// Its velocity \[m/s\].
+    /// Returns the velocity \[m/s\].
     #[must_use]
     pub fn velocity_m_s(&self) -> Vector3<f64> {
         let (sin, cos) = libm::sincos(self.psi_rad);
         self.speed_m_s * Vector3::new(cos, sin, 0.0)
     }
 
-    /// The way over `dt_s` seconds \[m\]: the chord of the arc, exact at a constant speed, and else off by a omega dt^3/12 at most.
+    /// Returns the displacement over `dt_s` seconds \[m\]: the chord of the arc. Exact at constant speed; otherwise the
+    /// error is at most a omega dt^3/12.
     #[must_use]
     pub fn way_m(&self, by: Steering, dt_s: f64) -> Vector3<f64> {
         let half_turn = 0.5 * by.turn_rad_s * dt_s;
@@ -89,7 +90,7 @@ impl Heading {
         (self.speed_m_s + 0.5 * by.accel_m_s2 * dt_s) * dt_s * sinc(half_turn) * Vector3::new(cos, sin, 0.0)
     }
 
-    /// How far at most it leaves that chord \[m\]: |p''| dt^2/8.
+    /// Returns a bound of the deviation of the arc from its chord \[m\]: |p''| dt^2/8.
     #[must_use]
     pub fn bend_m(&self, by: Steering, dt_s: f64) -> f64 {
         let fastest_m_s = self.speed_m_s + (by.accel_m_s2 * dt_s).max(0.0);
@@ -109,7 +110,7 @@ mod tests {
     const SLOW: Heading = Heading { psi_rad: 0.7, speed_m_s: 0.5 };
 
     #[test]
-    fn a_command_along_speeds_up_and_one_across_turns_as_far_as_the_limits_let_it() {
+    fn a_command_along_the_heading_accelerates_and_one_across_turns_within_limits() {
         let unicycle = Unicycle::default();
         let ahead = SLOW.velocity_m_s() / SLOW.speed_m_s;
         let left = Vector3::new(-ahead.y, ahead.x, 0.0);
@@ -126,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn at_a_constant_speed_the_way_is_the_chord_of_a_circle_and_the_arc_stays_within_its_bend() {
+    fn at_constant_speed_the_displacement_is_the_chord_of_a_circle() {
         let by = Steering { accel_m_s2: 0.0, turn_rad_s: 1.3 };
         let heading = Heading { psi_rad: 0.4, speed_m_s: 2.0 };
         let dt_s = 0.8;

@@ -1,4 +1,4 @@
-//! The step of the audit takes no memory once its lists have grown to the swarm.
+//! A step of the audit allocates no memory once its lists have grown.
 
 use nalgebra::Vector3;
 use stats_alloc::Region;
@@ -11,10 +11,10 @@ use crate::ALLOCATOR;
 
 const DELTA_M: f64 = 2.0;
 const SPACING_M: f64 = 5.0;
-/// Wide enough that many near-pair lists are made while counting: each lasts some 30 steps.
+/// Enough steps for many lists of near pairs: each lasts about 30 steps.
 const STEPS: u32 = 400;
 
-/// A square lattice, sheared to and fro: the lattice at phase 0 is that at every whole phase.
+/// Returns a square lattice, sheared back and forth: the lattice at phase 0 repeats at every integer phase.
 fn lattice(n: usize, phase: f64) -> Rows {
     let side = n.isqrt();
     let shear = (std::f64::consts::TAU * phase).sin();
@@ -41,7 +41,7 @@ pub(crate) fn a_step_of_a_warm_auditor_allocates_nothing() {
     }
 }
 
-/// A grid that drifts, each vehicle a little its own way, seen three times.
+/// Returns three samples of a drifting grid in which each vehicle has its own velocity.
 fn recorded(side: usize) -> (Vec<String>, Vec<Item>) {
     let count = side * side;
     let items = (0..3).flat_map(|k| {
@@ -56,8 +56,8 @@ fn recorded(side: usize) -> (Vec<String>, Vec<Item>) {
     ((1..=count).map(|number| number.to_string()).collect(), items.collect())
 }
 
-pub(crate) fn a_recording_is_judged_in_memory_for_its_vehicles_and_not_for_their_pairs() {
-    /// A vehicle with its name, segments, extents, and four times over what lists leave behind as they grow.
+pub(crate) fn the_memory_of_an_audit_is_linear_in_the_vehicles() {
+    /// Limit per vehicle: its name, segments, extents, and four times the capacity that growing lists leave unused.
     const MOST_BYTES_EACH: usize = 4000;
     for side in [20, 80] {
         let (names, items) = recorded(side);

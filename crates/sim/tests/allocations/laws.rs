@@ -1,4 +1,4 @@
-//! A step of a law and a look at the formation take no memory.
+//! A step of a law and a check of the formation allocate no memory.
 
 use stats_alloc::Region;
 use tautline_core::swarm::{Rows, Swarm};
@@ -41,7 +41,7 @@ pub(crate) fn control_energy_and_errors_of_the_shape_allocate_nothing() {
     }
     let region = Region::new(ALLOCATOR);
     std::hint::black_box(Graph::complete(40).laplacian());
-    assert!(region.change().allocations > 0, "the counter sees what is allocated");
+    assert!(region.change().allocations > 0, "the counter counts allocations");
 }
 
 pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {

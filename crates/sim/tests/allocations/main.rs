@@ -1,6 +1,6 @@
-//! What runs at every step takes no memory.
+//! Operations of every step allocate no memory.
 //!
-//! One program without a harness, because the counter is one for the whole process: a harness has threads of its own.
+//! One program without a test harness: the counter is global, and a harness has threads of its own.
 
 mod audit;
 mod laws;
@@ -19,7 +19,7 @@ fn main() {
     laws::a_law_that_senses_allocates_nothing_once_its_lists_have_grown();
     space::a_search_of_near_pairs_that_has_grown_allocates_nothing();
     audit::a_step_of_a_warm_auditor_allocates_nothing();
-    audit::a_recording_is_judged_in_memory_for_its_vehicles_and_not_for_their_pairs();
+    audit::the_memory_of_an_audit_is_linear_in_the_vehicles();
     step_loop::the_loop_allocates_nothing_per_step();
     println!("a step allocates nothing");
 }

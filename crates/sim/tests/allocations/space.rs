@@ -1,4 +1,4 @@
-//! A search that has grown takes no memory.
+//! A search allocates no memory once its lists have grown.
 
 use stats_alloc::Region;
 use tautline_laws::formation::Formation;

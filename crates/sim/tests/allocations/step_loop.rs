@@ -1,4 +1,4 @@
-//! The loop takes no memory per step: a flight of 300 steps allocates as often as one of 20.
+//! The loop allocates no memory per step: a flight of 300 steps allocates as often as one of 20.
 
 use std::ops::ControlFlow;
 
@@ -16,7 +16,7 @@ const FEW: u32 = 20;
 const MANY: u32 = 300;
 const ATTEMPTS: u32 = 3;
 
-/// Semi-implicit Euler without an engine.
+/// Semi-implicit Euler plant without an engine.
 #[derive(Clone)]
 struct Euler {
     state: Swarm,
@@ -56,7 +56,7 @@ impl Plant for Euler {
     }
 }
 
-/// A law that takes memory each time it is asked.
+/// Law that allocates memory at each evaluation.
 #[derive(Clone)]
 struct Wasteful(Box<dyn Law>);
 
@@ -75,7 +75,7 @@ fn builtin(name: &str, sets: &[&str]) -> Scenario {
     Scenario::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
 }
 
-/// How often a flight of so many steps takes memory.
+/// Returns the number of allocations of a flight of a number of steps.
 fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, plant: Box<dyn Plant>) -> usize {
     let mut scenario = scenario.clone();
     scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
@@ -87,7 +87,7 @@ fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, plant: Box<dy
     change.allocations + change.reallocations
 }
 
-/// How much more often a long flight takes memory than a short one, once the threads have what they take at first.
+/// Returns the excess allocations of a long flight over a short one, after a flight that initializes the threads.
 fn growth(scenario: &Scenario, law: impl Fn() -> Box<dyn Law>, plant: impl Fn() -> Box<dyn Plant>) -> usize {
     let [_, few, many] = [FEW, FEW, MANY].map(|steps| allocations(scenario, steps, law(), plant()));
     many.saturating_sub(few)
@@ -103,7 +103,7 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             "formation={shape=\"circle\", radius_m=200}",
         ],
     );
-    // Under a law whose energy of a state that it was not asked about takes no memory.
+    // Under a law whose energy of a state without evaluation allocates nothing.
     let imperfect = builtin(
         "pentagon-laplacian",
         &[
@@ -121,15 +121,15 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
             Box::new(Euler { state, held, a22_per_s: scenario.a22_per_s }) as Box<dyn Plant>
         };
-        // Idle threads take some memory now and then; what a step takes is in every attempt.
-        let takes_none = |_| threads.install(|| growth(scenario, law, euler)) == 0;
-        assert!((0..ATTEMPTS).any(takes_none), "{name}: a step takes memory: {}", growth(scenario, law, euler));
+        // Idle threads allocate now and then; allocations of a step occur in every attempt.
+        let allocates_nothing = |_| threads.install(|| growth(scenario, law, euler)) == 0;
+        assert!((0..ATTEMPTS).any(allocates_nothing), "{name}: a step allocates: {}", growth(scenario, law, euler));
 
         let wasteful = || -> Box<dyn Law> { Box::new(Wasteful(law())) };
         let grown = threads.install(|| growth(scenario, wasteful, euler));
-        assert!(grown >= (MANY - FEW) as usize, "{name}: a law that allocates is seen: {grown}");
+        assert!(grown >= (MANY - FEW) as usize, "{name}: a law that allocates is counted: {grown}");
 
         let engine = threads.install(|| growth(scenario, law, || plant::of(scenario)));
-        println!("{name}: the engine takes memory {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
+        println!("{name}: the engine allocates {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
     }
 }

@@ -1,12 +1,12 @@
-//! The built-in scenarios are the reference cases that they are named after.
+//! The built-in scenarios match their reference cases.
 
 use tautline_core::swarm::{Rows, Swarm, separation};
 use tautline_sim::scenario::{Scenario, builtin};
 
 use super::scenario_files::read_builtin;
 
-/// Positions and velocities at `time_s` under p'' = a22 v + u by the classical Runge-Kutta method, and the smallest
-/// separation at the steps on the way.
+/// Integrates p'' = a22 v + u to `time_s` with the classical Runge-Kutta method. Returns the state and the smallest
+/// separation at the steps.
 fn integrate(scenario: &Scenario, time_s: f64, steps: u32) -> (Swarm, f64) {
     let mut law = scenario.law().expect("a validated scenario has a law");
     let mut control = Rows::zeros(scenario.count());
@@ -39,7 +39,7 @@ fn integrate(scenario: &Scenario, time_s: f64, steps: u32) -> (Swarm, f64) {
     (swarm, smallest_m)
 }
 
-/// The reference table gives this many digits.
+/// Digits of the reference table.
 const TABLE_TOLERANCE: f64 = 1e-7;
 
 #[test]
@@ -55,7 +55,7 @@ fn the_built_in_pentagon_is_the_reference_pentagon() {
     let (swarm, smallest_m) = integrate(&scenario, 10.0, 4000);
     assert!((swarm.positions_m[(0, 0)] - 4.318_055_1).abs() < TABLE_TOLERANCE, "{}", swarm.positions_m);
     assert!((swarm.positions_m[(0, 1)] + 1.043_487_6).abs() < TABLE_TOLERANCE, "{}", swarm.positions_m);
-    // The smallest separation lies between two steps: 1e-5 m is what a quarter of a step misses.
+    // The smallest separation lies between two steps: the error is up to 1e-5 m.
     assert!((smallest_m - 2.460_353).abs() < 1e-5, "{smallest_m}");
 }
 
@@ -74,16 +74,16 @@ fn the_other_built_ins_are_their_reference_cases() {
     let collinear = read_builtin("pentagon-collinear", &[]).expect("a built-in");
     let (swarm, smallest_m) = integrate(&collinear, 10.0, 4000);
     assert!((smallest_m - 2.458_145).abs() < 1e-5, "{smallest_m}");
-    assert!(swarm.positions_m.column(1).iter().all(|&y| y == 0.0), "nothing leaves the line");
+    assert!(swarm.positions_m.column(1).iter().all(|&y| y == 0.0), "no vehicle leaves the line");
 }
 
 #[test]
-fn every_built_in_is_right_explains_itself_and_carries_its_name() {
+fn every_built_in_is_valid_and_has_a_summary_and_its_name() {
     for builtin in builtin::all() {
         let scenario = read_builtin(builtin.name, &[]).expect(builtin.name);
         assert_eq!(scenario.name, builtin.name);
         assert!(builtin.toml.starts_with("# "), "{}", builtin.name);
         assert!(!builtin.summary.is_empty() && !builtin.summary.contains('\n'));
     }
-    assert_eq!(builtin::all()[0].name, "pentagon", "the default comes first");
+    assert_eq!(builtin::all()[0].name, "pentagon", "the default is first");
 }

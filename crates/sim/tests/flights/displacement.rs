@@ -8,7 +8,7 @@ use tautline_core::swarm::{Pair, row};
 use crate::flight::{Log, builtin, fly};
 
 const HUB_3: &str = "graph={kind=\"edges\", edges=[[3, 1], [3, 2], [3, 4], [3, 5]]}";
-/// At rest, moved by nobody.
+/// A leader at rest.
 const LEADER_3: &str = "reference={kind=\"rest\", leader=3}";
 const DISPLACEMENT: &str = "law.kind=displacement";
 
@@ -20,7 +20,7 @@ struct Reference {
     closest_m: f64,
     closest_s: f64,
     pair: Pair,
-    /// From when on no distance of any pair is off by 0.01 m.
+    /// Time from which all distances of pairs are within 0.01 m of those of the slots.
     within_s: f64,
 }
 
@@ -69,7 +69,7 @@ fn references() -> [Reference; 4] {
     ]
 }
 
-/// First recorded instant from which on every pair is as far apart as its slots, to 0.01 m \[s\].
+/// Returns the first recorded instant from which every distance of a pair is within 0.01 m of that of the slots \[s\].
 fn within_s(log: &Log, scenario: &tautline_sim::scenario::Scenario) -> f64 {
     let formation = scenario.formation();
     let is_off = |sample: &&tautline_core::record::OwnedSample| {
@@ -85,7 +85,7 @@ fn within_s(log: &Log, scenario: &tautline_sim::scenario::Scenario) -> f64 {
 }
 
 #[test]
-fn the_pentagon_and_the_circle_are_flown_as_the_reference_says_in_both_plants() {
+fn pentagon_and_circle_match_the_reference_in_both_plants() {
     for reference in references() {
         for (plant, exact_m) in [("plant.kind=ideal", 1e-5), ("plant.kind=rapier", 1e-4)] {
             let scenario = builtin(reference.scenario, &[reference.sets, &[plant, "time.duration_s=40"]].concat());
@@ -96,7 +96,12 @@ fn the_pentagon_and_the_circle_are_flown_as_the_reference_says_in_both_plants() 
             };
             let certificate = &flight.certificate;
             near(certificate.energy_initial.expect("an energy"), reference.energy, 1e-6 * reference.energy, "E(0)");
-            near(certificate.certified_m.expect("a promise"), reference.certified_m, 1e-6, "the certified distance");
+            near(
+                certificate.certified_m.expect("a certificate"),
+                reference.certified_m,
+                1e-6,
+                "the certified distance",
+            );
             assert_eq!(flight.audit.status, Status::Clear, "{case}");
             let closest = flight.audit.closest.expect("a closest pair");
             near(closest.separation_m, reference.closest_m, exact_m, "the smallest separation");
@@ -111,7 +116,7 @@ fn the_pentagon_and_the_circle_are_flown_as_the_reference_says_in_both_plants() 
 }
 
 #[test]
-fn the_first_command_and_the_place_at_ten_seconds_are_those_of_the_reference() {
+fn the_first_command_and_the_position_at_ten_seconds_match_the_reference() {
     let scenario = builtin("pentagon", &[DISPLACEMENT, "plant.kind=ideal", "time.duration_s=11"]);
     let (_, log) = fly(&scenario);
     let off_m_s2 = (row(&log.samples[0].control, 0) - Vector3::new(1.5, -2.538_076_21, 0.0)).norm();
@@ -121,14 +126,14 @@ fn the_first_command_and_the_place_at_ten_seconds_are_those_of_the_reference() {
     assert!(off_m < 1e-7, "{off_m} m");
 }
 
-/// Distances that random starts come to are held on every graph, and the formation is reached.
+/// Random starts keep the certified separations on every graph and reach the formation.
 #[test]
-fn every_connected_graph_keeps_its_promise_to_every_pair() {
+fn the_certificate_holds_for_every_pair_on_every_connected_graph() {
     for graph in ["complete", "star", "ring", "path"] {
         let scenario = builtin("pentagon", &[DISPLACEMENT, &format!("graph.kind={graph}"), "time.duration_s=40"]);
         let (flight, log) = fly(&scenario);
         let closest_m = flight.audit.closest.expect("a closest pair").separation_m;
-        let certified_m = flight.certificate.certified_m.expect("a promise");
+        let certified_m = flight.certificate.certified_m.expect("a certificate");
         assert!(closest_m > certified_m && certified_m > scenario.delta_m, "{graph}: {closest_m} {certified_m}");
         assert!(within_s(&log, &scenario) < 20.0, "{graph}");
     }

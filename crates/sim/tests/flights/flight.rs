@@ -1,4 +1,4 @@
-//! Scenarios read and flown, with everything that was recorded kept in memory.
+//! Helpers that read and fly scenarios and keep their recording in memory.
 
 use std::ops::ControlFlow;
 
@@ -10,19 +10,19 @@ use tautline_sim::plant::{self, Plant};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
 use tautline_sim::sim::{self, Flight, Parts, SimError};
 
-/// A built-in scenario with some keys set.
+/// Reads a built-in scenario with overrides.
 pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
     let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
     Scenario::read(&Source::Builtin(name.to_owned()), &overrides).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A scenario of this text.
+/// Reads a scenario from its text.
 pub(crate) fn read(toml: &str) -> Scenario {
     let source = Source::Text { name: "test".to_owned(), text: toml.to_owned() };
     Scenario::read(&source, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Keeps every sample and every event.
+/// Sink that keeps every sample and event.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Log {
     pub(crate) samples: Vec<OwnedSample>,
@@ -41,14 +41,14 @@ impl Sink for Log {
     }
 }
 
-/// Flies the scenario with its own law and plant.
+/// Flies a scenario with its own law and plant.
 pub(crate) fn fly(scenario: &Scenario) -> (Flight, Log) {
     let law = scenario.law().expect("the law of a valid scenario");
     let (flown, log) = fly_with(scenario, law, plant::of(scenario));
     (flown.expect("a flight"), log)
 }
 
-/// Flies the scenario with another law or plant.
+/// Flies a scenario with another law or plant.
 pub(crate) fn fly_with(
     scenario: &Scenario,
     law: Box<dyn Law>,
@@ -60,7 +60,7 @@ pub(crate) fn fly_with(
     (flown, log)
 }
 
-/// Two vehicles on the x axis with these velocities \[m/s\], and a third far away.
+/// Returns a scenario of two vehicles on the x axis with these velocities \[m/s\], and a distant third one.
 pub(crate) fn duel(x_m: [f64; 2], speeds_m_s: [f64; 2], delta_m: f64, dt_s: f64, duration_s: f64) -> Scenario {
     let mut start = Swarm::at_rest(Rows::from_row_slice(&[x_m[0], 0.0, 0.0, x_m[1], 0.0, 0.0, 0.0, 60.0, 0.0]));
     start.velocities_m_s[(0, 0)] = speeds_m_s[0];

@@ -1,4 +1,4 @@
-//! The ideal plant solves p'' = a22 v + u: reference flights, free motion, energy, and the edge of the law.
+//! The ideal plant solves p'' = a22 v + u: reference flights, free motion, energy, and states outside the law's domain.
 
 use std::ops::ControlFlow;
 
@@ -13,11 +13,11 @@ use tautline_sim::continuous::{self, IdealError, Solution, Tolerances};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
 use tautline_sim::sim::{self, Breakdown, Ending, Parts};
 
-/// The reference values are printed with 7 digits after the point.
+/// Reference values have 7 decimals.
 const PRINTED_M: f64 = 1e-7;
-/// Rounding of an energy of a few m^2/s^2 and the solver's error in it.
+/// Rounding of an energy of a few m^2/s^2, and the solver's error in it.
 const ENERGY_ROUNDING: f64 = 1e-9;
-/// Solver error of a flight of tens of seconds at 1e-12 a step, amplified by a22 > 0 where it is.
+/// Solver error of a flight of tens of seconds at 1e-12 per step, amplified if a22 > 0.
 const SOLVED_M: f64 = 1e-11;
 
 fn scenario(name: &str, sets: &[&str]) -> Scenario {
@@ -30,7 +30,7 @@ fn solve(scenario: &Scenario, times_s: &[f64]) -> Solution {
     continuous::solve(scenario, law.as_mut(), times_s, Tolerances::default()).expect("a solution")
 }
 
-/// A law that commands nothing.
+/// Law without commands.
 #[derive(Clone)]
 struct Free;
 
@@ -45,7 +45,7 @@ impl Law for Free {
     }
 }
 
-/// A flight from this start with this a22, towards a line.
+/// Returns a flight from a start with a given a22, towards a line.
 fn from(start: Swarm, a22_per_s: f64) -> Scenario {
     let formation = Formation::line(start.count(), 3.0);
     let mut scenario = Scenario::new("from", start, formation, 2.0, 5.0);
@@ -53,7 +53,7 @@ fn from(start: Swarm, a22_per_s: f64) -> Scenario {
     scenario
 }
 
-/// The same under a law of one's own.
+/// Solves a flight under a given law.
 fn solve_under(
     law: &mut dyn Law,
     start: &Swarm,
@@ -72,7 +72,7 @@ fn the_closest_pairs_are_those_of_the_reference() {
 }
 
 #[test]
-fn a_wrong_sign_of_a22_does_not_fly_as_the_reference_says() {
+fn a_wrong_sign_of_a22_does_not_match_the_reference() {
     let pentagon = scenario("pentagon", &[]);
     let mut law = pentagon.law().expect("a law");
     let solved = solve_under(law.as_mut(), &pentagon.start, -0.1, &[10.0], Tolerances::default()).expect("a solution");
@@ -96,7 +96,7 @@ fn free_motion_is_exact_for_drag_and_for_its_opposite() {
     }
 }
 
-/// Largest rise of the energy above its least value so far, over so many tenths of a second.
+/// Returns the largest rise of the energy above its minimum so far, over a number of tenths of a second.
 fn largest_rise(scenario: &Scenario, a22_per_s: f64, tenths: u32) -> f64 {
     let mut law = scenario.law().expect("a law");
     let times_s: Vec<_> = (0..=tenths).map(|k| f64::from(k) * 0.1).collect();
@@ -116,13 +116,13 @@ fn largest_rise(scenario: &Scenario, a22_per_s: f64, tenths: u32) -> f64 {
 }
 
 #[test]
-fn the_energy_never_rises_and_does_where_the_plant_feeds_in_more_than_the_law_takes_out() {
+fn the_energy_rises_only_if_the_plant_adds_more_than_the_law_removes() {
     for name in ["pentagon", "circle"] {
         let scenario = scenario(name, &[]);
         let rise = largest_rise(&scenario, scenario.a22_per_s, 600);
         assert!(rise < ENERGY_ROUNDING, "{name}: {rise}");
-        // The law takes out (1 + a22) |v|^2 for the a22 that it knows. Not for long: the common velocity grows from
-        // rounding until distances drown in it.
+        // The law removes (1 + a22) |v|^2 for its own a22. The flight is short because the common velocity grows from
+        // rounding until it limits the resolution of distances.
         assert!(largest_rise(&scenario, scenario.a22_per_s + 1.5, 200) > 1e-3);
     }
 }
@@ -149,8 +149,8 @@ fn tighter_tolerances_change_the_reference_flights_by_less_than_the_stated_error
 }
 
 #[test]
-fn the_closest_approach_is_found_between_the_times_asked_for() {
-    // Two free vehicles pass each other at 0.3 m after 10.0123 s; the only time asked for is 50 s later.
+fn the_closest_approach_is_found_between_output_times() {
+    // Two free vehicles pass each other at 0.3 m after 10.0123 s; the output time is 50 s later.
     let mut start = Swarm::at_rest(Rows::zeros(2));
     set_row(&mut start.positions_m, 1, Vector3::new(10.0123, 0.3, 0.0));
     set_row(&mut start.velocities_m_s, 1, Vector3::new(-1.0, 0.0, 0.0));
@@ -159,7 +159,7 @@ fn the_closest_approach_is_found_between_the_times_asked_for() {
     assert!((closest.separation_m - 0.3).abs() < 1e-12 && (closest.time_s - 10.0123).abs() < 1e-6, "{closest:?}");
 }
 
-/// Two vehicles of the edge tension, 3 m apart with delta = 2 m, thrown at each other.
+/// Returns two vehicles under the edge tension, 3 m apart with delta = 2 m, that approach each other.
 fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
     let formation = Formation::line(2, 3.0);
     let graph = Graph::complete(2);
@@ -171,17 +171,17 @@ fn thrown(closing_m_s: f64) -> (EdgeTensionLaw, Swarm) {
 }
 
 #[test]
-fn a_hard_throw_stays_above_its_certificate_although_trial_steps_leave_the_law() {
+fn a_fast_approach_keeps_its_certificate_although_trial_steps_leave_the_domain() {
     let (mut law, start) = thrown(40.0);
     let certified_m =
         law.certificate(&from(start.clone(), 0.0).observation(&start), &[]).certified_m.expect("a certificate");
     let solved = solve_under(&mut law, &start, 0.0, &[5.0], Tolerances::default()).expect("a solution");
     let closest = solved.closest.expect("a closest approach");
-    assert!(certified_m < 2.01, "the throw is hard: {certified_m}");
+    assert!(certified_m < 2.01, "the approach is fast: {certified_m}");
     assert!(closest.separation_m > certified_m, "{closest:?}");
 }
 
-/// A law that brakes nothing and has no answer within 2 m.
+/// Law without braking that is undefined within 2 m.
 #[derive(Clone)]
 struct Wall;
 
@@ -199,7 +199,7 @@ impl Law for Wall {
 }
 
 #[test]
-fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason() {
+fn a_solution_that_leaves_the_domain_of_the_law_ends_with_the_laws_error() {
     let (_, start) = thrown(1.0);
     let ended = solve_under(&mut Wall, &start, 0.0, &[0.5, 5.0], Tolerances::default());
     match ended {
@@ -210,7 +210,7 @@ fn a_solution_that_runs_into_the_edge_of_the_law_ends_there_with_the_laws_reason
         other => panic!("{other:?}"),
     }
     let before = solve_under(&mut Wall, &start, 0.0, &[0.999], Tolerances::default());
-    assert!(before.is_ok(), "the negative twin: {before:?}");
+    assert!(before.is_ok(), "negative control: {before:?}");
 }
 
 #[test]
@@ -253,7 +253,7 @@ fn an_empty_swarm_and_a_single_vehicle_have_no_closest_approach() {
 }
 
 #[test]
-fn the_ideal_plant_flies_the_same_solution_whatever_the_step() {
+fn the_solution_of_the_ideal_plant_does_not_depend_on_the_step() {
     let solved = solve(&scenario("pentagon", &[]), &[10.0]);
     for dt in ["0.1", "0.004166666666666667"] {
         let scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=10", &format!("time.dt_s={dt}")]);
@@ -267,7 +267,7 @@ fn the_ideal_plant_flies_the_same_solution_whatever_the_step() {
     }
 }
 
-/// The baseline in steps of a second, in which vehicles 4 and 5 turn round between two of them.
+/// Flies the baseline in steps of a second, in which vehicles 4 and 5 turn round between two steps.
 fn baseline_in_long_steps(max_halvings: u32) -> (sim::Flight, f64) {
     let sets = ["plant.kind=ideal", "law.delta_m=1.6", "time.dt_s=1", "time.record_hz=1", "time.duration_s=10"];
     let mut scenario = scenario("pentagon-laplacian", &sets);
@@ -285,28 +285,28 @@ fn baseline_in_long_steps(max_halvings: u32) -> (sim::Flight, f64) {
 }
 
 #[test]
-fn a_step_on_which_paths_bend_is_flown_in_parts_so_that_the_audit_sees_what_its_chord_hides() {
+fn a_step_with_bent_paths_is_divided_so_that_the_audit_sees_the_violation() {
     let (flight, chords_m) = baseline_in_long_steps(16);
     let closest = flight.audit.closest.expect("pairs");
     assert!((closest.separation_m - 1.532_699).abs() < 1e-5, "{closest:?}");
     assert_eq!((flight.ending, flight.audit.violations.len()), (Ending::Completed, 1));
-    assert!(chords_m > 1.6, "straight lines between whole seconds would have hidden it: {chords_m}");
+    assert!(chords_m > 1.6, "straight lines between whole seconds hide the violation: {chords_m}");
 }
 
 #[test]
-fn a_bent_step_that_cannot_be_divided_ends_the_flight_and_says_so() {
+fn a_bent_step_that_cannot_be_divided_ends_the_flight_with_a_reason() {
     let (flight, _) = baseline_in_long_steps(0);
     assert!(matches!(flight.ending, Ending::BrokeDown(Breakdown::Bent { step: 1, bend_m }) if bend_m > 1e-5));
-    assert_eq!(flight.steps, 0, "what was not judged was not flown");
+    assert_eq!(flight.steps, 0, "the refused step does not count");
 }
 
 #[test]
-fn the_ideal_plant_asks_the_law_it_is_given_and_ends_where_that_has_no_answer() {
+fn the_ideal_plant_uses_the_given_law_and_ends_where_it_is_undefined() {
     let (_, start) = thrown(1.0);
     let mut scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=5"]);
     let carry_on = &mut |_| ControlFlow::Continue(());
     let free = sim::fly(&scenario, Parts::under(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
-    assert_eq!(free.last, scenario.start, "without a command nothing moves");
+    assert_eq!(free.last, scenario.start, "no vehicle moves without a command");
 
     scenario = Scenario::new("wall", start, Formation::line(2, 3.0), 0.5, 5.0);
     scenario.plant = PlantSpec::Ideal;
@@ -315,10 +315,11 @@ fn the_ideal_plant_asks_the_law_it_is_given_and_ends_where_that_has_no_answer() 
     assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
 }
 
-/// Two that fly at each other beside a third, which limited accelerations stop or do not.
+/// Flies two vehicles at each other, with a third one aside, under limited accelerations.
 fn limited(speed_m_s: f64, law: &str) -> sim::Flight {
     let text = format!(
-        "start = {{ positions_m = [[0, 20], [-4, 0], [4, 0]], velocities_m_s = [[0, 0], [{speed_m_s}, 0], [-{speed_m_s}, 0]] }}\n\
+        "start = {{ positions_m = [[0, 20], [-4, 0], [4, 0]], velocities_m_s = [[0, 0], [{speed_m_s}, 0], \
+         [-{speed_m_s}, 0]] }}\n\
          formation = {{ shape = \"points\", points_m = [[0, 20], [-2, 0], [2, 0]] }}\nplant.kind = \"ideal\"\n\
          time.duration_s = 3.0\n{law}"
     );
@@ -328,7 +329,7 @@ fn limited(speed_m_s: f64, law: &str) -> sim::Flight {
 }
 
 #[test]
-fn vehicles_that_limited_accelerations_do_not_stop_are_judged_past_the_barrier() {
+fn vehicles_that_cannot_stop_are_audited_past_the_barrier() {
     for law in [
         "law = { kind = \"potential\", delta_m = 1.0, max_accel_m_s2 = 5.0 }",
         "law = { kind = \"displacement\", delta_m = 1.0 }\nactuation.max_accel_m_s2 = 5.0",
@@ -346,7 +347,7 @@ fn vehicles_that_limited_accelerations_do_not_stop_are_judged_past_the_barrier()
 }
 
 #[test]
-fn a_barrier_without_a_limit_is_never_coasted_through() {
+fn without_a_limit_no_vehicle_passes_the_barrier() {
     let flight = limited(10.0, "law = { kind = \"potential\", delta_m = 1.0 }");
     assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear));
 }

@@ -1,4 +1,4 @@
-//! What sensors, radio and motors that are not perfect do to a flight, against what theory says.
+//! Imperfect sensors, radio and actuators in flight, against theory.
 
 use crate::flight::{Log, builtin, fly, read};
 use tautline_audit::Status;
@@ -9,7 +9,7 @@ use tautline_laws::law::{LawError, Linear, Void};
 use tautline_sim::scenario::{Failure, FailureKind, Override, Scenario, Source};
 use tautline_sim::sim::{Ending, Simulation};
 
-/// Every imperfection at once that Rapier can have.
+/// Every imperfection that Rapier supports, at once.
 const ALL: [&str; 16] = [
     "time.duration_s=4",
     "sensing.position_noise_m=0.01",
@@ -54,18 +54,19 @@ fn a_saved_and_loaded_flight_with_every_imperfection_has_the_same_bits() {
         straight.step();
         reseeded.step();
     });
-    assert_ne!(straight.state(), reseeded.state(), "other numbers from there on");
+    assert_ne!(straight.state(), reseeded.state(), "random numbers differ from there on");
 }
 
 #[test]
-fn a_scenario_with_every_imperfection_is_written_back_as_it_was_read() {
+fn a_scenario_with_every_imperfection_is_written_and_read_back() {
     let more = [
         "sensing.near_latency_s=0.005",
         "network.near=heard",
         "network.failure=[{link=[1, 3], from_s=1, to_s=2.5}, {link=[4, 2], from_s=3}]",
-        "failure=[{vehicle=2, at_s=1, kind=\"dead\"}, {vehicle=5, at_s=2, kind=\"silent\"}, {vehicle=1, at_s=3, kind=\"frozen\"}]",
+        "failure=[{vehicle=2, at_s=1, kind=\"dead\"}, {vehicle=5, at_s=2, kind=\"silent\"}, {vehicle=1, at_s=3, \
+         kind=\"frozen\"}]",
         "noise.seed=7",
-        // Nobody takes two for nearer than that.
+        // Separations are smaller than the position errors allow.
         "law.delta_m=1",
     ];
     let sets: Vec<_> = ALL.into_iter().chain(more).collect();
@@ -78,14 +79,14 @@ fn a_scenario_with_every_imperfection_is_written_back_as_it_was_read() {
     let ages =
         log.samples.last().expect("samples").channels.iter().find(|channel| channel.name.as_ref() == "message_age");
     let ages = &ages.expect("ages of messages").values;
-    // The oldest of each, and the mean of who is heard: vehicle 5 has been silent for 2 s.
+    // Oldest and mean age of each vehicle: vehicle 5 has been silent for 2 s.
     assert_eq!(ages.len(), 10);
     assert!(ages.chunks(2).all(|age| age[0] >= age[1] && age[1] > 0.0), "{ages:?}");
     assert!(ages[0] > 1.9 && ages[8] < 1.0 && flight.traffic.is_some_and(|traffic| traffic.lost > 0), "{ages:?}");
 }
 
 #[test]
-fn the_seed_changes_the_noise_and_nothing_else_and_threads_change_nothing() {
+fn the_seed_changes_only_the_noise_and_threads_change_no_bits() {
     let flown = |sets: &[&str], threads: usize| {
         let sets: Vec<_> = ALL.into_iter().chain(sets.iter().copied()).collect();
         let scenario = builtin("pentagon", &sets);
@@ -98,7 +99,7 @@ fn the_seed_changes_the_noise_and_nothing_else_and_threads_change_nothing() {
 }
 
 #[test]
-fn certificates_are_void_with_the_reason() {
+fn certificates_are_void_with_a_reason() {
     for (set, reason) in [
         ("sensing.latency_s=0.01", Void::KnownLate),
         ("sensing.near_latency_s=0.01", Void::KnownLate),
@@ -120,7 +121,7 @@ fn certificates_are_void_with_the_reason() {
     assert!(fly(&builtin("pentagon", &["time.duration_s=1"])).0.certificate.certified_m.is_some());
 }
 
-/// Two vehicles at their slots under the displacement law, of which the second drifts away at 1 m/s.
+/// Returns two vehicles at their slots under the displacement law; the second drifts away at 1 m/s.
 fn drifting(sets: &str) -> Scenario {
     read(&format!(
         "name = \"drift\"\nstart = {{ positions_m = [[0, 0], [5, 0]], velocities_m_s = [[0, 0], [1, 0]] }}\n\
@@ -130,7 +131,7 @@ fn drifting(sets: &str) -> Scenario {
 }
 
 #[test]
-fn nobody_is_accelerated_by_more_than_the_limit_and_what_is_recorded_is_what_was_flown() {
+fn accelerations_keep_the_limit_and_are_recorded_as_flown() {
     let free = fly(&builtin("pentagon", &["time.duration_s=4", "time.record_hz=240"])).1;
     let limited =
         fly(&builtin("pentagon", &["time.duration_s=4", "time.record_hz=240", "actuation.max_accel_m_s2=0.3"])).1;
@@ -144,7 +145,8 @@ fn nobody_is_accelerated_by_more_than_the_limit_and_what_is_recorded_is_what_was
 #[test]
 fn a_lagging_vehicle_flies_the_solution_of_its_equations() {
     const PARTS: u32 = 100_000;
-    // x'' = a, lag a' = -(k x + c x') - a for the distance of two, with k = c = 1: by small steps of Heun's method.
+    // x'' = a, lag a' = -(k x + c x') - a for the distance of two vehicles with k = c = 1, by small steps of Heun's
+    // method.
     let lag_s = 0.2;
     let (mut x, mut v, mut a) = (0.0_f64, 1.0_f64, 0.0_f64);
     let rates = |x: f64, v: f64, a: f64| (v, a, (-(x + v) - a) / lag_s);
@@ -163,14 +165,14 @@ fn a_lagging_vehicle_flies_the_solution_of_its_equations() {
     assert!(fine < 2e-5, "{fine}");
     let order = (coarse / fine).log2();
     assert!((1.7..2.3).contains(&order), "second order in the step: {order} ({coarse} {fine})");
-    // Without the lag it is another motion.
+    // Without the lag the motion is different.
     let sets = "time = { duration_s = 3.0, dt_s = 0.01 }";
     let last = fly(&drifting(sets)).0.last;
     assert!((last.positions_m[(1, 0)] - last.positions_m[(0, 0)] - 5.0 - x).abs() > 0.05);
 }
 
 #[test]
-fn a_dead_vehicle_drifts_on_and_a_frozen_one_goes_on_accelerating() {
+fn a_dead_vehicle_drifts_and_a_frozen_one_keeps_accelerating() {
     let sets = "time = { duration_s = 2.0, record_hz = 240.0 }";
     for kind in [FailureKind::Dead {}, FailureKind::Frozen {}] {
         let mut scenario = drifting(sets);
@@ -186,7 +188,7 @@ fn a_dead_vehicle_drifts_on_and_a_frozen_one_goes_on_accelerating() {
 
 // Delay
 
-/// The slots with everybody 1 mm off, each to another side, under the displacement law without a tension to speak of.
+/// Returns vehicles 1 mm off their slots in different directions, under the displacement law with negligible tension.
 fn disturbed(graph: &str, sets: &str) -> Scenario {
     let slots = Formation::pentagon(3.0).slots_m;
     let off = |i: usize, axis: usize| 1e-3 * libm::sin(f64::from(u32::try_from(4 * i + 7 * axis).unwrap_or(0)));
@@ -196,13 +198,13 @@ fn disturbed(graph: &str, sets: &str) -> Scenario {
     read(&format!(
         "name = \"late\"\nstart = {{ positions_m = [{}] }}\nformation = {{ shape = \"points\", points_m = [{}] }}\n\
          law = {{ kind = \"displacement\", delta_m = 2.0, alpha = 1e-8 }}\ngraph = {{ kind = \"{graph}\" }}\n\
-         plant = {{ kind = \"ideal\" }}\nbreathing = {{ mode = \"off\" }}\n{sets}",
+         plant = {{ kind = \"ideal\" }}\ndeadlock = {{ mode = \"off\" }}\n{sets}",
         list(&start),
         list(&slots)
     ))
 }
 
-/// Root mean square error of the relative positions over a while \[m\].
+/// Returns the root mean square error of the relative positions over a time interval \[m\].
 fn error_m(log: &Log, slots_m: &Rows, from_s: f64, to_s: f64) -> f64 {
     let within = log.samples.iter().filter(|sample| (from_s..to_s).contains(&sample.time_s));
     let (mut sum, mut number) = (0.0, 0.0);
@@ -215,7 +217,7 @@ fn error_m(log: &Log, slots_m: &Rows, from_s: f64, to_s: f64) -> f64 {
     (sum / number).sqrt()
 }
 
-/// Whether the disturbance is larger at the end than in the middle, or has brought two too near to each other.
+/// Returns whether the disturbance grows from the middle to the end, or ends the flight.
 fn grows(scenario: &Scenario) -> bool {
     let (flight, log) = fly(scenario);
     if flight.ending != Ending::Completed {
@@ -228,15 +230,15 @@ fn grows(scenario: &Scenario) -> bool {
 
 const LOOK: &str = "time = { duration_s = 30.0, dt_s = 0.25, record_hz = 4.0, max_halvings = 10 }";
 
-/// The law's modes at the slots.
+/// Returns the modes of the law at the slots.
 fn linear(scenario: &Scenario) -> Linear {
     scenario.law().expect("a law").linear(scenario.formation()).expect("modes")
 }
 
-// `tautline validate` has the same for complete graph, star and ring in bisections.
+// `tautline validate` repeats these by bisection for the complete graph, the star and the ring.
 
 #[test]
-fn the_delay_at_which_a_millimetre_grows_is_the_formulas() {
+fn the_delay_margin_matches_the_formula() {
     let plain = disturbed("ring", LOOK);
     let margin_s = linear(&plain).delay_margin_s(0.0);
     for (share, expected) in [(0.95, false), (1.05, true)] {
@@ -247,20 +249,20 @@ fn the_delay_at_which_a_millimetre_grows_is_the_formulas() {
 }
 
 #[test]
-fn the_delay_of_what_is_heard_alone_at_which_it_grows_is_the_formulas_too() {
+fn the_margin_of_the_network_delay_matches_the_formula() {
     let plain = disturbed("star", LOOK);
     let margin_s = linear(&plain).heard.and_then(|heard| heard.delay_margin_s(0.0)).expect("a margin");
     for (share, expected) in [(0.95, false), (1.05, true)] {
         let mut late = plain.clone();
         (late.time.duration_s, late.network.latency_s) = (20.0 * margin_s, share * margin_s);
-        // A delay ties common motion to where the swarm was: it must be there.
+        // A delay couples the common motion to earlier positions, so common motion must be present.
         late.start.velocities_m_s.fill(1e-3);
         late.start.velocities_m_s.column_mut(2).fill(0.0);
         assert_eq!(moves(&late), expected, "{share} of {margin_s} s");
     }
 }
 
-/// Whether the swarm moves more at the end than in the middle, its mean too.
+/// Returns whether the swarm, with its mean, moves more at the end than in the middle.
 fn moves(scenario: &Scenario) -> bool {
     let (_, log) = fly(scenario);
     let end_s = scenario.time.duration_s;
@@ -272,7 +274,7 @@ fn moves(scenario: &Scenario) -> bool {
 }
 
 #[test]
-fn the_time_between_commands_at_which_it_grows_is_the_formulas() {
+fn the_margin_of_the_control_period_matches_the_formula() {
     for graph in ["complete", "ring"] {
         let plain = disturbed(graph, LOOK);
         let margin_s = linear(&plain).sampling_margin_s(0.0);
@@ -286,13 +288,14 @@ fn the_time_between_commands_at_which_it_grows_is_the_formulas() {
     }
 }
 
-/// Two that fly one behind the other, 2.5 m apart, and hear of each other a tenth of a second late.
+/// Two vehicles fly one behind the other, 2.5 m apart, with a network latency of 0.1 s.
 #[test]
-fn a_law_that_ends_by_what_a_vehicle_heard_says_so_with_the_true_distance() {
+fn a_law_undefined_by_received_states_reports_the_true_distance() {
     let flight = |latency_s: f64| {
         let scenario = read(&format!(
             "start = {{ positions_m = [[0, 0], [2.5, 0]], velocities_m_s = [[100, 0], [100, 0]] }}\n\
-             formation = {{ shape = \"line\", spacing_m = 3.0 }}\nlaw.delta_m = 2.0\nnetwork.latency_s = {latency_s:?}\n\
+             formation = {{ shape = \"line\", spacing_m = 3.0 }}\nlaw.delta_m = 2.0\n\
+             network.latency_s = {latency_s:?}\n\
              network.missing = \"hold\"\ntime.duration_s = 1.0"
         ));
         fly(&scenario).0

@@ -1,4 +1,4 @@
-//! What the laws promise for every swarm, shape and graph.
+//! Properties of the laws for every swarm, shape and graph.
 
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -19,19 +19,19 @@ const ALPHA: f64 = 1.3;
 const DELTA_M: f64 = 0.4;
 const F1_PER_S2: f64 = 0.9;
 
-/// Clearance of every start \[m\]: near the barrier V'' grows as the inverse cube of the clearance, and with it the
-/// error that any rounding of a position makes.
+/// Clearance of every start \[m\]. Near the barrier V'' grows as the inverse cube of the clearance, and with it the
+/// effect of rounding of positions.
 const CLEARANCE_M: f64 = 0.1;
-/// Largest coordinate of a start \[m\], so that a position is rounded to 1e-15 m.
+/// Largest coordinate of a start \[m\]: positions are rounded to 1e-15 m.
 const EXTENT_M: f64 = 4.0;
-/// Rounding of a control relative to the largest terms in it (see [`Case::scale`]): sums of at most 40 terms.
+/// Rounding of a control relative to its largest terms (see [`Case::scale`]): sums of at most 40 terms.
 const ROUNDING: f64 = 1e-13;
-/// The same where positions were moved first: their rounding, 1e-15 m, over the clearance.
+/// Rounding after a transformation of positions: 1e-15 m over the clearance.
 const MOVED_ROUNDING: f64 = 1e-12 / CLEARANCE_M;
 /// Relative error of a central difference of the energy, at the step of [`rate_of_energy`].
 const DIFFERENCE: f64 = 1e-6;
 
-/// A swarm with a shape to fly and the plant's a22.
+/// Swarm with a formation and the a22 of its plant.
 #[derive(Clone, Debug)]
 struct Case {
     formation: Formation,
@@ -50,7 +50,7 @@ impl Case {
         LaplacianLaw::new(&context, LaplacianKeys { f1_per_s2: F1_PER_S2, f2_per_s: None }).map_err(fail)
     }
 
-    /// Size of the terms in a control: the largest pull of an edge, the extent and the largest velocity.
+    /// Returns the size of the terms in a control: the largest pull of an edge, the extent and the largest velocity.
     fn scale(&self, graph: &Graph) -> f64 {
         let pull = |(i, j)| {
             let tension = EdgeTension::new(ALPHA, DELTA_M, self.formation.desired_distance(i, j));
@@ -68,13 +68,13 @@ fn table(count: usize, values: &[f64]) -> Rows {
     Rows::from_fn(count, |i, axis| values[3 * i + axis])
 }
 
-/// From 2 to 40 vehicles, so that both layouts of the edge sum are met, with slots and positions clear of delta.
+/// Generates 2 to 40 vehicles, which covers both layouts of the edge sum, with slots and positions clear of delta.
 fn cases() -> impl Strategy<Value = Case> {
     let clear = |rows: &Rows| closest_pair(rows).is_none_or(|(_, distance_m)| distance_m > DELTA_M + CLEARANCE_M);
     prop_oneof![2..9_usize, 23..27_usize, Just(40_usize)]
         .prop_flat_map(|count| {
             let numbers = move |size: f64| prop::collection::vec(-size..size, 3 * count);
-            // Points near an even spread are rarely too close, so that few cases are thrown away.
+            // Points near an even distribution are rarely too close, so few cases are rejected.
             let spread = move |jitter_m: f64| {
                 let even = Formation::sphere(count, 3.0).slots_m;
                 numbers(jitter_m).prop_map(move |noise| &even + table(count, &noise))
@@ -89,7 +89,7 @@ fn cases() -> impl Strategy<Value = Case> {
         .prop_filter("too close", move |case| clear(&case.swarm.positions_m) && clear(&case.formation.slots_m))
 }
 
-/// The same slots given to other vehicles, so that edges pull as well as push.
+/// Permutes the slots, so that edges both pull and push.
 fn scattered(slots_m: &Rows) -> Rows {
     let count = slots_m.nrows();
     let coprime = |step: &usize| (2..=*step).all(|d| !step.is_multiple_of(d) || !count.is_multiple_of(d));
@@ -97,7 +97,7 @@ fn scattered(slots_m: &Rows) -> Rows {
     permuted(slots_m, &(0..count).map(|i| i * step % count).collect::<Vec<_>>())
 }
 
-/// The complete graph, a star, and the graph of the edges that `keep` picks.
+/// Returns the complete graph, a star, and the graph of the edges selected by `keep`.
 fn graphs(count: usize, keep: &[bool]) -> Result<[Graph; 3], TestCaseError> {
     let complete = Graph::complete(count);
     let kept = complete.edges().zip(keep.iter().cycle()).filter(|(_, keep)| **keep);
@@ -116,10 +116,10 @@ fn isometries() -> impl Strategy<Value = Matrix3<f64>> {
     })
 }
 
-/// What the vehicles know where they know everything.
+/// Returns an observation without imperfections.
 fn exact<'a>(swarm: &'a Swarm, formation: &'a Formation) -> Observation<'a> {
-    static NOBODY: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
-    Observation::exact(swarm, &NOBODY, formation)
+    static NO_LINKS: LazyLock<Graph> = LazyLock::new(|| Graph::complete(0));
+    Observation::exact(swarm, &NO_LINKS, formation)
 }
 
 fn control_of(law: &mut dyn Law, swarm: &Swarm, formation: &Formation) -> Result<Rows, TestCaseError> {
@@ -140,12 +140,12 @@ fn translated(rows: &Rows, by: Vector3<f64>) -> Rows {
     moved
 }
 
-/// Row i of the result is row `order[i]` of the table.
+/// Permutes rows: row i of the result is row `order[i]` of the table.
 fn permuted(rows: &Rows, order: &[usize]) -> Rows {
     Rows::from_fn(rows.nrows(), |i, axis| rows[(order[i], axis)])
 }
 
-/// The derivative of the law's energy along p' = v, v' = a22 v + u, by a central difference.
+/// Returns the derivative of the law's energy along p' = v, v' = a22 v + u, by a central difference.
 fn rate_of_energy(law: &mut dyn Law, case: &Case) -> Result<f64, TestCaseError> {
     const STEP_S: f64 = 1e-6;
     let Case { formation, swarm, a22_per_s } = case;
@@ -158,13 +158,13 @@ fn rate_of_energy(law: &mut dyn Law, case: &Case) -> Result<f64, TestCaseError> 
     Ok((energy_at(STEP_S)? - energy_at(-STEP_S)?) / (2.0 * STEP_S))
 }
 
-/// `sum |v_i - mean v|^2`
+/// Returns `sum |v_i - mean v|^2`.
 fn relative_speeds_squared(swarm: &Swarm) -> f64 {
     let mean = swarm.mean_velocity_m_s();
     (0..swarm.count()).map(|i| (row(&swarm.velocities_m_s, i) - mean).norm_squared()).sum()
 }
 
-/// The check that `dE/dt = -sum |v_i - mean v|^2` on the complete graph, for any law with an energy.
+/// Checks `dE/dt = -sum |v_i - mean v|^2` on the complete graph, for any law with an energy.
 fn energy_falls_by_the_relative_speeds_squared(law: &mut dyn Law, case: &Case) -> TestCaseResult {
     let found = rate_of_energy(law, case)?;
     let expected = -relative_speeds_squared(&case.swarm);
@@ -176,7 +176,7 @@ fn allowed_rate_error(case: &Case) -> f64 {
     DIFFERENCE * case.scale(&Graph::complete(case.swarm.count())) * (1.0 + relative_speeds_squared(&case.swarm))
 }
 
-/// The edge-tension law with the sign of its tension flipped: the wrong twin that the energy check must reject.
+/// Negative control: the edge-tension law with the sign of its tension flipped, which the energy check must reject.
 #[derive(Clone)]
 struct Flipped(EdgeTensionLaw);
 
@@ -201,7 +201,7 @@ impl Law for Flipped {
 
 proptest! {
     #[test]
-    fn the_control_moves_no_centre_of_mass(case in cases(), keep in keep()) {
+    fn the_control_does_not_accelerate_the_centre_of_mass(case in cases(), keep in keep()) {
         for graph in graphs(case.swarm.count(), &keep)? {
             let allowed = ROUNDING * case.scale(&graph) * case.swarm.count() as f64;
             let laws: [&mut dyn Law; 2] = [&mut case.edge_tension(&graph)?, &mut case.laplacian(&graph)?];
@@ -213,7 +213,7 @@ proptest! {
     }
 
     #[test]
-    fn the_matrix_form_is_the_sum_over_the_edges(case in cases(), keep in keep()) {
+    fn the_matrix_form_equals_the_sum_over_the_edges(case in cases(), keep in keep()) {
         for graph in graphs(case.swarm.count(), &keep)? {
             let mut law = case.edge_tension(&graph)?;
             let matrix = law.matrix_form(&case.swarm).map_err(fail)?;
@@ -223,7 +223,7 @@ proptest! {
     }
 
     #[test]
-    fn a_turned_or_mirrored_swarm_is_controlled_alike(case in cases(), keep in keep(), isometry in isometries()) {
+    fn the_control_commutes_with_rotations_and_reflections(case in cases(), keep in keep(), isometry in isometries()) {
         let turned_case = Case {
             formation: Formation::points(turned(&case.formation.slots_m, &isometry)),
             swarm: Swarm {
@@ -234,8 +234,9 @@ proptest! {
         };
         for graph in graphs(case.swarm.count(), &keep)? {
             let allowed = MOVED_ROUNDING * case.scale(&graph);
-            let expected = turned(&control_of(&mut case.edge_tension(&graph)?, &case.swarm, &case.formation)?, &isometry);
-            // The edge-tension law knows distances only: its shape need not turn along.
+            let control = control_of(&mut case.edge_tension(&graph)?, &case.swarm, &case.formation)?;
+            let expected = turned(&control, &isometry);
+            // The edge-tension law depends only on distances, so its formation need not be rotated.
             for mut law in [case.edge_tension(&graph)?, turned_case.edge_tension(&graph)?] {
                 let difference = (control_of(&mut law, &turned_case.swarm, &turned_case.formation)? - &expected).amax();
                 prop_assert!(difference <= allowed, "{difference:e}");
@@ -247,7 +248,7 @@ proptest! {
     }
 
     #[test]
-    fn a_swarm_elsewhere_and_under_way_is_controlled_alike(
+    fn the_control_is_invariant_under_translations_and_common_velocities(
         case in cases(), keep in keep(), by in [-9.0..9.0, -9.0..9.0, -9.0..9.0],
     ) {
         let swarm = Swarm {
@@ -258,14 +259,15 @@ proptest! {
             let laws: [&mut dyn Law; 2] = [&mut case.edge_tension(&graph)?, &mut case.laplacian(&graph)?];
             for law in laws {
                 let formation = &case.formation;
-                let difference = (control_of(law, &swarm, formation)? - control_of(law, &case.swarm, formation)?).amax();
+                let expected = control_of(law, &case.swarm, formation)?;
+                let difference = (control_of(law, &swarm, formation)? - expected).amax();
                 prop_assert!(difference <= MOVED_ROUNDING * case.scale(&graph), "{difference:e}");
             }
         }
     }
 
     #[test]
-    fn relabelled_vehicles_are_controlled_alike(
+    fn the_control_commutes_with_permutations_of_vehicles(
         (case, order) in cases().prop_flat_map(|case| {
             let order = Just((0..case.swarm.count()).collect::<Vec<_>>()).prop_shuffle();
             (Just(case), order)
@@ -291,7 +293,8 @@ proptest! {
             ];
             for (law, relabelled_law) in pairs {
                 let expected = permuted(&control_of(law, &case.swarm, &case.formation)?, &order);
-                let difference = (control_of(relabelled_law, &relabelled.swarm, &relabelled.formation)? - expected).amax();
+                let found = control_of(relabelled_law, &relabelled.swarm, &relabelled.formation)?;
+                let difference = (found - expected).amax();
                 prop_assert!(difference <= ROUNDING * case.scale(&graph), "{difference:e}");
             }
         }
@@ -301,7 +304,7 @@ proptest! {
     fn on_the_complete_graph_the_energy_falls_by_the_relative_speeds_squared(case in cases()) {
         let graph = Graph::complete(case.swarm.count());
         energy_falls_by_the_relative_speeds_squared(&mut case.edge_tension(&graph)?, &case)?;
-        // The rate is a22 - f2, which is -1 for the source's gain f2 = 1 + a22.
+        // The rate is a22 - f2, which is -1 for the gain f2 = 1 + a22 of the source.
         energy_falls_by_the_relative_speeds_squared(&mut case.laplacian(&graph)?, &case)?;
     }
 
@@ -310,7 +313,7 @@ proptest! {
         let graph = Graph::complete(case.swarm.count());
         let at_rest = Swarm::at_rest(case.swarm.positions_m.clone());
         let tension = control_of(&mut case.edge_tension(&graph)?, &at_rest, &case.formation)?;
-        // Flipping the tension changes the rate by twice its power, which must be more than the check lets pass.
+        // Flipping the tension changes the rate by twice its power, which must exceed the tolerance of the check.
         prop_assume!(tension.dot(&case.swarm.velocities_m_s).abs() > allowed_rate_error(&case));
         let flipped = &mut Flipped(case.edge_tension(&graph)?);
         prop_assert!(energy_falls_by_the_relative_speeds_squared(flipped, &case).is_err());

@@ -1,4 +1,4 @@
-//! What the link of a scenario tells, and when.
+//! Knowledge of the vehicles through the link of a scenario.
 
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::formation::Formation;
@@ -10,7 +10,7 @@ use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy,
 const DT_S: f64 = 0.01;
 const COUNT: usize = 4;
 
-/// Vehicle i is at x = 10 i + t^2, y = -t.
+/// Returns the true state: vehicle i is at x = 10 i + t^2, y = -t.
 fn truth(time_s: f64) -> Swarm {
     Swarm {
         positions_m: Rows::from_fn(COUNT, |i, axis| [10.0 * i as f64 + time_s * time_s, -time_s, 0.0][axis]),
@@ -29,7 +29,7 @@ fn scenario() -> Scenario {
     scenario
 }
 
-/// The link after so many steps, and what it shows then.
+/// Advances a link over steps and passes its result at each to `show`.
 fn after(link: &mut dyn Imperfections, steps: std::ops::RangeInclusive<u32>, mut show: impl FnMut(f64, Sensed<'_>)) {
     for step in steps {
         let time_s = f64::from(step) * DT_S;
@@ -54,8 +54,8 @@ fn is_of(neighbour: Neighbour, vehicle: usize, time_s: f64) -> bool {
 }
 
 #[test]
-fn what_is_known_late_is_as_old_as_was_asked_for_and_no_older() {
-    // Not a multiple of the step, and one that is.
+fn delayed_states_have_exactly_the_given_age() {
+    // One latency is not a multiple of the step, the other is.
     for latency_s in [0.037, 0.05] {
         let mut late = scenario();
         late.sensing.latency_s = latency_s;
@@ -69,7 +69,7 @@ fn what_is_known_late_is_as_old_as_was_asked_for_and_no_older() {
 }
 
 #[test]
-fn the_network_delays_what_is_heard_and_neither_the_own_state_nor_what_is_seen() {
+fn the_network_delays_only_received_states() {
     for rate_hz in [None, Some(100.0)] {
         let mut late = scenario();
         (late.network.latency_s, late.network.rate_hz) = (0.05, rate_hz);
@@ -86,14 +86,14 @@ fn the_network_delays_what_is_heard_and_neither_the_own_state_nor_what_is_seen()
 }
 
 #[test]
-fn near_ones_are_seen_late_or_at_once_or_heard_as_the_keys_say() {
+fn near_vehicles_are_sensed_or_heard_with_the_given_delays() {
     let mut own_late = scenario();
     (own_late.sensing.latency_s, own_late.sensing.near_latency_s) = (0.05, Some(0.0));
     after(of(&own_late, true).as_mut(), 0..=50, |time_s, sensed| {
         let (seen, own_m) = (picture(&sensed).seen(1, 2), row(&sensed.own.positions_m, 1));
         assert!(is_of(in_row(sensed.own, 1), 1, time_s - 0.05));
         let apart_m = row(&truth(time_s).positions_m, 2) - row(&truth(time_s).positions_m, 1);
-        assert!((seen.position_m - own_m - apart_m).norm() < 1e-12, "where the other is from there, now");
+        assert!((seen.position_m - own_m - apart_m).norm() < 1e-12, "present relative position");
     });
     let mut heard = scenario();
     (heard.network.latency_s, heard.network.near) = (0.05, NearBy::Heard);
@@ -107,7 +107,7 @@ fn near_ones_are_seen_late_or_at_once_or_heard_as_the_keys_say() {
 }
 
 #[test]
-fn old_messages_are_held_or_carried_along() {
+fn old_messages_are_held_or_extrapolated() {
     let mut scenario = scenario();
     (scenario.network.latency_s, scenario.network.rate_hz) = (0.05, Some(10.0));
     for missing in [Missing::Hold, Missing::Extrapolate] {
@@ -124,7 +124,7 @@ fn old_messages_are_held_or_carried_along() {
 }
 
 #[test]
-fn a_link_that_is_down_and_a_vehicle_that_is_silent_leave_what_was_heard_before() {
+fn broken_links_and_silent_vehicles_leave_the_last_message() {
     let mut scenario = scenario();
     scenario.network.rate_hz = Some(100.0);
     scenario.network.failure = vec![LinkFailure { link: [1, 3], from_s: 0.2, to_s: Some(0.4) }];
@@ -137,16 +137,16 @@ fn a_link_that_is_down_and_a_vehicle_that_is_silent_leave_what_was_heard_before(
         assert!(is_of(picture.heard(2, 0), 0, known_s) && is_of(picture.heard(0, 2), 2, known_s), "{time_s}");
         assert!(is_of(picture.heard(3, 0), 0, time_s), "other links are up");
         assert!(is_of(picture.heard(0, 1), 1, time_s.min(0.29)), "{time_s}");
-        assert!(is_of(picture.heard(1, 0), 0, time_s), "the silent one listens");
+        assert!(is_of(picture.heard(1, 0), 0, time_s), "the silent vehicle still receives");
     });
     let traffic = link.traffic().expect("messages");
-    // 81 instants, six links one way; 20 of them are lost on two; one sender stops at 30.
+    // 81 instants, six directed links: 20 messages are lost on two of them, and one sender stops at message 30.
     assert_eq!((traffic.sent, traffic.lost), (81 * 6 - 51, 40));
     assert!(traffic.age_p95_s.is_some_and(|age_s| (0.2..0.5).contains(&age_s)), "{traffic:?}");
 }
 
 #[test]
-fn errors_have_the_deviation_asked_for_and_are_drawn_with_each_measurement() {
+fn errors_have_the_given_deviation_and_are_drawn_for_each_measurement() {
     let mut noisy = scenario();
     (noisy.sensing.position_noise_m, noisy.sensing.velocity_noise_m_s) = (0.1, 0.02);
     noisy.sensing.rate_hz = Some(50.0);
@@ -166,18 +166,18 @@ fn errors_have_the_deviation_asked_for_and_are_drawn_with_each_measurement() {
             sums[2] += (apart_m.x - 10.0).powi(2);
             sums[3] += (own.position_m - then.position_m).x * (apart_m.x - 10.0);
         }
-        assert_eq!((own.position_m.z, seen.position_m.z), (0.0, 0.0), "nobody leaves the plane");
+        assert_eq!((own.position_m.z, seen.position_m.z), (0.0, 0.0), "no error leaves the plane");
     });
     let [own, speed, seen, both] = sums.map(|sum| sum / number);
     // 10,001 draws: the standard error of a variance is 1.4 %.
     for (variance, expected) in [(own, 0.01), (speed, 0.0004), (seen, 0.01)] {
         assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
     }
-    assert!(both.abs() < 0.0004, "what is seen has errors of its own: {both}");
+    assert!(both.abs() < 0.0004, "errors of near vehicles are independent: {both}");
 }
 
 #[test]
-fn a_bias_stays_and_is_no_part_of_what_is_seen() {
+fn a_bias_is_constant_and_does_not_affect_near_vehicles() {
     let mut biased = scenario();
     biased.sensing.position_bias_m = 0.5;
     let mut first = None;
@@ -192,7 +192,7 @@ fn a_bias_stays_and_is_no_part_of_what_is_seen() {
 }
 
 #[test]
-fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
+fn refused_steps_and_trial_states_change_no_knowledge() {
     let mut scenario = scenario();
     scenario.sensing.rate_hz = Some(30.0);
     scenario.sensing.position_noise_m = 0.1;
@@ -203,7 +203,7 @@ fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
         for step in 0..=200 {
             let time_s = f64::from(step) * DT_S;
             if disturb && step > 0 {
-                // A step twice as long that is refused, and one in halves.
+                // A refused step of double length, then one in halves.
                 link.accept(time_s + DT_S, &truth(7.0));
                 link.sense(time_s + DT_S, &truth(7.0));
                 link.forget_after(time_s - DT_S);
@@ -224,7 +224,7 @@ fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
     assert_eq!(plain.1, disturbed.1);
     let far = |a: &Neighbour, b: &Neighbour| (a.position_m - b.position_m).norm();
     for (a, b) in plain.0.iter().zip(&disturbed.0) {
-        // What lies between two states is interpolated from other states.
+        // Values between two states are interpolated from different states.
         assert!((&a.0.positions_m - &b.0.positions_m).amax() < 1e-12);
         assert!(far(&a.1, &b.1) < 1e-12 && far(&a.2, &b.2) < 1e-12 && far(&a.3, &b.3) < 1e-12);
     }
@@ -233,7 +233,7 @@ fn steps_that_were_refused_and_questions_about_trial_states_change_nothing() {
 }
 
 #[test]
-fn a_vehicle_that_is_dead_commands_nothing_and_a_frozen_one_what_it_did() {
+fn a_dead_vehicle_has_no_command_and_a_frozen_one_keeps_its_last() {
     let mut scenario = scenario();
     scenario.failures = vec![
         Failure { vehicle: 2, at_s: 0.5, kind: FailureKind::Dead {} },
@@ -256,5 +256,5 @@ fn without_imperfections_the_link_is_the_direct_one() {
     assert!(of(&scenario(), true).is_exact());
     let mut scenario = scenario();
     scenario.network.missing = Missing::Extrapolate;
-    assert!(of(&scenario, true).is_exact(), "nothing is missing");
+    assert!(of(&scenario, true).is_exact(), "no imperfection");
 }

@@ -1,5 +1,5 @@
-//! What the loop of sense, law, plant and judge keeps: no step jumps a barrier, nothing passes unseen, energy is not
-//! made, symmetries hold, and a flight that cannot go on ends with a name and with what was recorded.
+//! Properties of the simulation loop: no step jumps a barrier or hides a violation, energy is conserved, and symmetries
+//! hold. A flight that cannot continue ends with a reason and keeps its recording.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
@@ -16,16 +16,16 @@ use tautline_sim::plant::{self, Path, Plant, PlantError, rapier};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
 
-/// A sum of ten tensions and five squares, relative to a sum that may be many times larger.
+/// Rounding of a sum of ten tensions and five squares relative to that sum.
 const ENERGY_ROUNDING: f64 = 1e-12;
-/// The error of a second-order method measured at two steps gives an order of 2 up to terms of the order of dt.
+/// Measured order of a second-order method from two steps: 2 up to terms of the order of dt.
 const ORDER: std::ops::RangeInclusive<f64> = 1.9..=2.1;
 
-/// A law whose commands are changed after the fact.
+/// Law with modified commands.
 #[derive(Clone)]
 struct Bent<F> {
     inner: Box<dyn Law>,
-    /// Given how often the law was asked before, the state, and the command.
+    /// Arguments: number of earlier evaluations, state, and command.
     bend: F,
     asked: u64,
 }
@@ -56,7 +56,7 @@ impl<F: FnMut(u64, &Swarm, &mut Rows) -> Result<(), LawError> + Clone + Send> La
     }
 }
 
-/// A plant that is lost after some steps: it says so, or it does not and shows a vehicle that is nowhere.
+/// Plant that fails after some steps: with an error, or with a state that is not finite.
 #[derive(Clone)]
 struct Lost {
     inner: Box<dyn Plant>,
@@ -96,7 +96,7 @@ impl Plant for Lost {
 
 // Energy
 
-/// Largest rise of the energy over what it had been before, relative to E(0).
+/// Returns the largest rise of the energy above its minimum so far, relative to E(0).
 fn energy_rise(log: &Log) -> f64 {
     let energies: Vec<f64> = log.samples.iter().filter_map(|sample| sample.energy).collect();
     let mut least = energies[0];
@@ -106,7 +106,8 @@ fn energy_rise(log: &Log) -> f64 {
     })
 }
 
-/// Largest difference between E(0) - E(t) and the integral of `sum |v_i - mean v|^2` up to t, relative to E(0).
+/// Returns the largest difference between E(0) - E(t) and the integral of `sum |v_i - mean v|^2` up to t, relative to
+/// E(0).
 fn energy_imbalance(log: &Log) -> f64 {
     let loss = |sample: &OwnedSample| {
         let mean = sample.swarm.mean_velocity_m_s();
@@ -123,7 +124,7 @@ fn energy_imbalance(log: &Log) -> f64 {
     worst
 }
 
-/// 40 s in steps of 1/`steps_per_s`, every one of them recorded.
+/// Returns 40 s of a built-in scenario in steps of 1/`steps_per_s`, all of them recorded.
 fn stepwise(name: &str, steps_per_s: u32) -> Scenario {
     let mut scenario = builtin(name, &["time.duration_s=40"]);
     scenario.time.dt_s = 1.0 / f64::from(steps_per_s);
@@ -131,7 +132,7 @@ fn stepwise(name: &str, steps_per_s: u32) -> Scenario {
     scenario
 }
 
-/// The law with the sign of its tension flipped: pairs that are too near pull, pairs that are too far push.
+/// Returns the law with the sign of its tension flipped: close pairs pull, distant pairs push.
 fn flipped(scenario: &Scenario) -> impl Law + use<> {
     let (mut tension, flown) = (scenario.law().expect("a law"), scenario.clone());
     Bent::new(scenario, move |_, swarm: &Swarm, control: &mut Rows| {
@@ -143,7 +144,7 @@ fn flipped(scenario: &Scenario) -> impl Law + use<> {
 }
 
 #[test]
-fn energy_never_increases_and_is_lost_at_the_rate_of_the_theory_up_to_the_step() {
+fn energy_decreases_at_the_theoretical_rate_up_to_the_step() {
     for name in ["pentagon", "circle"] {
         let flights = [60, 120, 240, 480].map(|steps_per_s| fly(&stepwise(name, steps_per_s)).1);
         for log in &flights {
@@ -167,7 +168,7 @@ fn with_the_sign_of_the_tension_flipped_both_energy_checks_fail() {
 
 // Passing through
 
-/// Thrown at 1000 m/s past a vehicle at rest: 16.7 m a step, from 8.4 m before it to 8.3 m behind it.
+/// Returns a vehicle that passes one at rest at 1000 m/s: 16.7 m per step, from 8.4 m before it to 8.3 m behind it.
 fn thrown() -> Scenario {
     let mut scenario = duel([-41.7, 0.0], [1000.0, 0.0], 2.0, 1.0 / 60.0, 0.1);
     scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
@@ -176,7 +177,7 @@ fn thrown() -> Scenario {
 }
 
 #[test]
-fn a_flight_reports_a_violation_that_none_of_its_samples_shows_and_the_engine_misses() {
+fn a_violation_between_samples_is_reported_although_the_engine_misses_it() {
     let scenario = thrown();
     let (flight, log) = fly(&scenario);
     assert_eq!((&flight.ending, flight.audit.status), (&Ending::Completed, Status::Violation));
@@ -191,16 +192,16 @@ fn a_flight_reports_a_violation_that_none_of_its_samples_shows_and_the_engine_mi
 
 // Endings
 
-/// Why the motion could not be carried on.
+/// Returns the reason why a motion could not be continued.
 fn breakdown(flown: Result<Flight, SimError>) -> Breakdown {
-    match flown.expect("an early end is no error").ending {
+    match flown.expect("an early end is not an error").ending {
         Ending::BrokeDown(why) => why,
         other => panic!("{other:?}"),
     }
 }
 
 #[test]
-fn a_law_that_commands_what_cannot_be_flown_is_named_with_vehicle_and_step() {
+fn an_invalid_command_is_reported_with_vehicle_and_step() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (bad, at) in [(f64::NAN, 0), (f64::INFINITY, 7), (f64::NEG_INFINITY, 239), (1e300, 0), (-1.1e30, 5)] {
         let law = Bent::new(&scenario, move |asked, _: &Swarm, control: &mut Rows| {
@@ -223,7 +224,7 @@ fn a_law_that_commands_what_cannot_be_flown_is_named_with_vehicle_and_step() {
 }
 
 #[test]
-fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
+fn a_state_that_is_not_finite_is_reported_with_vehicle_and_step() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (says_so, lost_at) in [(true, 1), (true, 9), (false, 0), (false, 1), (false, 9)] {
         let inner = rapier::plant(&scenario);
@@ -237,20 +238,20 @@ fn a_plant_that_loses_a_vehicle_is_named_with_vehicle_and_step() {
 }
 
 #[test]
-fn the_engine_itself_reports_a_vehicle_that_left_the_range_of_its_numbers() {
+fn the_engine_reports_a_state_that_is_not_finite() {
     let scenario = builtin("pentagon", &["time.duration_s=1", "swarm.mass_kg=100"]);
     let (mut plant, mut state, mut path) = (rapier::plant(&scenario), scenario.start.clone(), Path::default());
     let mut control = Rows::zeros(5);
     plant.apply(&control, &mut state);
     assert_eq!(plant.advance(0.01, &mut state, &mut path), Ok(()));
-    // A force of 1e308 m/s^2 times 100 kg is no number.
+    // A force of 1e308 m/s^2 times 100 kg overflows.
     control[(1, 0)] = 1e308;
     plant.apply(&control, &mut state);
     assert_eq!(plant.advance(0.01, &mut state, &mut path), Err(PlantError::NotFinite { vehicle: 1 }));
 }
 
 #[test]
-fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
+fn an_undefined_law_ends_the_run_and_keeps_the_recording() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for undefined_at in [0, 1, 101] {
         let law = Bent::new(
@@ -260,7 +261,7 @@ fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
             },
         );
         let (flown, log) = fly_with(&scenario, Box::new(law), plant::of(&scenario));
-        let flight = flown.expect("an early end is no error");
+        let flight = flown.expect("an early end is not an error");
         assert_eq!(flight.ending, Ending::LawUndefined(LawError::OutOfRange));
         assert_eq!((flight.steps, flight.audit.steps), (undefined_at, undefined_at));
         let (_, undisturbed) = fly(&scenario);
@@ -273,7 +274,7 @@ fn a_law_that_becomes_undefined_ends_the_run_with_what_was_recorded() {
     }
 }
 
-/// The scenario's law under a name that is made as the program runs.
+/// The scenario's law with a name that is created at run time.
 #[derive(Clone)]
 struct Named {
     inner: Box<dyn Law>,
@@ -291,7 +292,7 @@ impl Law for Named {
 }
 
 #[test]
-fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
+fn a_custom_law_is_recorded_by_its_name() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     let inner = scenario.law().expect("a law");
     let law = Named { name: format!("{} of my own", inner.name()), inner };
@@ -299,12 +300,12 @@ fn a_law_of_ones_own_is_recorded_by_its_name_and_not_by_the_scenarios() {
     assert_eq!(flown.expect("a flight").law, "edge-tension of my own");
     let told = Event::OtherLaw { time_s: 0.0, name: "edge-tension of my own".to_owned() };
     assert_eq!(log.events, [told]);
-    // Nothing is told of the scenario's own.
+    // The scenario's own law needs no event.
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.law.as_str(), &log.events[..]), ("edge-tension", &[][..]));
 }
 
-/// Notes who asks it.
+/// Law that records the names of its threads.
 #[derive(Clone)]
 struct Asked {
     stays: bool,
@@ -346,7 +347,7 @@ fn a_law_that_requires_the_calling_thread_runs_on_no_other() {
 }
 
 #[test]
-fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
+fn an_interrupted_flight_is_complete_up_to_the_interruption() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     for (break_at, last_sample) in [(1, 1), (100, 100), (101, 101)] {
         let mut log = Log::default();
@@ -355,7 +356,7 @@ fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
             asked.push(step);
             if step == break_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
-        .expect("breaking off is no error");
+        .expect("an interruption is not an error");
         assert_eq!((flight.ending, flight.steps), (Ending::Interrupted, break_at));
         assert_eq!(asked, (1..=break_at).collect::<Vec<_>>());
         assert_eq!(log.samples.last().map(|sample| sample.step), Some(last_sample));
@@ -366,7 +367,7 @@ fn a_caller_that_breaks_off_gets_a_complete_flight_up_to_there() {
 }
 
 #[test]
-fn breaking_off_at_the_last_step_is_a_completed_flight() {
+fn an_interruption_at_the_last_step_completes_the_flight() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
     let flight = sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut (), &mut |step| {
         if step == 240 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -375,7 +376,7 @@ fn breaking_off_at_the_last_step_is_a_completed_flight() {
 }
 
 #[test]
-fn samples_are_recorded_at_the_rate_that_was_asked_for() {
+fn samples_are_recorded_at_the_recording_rate() {
     for (record_hz, samples) in [(60, 61), (1, 2), (240, 241), (1000, 241), (7, 8)] {
         let scenario = builtin("pentagon", &["time.duration_s=1", &format!("time.record_hz={record_hz}")]);
         let (_, log) = fly(&scenario);
@@ -389,7 +390,7 @@ fn samples_are_recorded_at_the_rate_that_was_asked_for() {
 }
 
 #[test]
-fn the_closest_approach_of_a_sample_is_that_of_all_steps_since_the_sample_before() {
+fn the_closest_approach_of_a_sample_covers_all_steps_since_the_last() {
     let fine = fly(&builtin("pentagon", &["time.duration_s=5", "time.record_hz=240"])).1;
     let coarse = fly(&builtin("pentagon", &["time.duration_s=5", "time.record_hz=2"])).1;
     let mut from = 0;
@@ -402,7 +403,7 @@ fn the_closest_approach_of_a_sample_is_that_of_all_steps_since_the_sample_before
     }
 }
 
-/// Certifies 3 m, whatever formations lie ahead.
+/// Law that certifies 3 m for any formations ahead.
 #[derive(Clone)]
 struct Careless;
 
@@ -422,7 +423,7 @@ impl Law for Careless {
 }
 
 #[test]
-fn a_law_that_does_not_account_for_the_formations_ahead_certifies_nothing_through_them() {
+fn a_law_that_ignores_later_formations_certifies_no_flight_through_them() {
     let still = builtin("pentagon", &["time.duration_s=1"]);
     assert_eq!(still.certificate(&Careless).certified_m, Some(3.0));
     let mut legs = still.clone();

@@ -1,4 +1,4 @@
-//! Scenarios, laws, plants and the loop that flies them.
+//! Scenarios, laws, plants and the simulation loop.
 
 mod flight;
 

@@ -1,6 +1,6 @@
-//! Random numbers for scenarios of any kind.
+//! Random numbers for scenarios of tests.
 
-/// A reproducible stream of numbers in [0, 1).
+/// Reproducible stream of numbers in \[0, 1).
 pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
@@ -17,13 +17,13 @@ impl Numbers {
         low + (high - low) * self.unit()
     }
 
-    /// One of 0, 1, ..., `count` - 1.
+    /// Returns one of 0, 1, ..., `count` - 1.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0 and below `count`")]
     pub(crate) fn below(&mut self, count: usize) -> usize {
         (self.unit() * count as f64) as usize
     }
 
-    /// Uniform in the logarithm.
+    /// Returns a number that is uniform in its logarithm.
     pub(crate) fn over_decades(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }

@@ -1,7 +1,8 @@
-//! Flights among obstacles: what is certified holds, the judge sees what the law ignores, hulls do not pass.
+//! Flights among obstacles: certificates hold, the audit reports violations by laws that ignore obstacles, and hulls do
+//! not pass.
 //!
-//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=500 cargo test --release --test flights obstacles --
-//! --nocapture` flies 500 and prints what docs/validation.md says of them.
+//! 12 random flights in continuous time; `TAUTLINE_RANDOM_OBSTACLES=500 cargo test --release --test flights obstacles
+//! -- --nocapture` flies 500 and prints the numbers of docs/validation.md.
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
@@ -11,7 +12,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
 use tautline_laws::space::{Obstacle, Shape, least_room};
-use tautline_laws::target::{Begins, BreathingMode, Guidance, Leg, ReferenceMotion};
+use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg, ReferenceMotion};
 use tautline_sim::plant;
 use tautline_sim::scenario::{PlantSpec, Scenario, Source};
 use tautline_sim::sim::{Ending, Flight, Simulation};
@@ -29,7 +30,7 @@ fn shape(numbers: &mut Numbers, delta_m: f64) -> Shape {
     }
 }
 
-/// Two legs among three solids, around a reference at rest, from places and to slots that have room.
+/// Returns two legs among three obstacles, around a reference at rest, with starts and slots outside the clearances.
 fn among(seed: u64) -> Scenario {
     let mut numbers = Numbers(seed.wrapping_mul(0xe703_7ed1_a0b4_28db) | 1);
     let sixth = 6.0 * numbers.unit();
@@ -75,7 +76,7 @@ fn among(seed: u64) -> Scenario {
     scenario.law = LawSpec::Displacement(DisplacementKeys { alpha: delta_m * delta_m, ..DisplacementKeys::default() });
     scenario.a22_per_s = numbers.between(-0.5, 0.2);
     scenario.plant = PlantSpec::Ideal;
-    scenario.breathing.mode = BreathingMode::Off;
+    scenario.deadlock.mode = DeadlockMode::Off;
     scenario.hull_radius_m.fill((0.4 * delta_m).min(0.5 * delta_m - 0.021).max(1e-3));
     scenario.legs = legs.to_vec();
     let known_by = if numbers.unit() < 0.5 { Pinning::All } else { Pinning::Listed(vec![0]) };
@@ -86,7 +87,7 @@ fn among(seed: u64) -> Scenario {
 }
 
 #[test]
-fn no_random_flight_among_obstacles_breaks_what_was_certified() {
+fn no_random_flight_among_obstacles_violates_its_certificate() {
     let flights = std::env::var("TAUTLINE_RANDOM_OBSTACLES").map_or(12, |n| n.parse().expect("a number"));
     let (mut tightest, mut near, mut worst_rise) = (f64::INFINITY, 0_u64, 0.0_f64);
     for seed in 0..flights {
@@ -110,14 +111,15 @@ fn no_random_flight_among_obstacles_breaks_what_was_certified() {
         worst_rise = worst_rise.max((rise.to - rise.from) / rise.from);
     }
     println!(
-        "{flights} flights among obstacles, {near} of them nearer than 0.1 delta beyond a clearance: least room above the \
+        "{flights} flights among obstacles, {near} of them nearer than 0.1 delta beyond a clearance: least room above \
+         the \
          certificate {tightest:.3e} delta, largest rise of energy {worst_rise:.1e}"
     );
     assert!(worst_rise < 1e-6, "{worst_rise}");
-    assert!(4 * near > flights, "{near}: obstacles were hardly in the way");
+    assert!(4 * near > flights, "{near}: too few flights came close to obstacles");
 }
 
-/// The law of a scenario that was not told of the obstacles flies through them: the judge sees it, and nothing is certified.
+/// Flies under a law without the obstacles: the audit reports violations, and there is no certificate.
 fn ignorant(scenario: &Scenario) -> (Flight, Log) {
     let mut alone = scenario.clone();
     alone.obstacles.clear();
@@ -126,7 +128,7 @@ fn ignorant(scenario: &Scenario) -> (Flight, Log) {
 }
 
 #[test]
-fn a_law_that_is_not_told_of_obstacles_flies_into_them_and_certifies_nothing() {
+fn a_law_without_obstacles_hits_them_and_has_no_certificate() {
     let too_near = (0..12).map(among).filter(|scenario| {
         let (flight, log) = ignorant(scenario);
         assert_eq!(flight.certificate.void, [Void::ObstaclesUnknown]);
@@ -138,7 +140,7 @@ fn a_law_that_is_not_told_of_obstacles_flies_into_them_and_certifies_nothing() {
     assert!(too_near.count() >= 6);
 }
 
-/// Straight at a wall that the law does not know: points go through, hulls do not.
+/// Vehicles fly straight at a wall that the law ignores: points pass through it, hulls do not.
 #[test]
 fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
     let mut scenario = builtin("pentagon", &[]);
@@ -175,7 +177,7 @@ fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
             assert_eq!(deepest_m < 0.0, passes, "{shape:?} {plant:?}: {deepest_m}");
             assert!(passes || deepest_m > 0.2, "a hull has a radius of 0.25 m: {deepest_m}");
         }
-        // Who is told keeps the clearance, and comes to rest before it.
+        // A law with the obstacles keeps the clearance and stops in front of it.
         let (flight, _) = fly(&Scenario { reference: None, ..scenario.clone() });
         assert_eq!(flight.clearance.expect("an obstacle").status, Status::Clear);
     }
@@ -183,7 +185,7 @@ fn a_hull_does_not_pass_a_wall_that_a_point_passes() {
 
 /// The same flight in the engine and in continuous time, through the gate of the built-in scenario.
 #[test]
-fn the_engine_flies_past_obstacles_as_the_law_does_in_continuous_time() {
+fn the_engine_matches_continuous_time_among_obstacles() {
     const TOLERANCE_M: f64 = 1e-3;
     let engine = builtin("obstacles", &["time.duration_s=8"]);
     let ideal = Scenario { plant: PlantSpec::Ideal, ..engine.clone() };
@@ -201,7 +203,7 @@ fn the_engine_flies_past_obstacles_as_the_law_does_in_continuous_time() {
 }
 
 #[test]
-fn a_swarm_that_is_carried_past_obstacles_or_fed_is_promised_nothing_and_flown_all_the_same() {
+fn a_moving_reference_or_added_energy_voids_the_certificate_among_obstacles() {
     let mut scenario = among(3);
     let certified = |scenario: &Scenario| scenario.certificate(scenario.law().expect("a law").as_ref());
     assert!(certified(&scenario).certified_room_m.is_some());
@@ -209,7 +211,7 @@ fn a_swarm_that_is_carried_past_obstacles_or_fed_is_promised_nothing_and_flown_a
     scenario.a22_per_s = 0.1;
     assert_eq!(certified(&scenario).void, [Void::VelocityUndamped]);
     scenario.a22_per_s = -0.1;
-    assert!(certified(&scenario).certified_room_m.is_some(), "braked, it needs no reference");
+    assert!(certified(&scenario).certified_room_m.is_some(), "with drag it needs no reference");
     let motion = ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::x() };
     scenario.reference = guidance.map(|guidance| Guidance { motion, ..guidance });
     assert_eq!(certified(&scenario).void, [Void::CarriedPastObstacles]);
@@ -231,9 +233,10 @@ fn a_saved_flight_among_obstacles_goes_on_with_the_same_bits() {
     assert_eq!((once.last, once.clearance), (again.last, again.clearance));
 }
 
-/// Steps far too long for the law's rate, at a wall: what would take more than half of the room is undone and flown in halves.
+/// Steps are far too long for the law's rate at a wall: moves that take more than half of the margin are undone and
+/// halved.
 #[test]
-fn a_step_that_takes_more_than_half_of_the_room_is_flown_in_halves() {
+fn a_step_that_takes_more_than_half_of_the_margin_is_halved() {
     let mut scenario = builtin("obstacles", &["time.duration_s=6", "time.max_rate_dt=1e6", "time.dt_s=0.05"]);
     scenario.start.velocities_m_s.column_mut(0).fill(20.0);
     let (flight, log) = fly(&scenario);

@@ -1,5 +1,5 @@
-//! The rigid bodies of the physics engine are the double integrators of equation (1): free motion is exact, masses,
-//! keep-out balls and the third axis of a plane do not matter, and hulls are solid.
+//! The rigid bodies of the physics engine are the double integrators of equation (1). Free motion is exact; masses,
+//! keep-out balls and the third axis of a plane have no effect; hulls are solid.
 
 use crate::flight::{builtin, fly};
 use nalgebra::Vector3;
@@ -11,14 +11,14 @@ use tautline_sim::scenario::{Scenario, Space};
 const DT_S: f64 = 1.0 / 240.0;
 const HULL_RADIUS_M: f64 = 0.25;
 
-/// Moves a plant over a step under these accelerations \[m/s^2\].
+/// Advances a plant by a step under accelerations \[m/s^2\].
 fn step(plant: &mut dyn Plant, command: &Rows, dt_s: f64) {
     let mut state = observed(plant, command.nrows());
     plant.apply(command, &mut state);
     plant.advance(dt_s, &mut state, &mut Path::default()).expect("a finite motion");
 }
 
-/// Vehicles at these positions \[m\] with these velocities \[m/s\].
+/// Returns vehicles with positions \[m\] and velocities \[m/s\].
 fn scenario(positions_m: &[f64], velocities_m_s: &[f64]) -> Scenario {
     let start =
         Swarm { positions_m: Rows::from_row_slice(positions_m), velocities_m_s: Rows::from_row_slice(velocities_m_s) };
@@ -35,7 +35,7 @@ fn observed(plant: &dyn Plant, count: usize) -> Swarm {
 }
 
 #[test]
-fn a_free_velocity_is_exactly_v0_exp_a22_t_whatever_the_sign_of_a22() {
+fn a_free_velocity_is_exactly_v0_exp_a22_t_for_both_signs_of_a22() {
     const STEPS: u32 = 2400;
     let velocity = Vector3::new(0.75, -0.5, 0.25);
     for a22_per_s in [-0.9, -0.1, 0.0, 0.1, 0.7] {
@@ -48,7 +48,7 @@ fn a_free_velocity_is_exactly_v0_exp_a22_t_whatever_the_sign_of_a22() {
         let found = row(&observed(plant.as_ref(), 2).velocities_m_s, 0);
         let expected = velocity * (a22_per_s * f64::from(STEPS) * DT_S).exp();
         let off = (found - expected).norm() / expected.norm();
-        // Each step rounds the velocity of the drift and the one at its end.
+        // Each step rounds the velocity of the drift and that at its end.
         let rounding = 3.0 * f64::from(STEPS) * f64::EPSILON;
         assert!(off <= rounding, "a22 = {a22_per_s}, off by {off}, rounding is {rounding}");
         if a22_per_s == 0.0 {
@@ -65,21 +65,21 @@ fn within_a_step_motion_is_the_straight_line_that_the_audit_sweeps() {
     set_row(&mut control, 0, Vector3::new(2.0, 4.0, -8.0));
     step(plant.as_mut(), &control, DT_S);
     let after = observed(plant.as_ref(), 2);
-    // A constant acceleration moves a vehicle exactly as it should: p = v t + u t^2/2, v = v(0) + u t.
+    // Exact motion under a constant acceleration: p = v t + u t^2/2, v = v(0) + u t.
     let (velocity, held) = (Vector3::new(0.75, -0.5, 0.25), Vector3::new(2.0, 4.0, -8.0));
     let rounding = 4.0 * f64::EPSILON;
     let off_m_s = (row(&after.velocities_m_s, 0) - (velocity + held * DT_S)).norm();
     let off_m = (row(&after.positions_m, 0) - (velocity + held * (0.5 * DT_S)) * DT_S).norm();
-    // The engine's origin is the middle of the start, 45 m away.
+    // The engine's origin is the centre of the start, 45 m away.
     assert!(off_m_s <= rounding && off_m <= 45.0 * f64::EPSILON, "{off_m_s} m/s, {off_m} m");
 }
 
 #[test]
-fn keep_out_balls_see_and_do_not_push() {
-    // The baseline does not know delta: it is the radius of the keep-out balls and nothing else.
+fn keep_out_balls_report_contacts_and_do_not_push() {
+    // In the baseline, delta is only the diameter of the keep-out balls.
     let [touching, clear] =
         ["law.delta_m=2", "law.delta_m=1.5"].map(|delta| fly(&builtin("pentagon-laplacian", &[delta])));
-    assert!(!touching.0.engine_contacts.is_empty(), "balls of 1 m are seen to overlap");
+    assert!(!touching.0.engine_contacts.is_empty(), "balls of 1 m overlap");
     assert!(clear.0.engine_contacts.is_empty(), "balls of 0.75 m never meet");
     for (with, without) in touching.1.samples.iter().zip(&clear.1.samples) {
         assert_eq!(with.swarm, without.swarm, "at {} s", with.time_s);
@@ -89,9 +89,9 @@ fn keep_out_balls_see_and_do_not_push() {
 
 #[test]
 fn hulls_are_solid_and_bounce() {
-    // The engine sees a contact coming and stops the hulls at each other's surface, up to rounding over 240 steps.
+    // The engine predicts contacts and stops the hulls at each other's surface, up to rounding over 240 steps.
     const STEPS: u32 = 480;
-    // Head-on at 1 m/s each.
+    // A head-on collision at 1 m/s each.
     let scenario = scenario(&[-1.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
     let mut plant = rapier::plant(&scenario);
     let mut nearest_m = f64::INFINITY;
@@ -106,9 +106,9 @@ fn hulls_are_solid_and_bounce() {
     let [left, right] = [0, 1].map(|i| observed(plant.as_ref(), 2).velocities_m_s[(i, 0)]);
     assert!(
         (left + 0.5).abs() <= rounding && (right - 0.5).abs() <= rounding,
-        "half the speed is kept: {left}, {right}"
+        "half the speed remains: {left}, {right}"
     );
-    let [hit] = hits[..] else { panic!("they hit once: {hits:?}") };
+    let [hit] = hits[..] else { panic!("one hit expected: {hits:?}") };
     assert_eq!(hit.pair, Pair::new(0, 1));
     assert!((hit.closing_m_s - 2.0).abs() <= rounding, "{} m/s", hit.closing_m_s);
 }
@@ -128,7 +128,7 @@ fn hulls_that_pass_beside_each_other_do_not_touch() {
 }
 
 #[test]
-fn a_swarm_in_the_plane_never_leaves_it_even_when_it_is_told_to() {
+fn a_swarm_in_the_plane_never_leaves_it_under_any_command() {
     let mut scenario = scenario(&[-1.0, 0.1, 0.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 0.0, -1.0, 0.0, 0.0]);
     assert_eq!(scenario.space, Space::Plane);
     let mut control = Rows::zeros(2);
@@ -143,7 +143,7 @@ fn a_swarm_in_the_plane_never_leaves_it_even_when_it_is_told_to() {
     };
     assert!(!lifted(&scenario));
     scenario.space = Space::Volume;
-    assert!(lifted(&scenario), "the same command lifts a swarm that is free to go");
+    assert!(lifted(&scenario), "the same command lifts a swarm in three dimensions");
 }
 
 #[test]
@@ -159,18 +159,18 @@ fn two_dimensional_flights_stay_in_their_plane_exactly() {
 
 #[test]
 fn mass_does_not_change_motion() {
-    // Rounding of force and inverse mass, carried along for 2400 steps by a flight that does not amplify it.
+    // Rounding of force and inverse mass over 2400 steps of a flight that does not amplify it.
     const TOLERANCE_M: f64 = 1e-10;
     let sets = ["time.duration_s=10"];
     let with = |mass: &str| fly(&builtin("pentagon", &[sets[0], mass])).0.last;
     let light = with("swarm.mass_kg=1");
     let off_m = (with("swarm.mass_kg=[0.03,700,5,1e-6,1e6]").positions_m - &light.positions_m).amax();
     assert!(off_m <= TOLERANCE_M, "off by {off_m} m");
-    assert_eq!(with("swarm.mass_kg=[0.25,1024,2,0.5,8]"), light, "powers of two round nothing");
+    assert_eq!(with("swarm.mass_kg=[0.25,1024,2,0.5,8]"), light, "powers of two cause no rounding");
 }
 
 #[test]
-fn a_restored_plant_flies_on_as_if_the_refused_step_had_not_been() {
+fn a_restored_plant_continues_as_without_the_refused_step() {
     let scenario = builtin("pentagon", &[]);
     let mut plant = rapier::plant(&scenario);
     let mut control = Rows::zeros(5);

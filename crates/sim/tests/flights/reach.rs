@@ -1,16 +1,18 @@
-//! Given slots are reached under the displacement law: on any connected graph, with breaths where vehicles stand in each
-//! other's way, without a violation and with no more energy than was promised.
+//! Given slots are reached under the displacement law: on any connected graph, with deadlock recovery where vehicles
+//! block each other, without a violation, and with the energy below its bound.
 //!
-//! 2 random starts of each case, 6 of the 60 orderings of the pentagon, and 16 or 27 vehicles where the case is of 100 or 500,
-//! which `TAUTLINE_LONG=1` flies; `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: -- --nocapture`
-//! flies 20 of every case in full, all orderings, and prints the table of docs/validation.md. Rapier at its defaults, a22 = 0.1 1/s; a flight ends once the formation has been
-//! held for as long as it must be, or after 300 s.
+//! By default: 2 random starts of each case and 6 of the 60 orderings of the pentagon. 16 or 27 vehicles replace 100
+//! or 500, which `TAUTLINE_LONG=1` flies. `TAUTLINE_REACH_STARTS=20 cargo test --release --test flights reach:: --
+//! --nocapture` flies 20 starts of every case in full and all orderings. It prints the table of docs/validation.md.
+//!
+//! Rapier with its defaults, a22 = 0.1 1/s. A flight ends once the formation has been held for `arrival.hold_s`, or
+//! after 300 s.
 
 use tautline_audit::Status;
 use tautline_core::record::Sink as _;
 use tautline_laws::formation::{Formation, Freedom};
 use tautline_laws::law::{EdgeTension, Void};
-use tautline_laws::target::BreathingMode;
+use tautline_laws::target::DeadlockMode;
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::Simulation;
@@ -19,27 +21,27 @@ use crate::flight::read;
 use crate::numbers::Numbers;
 
 const DURATION_S: f64 = 300.0;
-/// Distances of slots and of starts over delta, which is 1 m.
+/// Distances of slots and of starts relative to delta = 1 m.
 const SLOTS: f64 = 1.6;
 const STARTS: f64 = 1.3;
-/// How much of the plane, and of space, is taken by discs and balls that the starts keep apart.
+/// Share of the plane and of space that is filled by the discs and balls of separated starts.
 const FILLED_PLANE: f64 = 0.35;
 const FILLED_SPACE: f64 = 0.2;
-/// What integration of second order may add to the energy, relative to what was promised.
+/// Relative error of the energy by second-order integration.
 const ENERGY_ROUNDING: f64 = 1e-3;
 
-/// Starts of each case, where a number is asked for.
-fn starts_asked_for() -> Option<u64> {
+/// Returns the number of starts per case, if the environment gives one.
+fn starts_per_case() -> Option<u64> {
     std::env::var("TAUTLINE_REACH_STARTS").ok().map(|n| n.parse().expect("a number"))
 }
 
-/// Of the two numbers of vehicles the second where there is time for it.
+/// Returns the smaller number of vehicles by default, the larger one in long runs.
 fn vehicles(few: usize, all: usize) -> usize {
-    let is_thorough = starts_asked_for().is_some() || std::env::var_os("TAUTLINE_LONG").is_some();
+    let is_thorough = starts_per_case().is_some() || std::env::var_os("TAUTLINE_LONG").is_some();
     if is_thorough { all } else { few }
 }
 
-/// Slots to be reached by so many vehicles.
+/// Target slots.
 #[derive(Clone, Copy)]
 enum Slots {
     Circle(usize),
@@ -68,7 +70,7 @@ impl Slots {
         }
     }
 
-    /// Half the side of the square or the cube that they start in \[m\].
+    /// Returns half the side of the square or cube of the start \[m\].
     fn half_extent_m(self) -> f64 {
         let (count, radius_m) = (self.count() as f64, 0.5 * STARTS);
         match self {
@@ -81,7 +83,7 @@ impl Slots {
         }
     }
 
-    /// From the random start, and on the random graph, of this seed.
+    /// Returns the scenario with the random start and the random graph of a seed.
     fn scenario(self, graph: &str, assignment: &str, seed: u64) -> Scenario {
         let (count, keys, half_extent_m) = (self.count(), self.keys(), self.half_extent_m());
         let graph = match graph {
@@ -90,7 +92,8 @@ impl Slots {
         };
         read(&format!(
             "swarm = {{ count = {count}, a22_per_s = 0.1 }}\n\
-             start = {{ shape = \"random\", half_extent_m = {half_extent_m}, min_separation_m = {STARTS}, seed = {seed} }}\n\
+             start = {{ shape = \"random\", half_extent_m = {half_extent_m}, min_separation_m = {STARTS}, seed = \
+             {seed} }}\n\
              formation = {{ {keys}, assignment = \"{assignment}\" }}\n\
              law = {{ kind = \"displacement\", delta_m = 1.0 }}\n\
              graph = {{ {graph} }}\n\
@@ -99,7 +102,7 @@ impl Slots {
     }
 }
 
-/// A tree in which each vehicle is linked with a random one before it, and as many random links more.
+/// Returns a tree in which each vehicle is linked with a random earlier one, and as many random links again.
 fn random_edges(count: usize, seed: u64) -> Vec<[usize; 2]> {
     let mut numbers = Numbers(seed.wrapping_add(1).wrapping_mul(0x9fb2_1c65_1e98_df25));
     let mut edges: Vec<[usize; 2]> = (2..=count).map(|vehicle| [numbers.below(vehicle - 1) + 1, vehicle]).collect();
@@ -113,13 +116,13 @@ fn random_edges(count: usize, seed: u64) -> Vec<[usize; 2]> {
     edges
 }
 
-/// What a flight came to.
+/// Result of a flight.
 struct Flown {
     reached_at_s: Option<f64>,
-    breaths: usize,
+    recoveries: usize,
     assignments: usize,
     separation_m: f64,
-    /// What was broken, in words.
+    /// Description of a violated property.
     broken: Option<String>,
 }
 
@@ -153,16 +156,16 @@ fn fly(scenario: &Scenario) -> Flown {
             let slots_m = scenario.formation().min_distance().expect("two slots").1;
             let promised = EdgeTension::new(1.0, scenario.delta_m, slots_m).expect("a tension").value(certified_m);
             let is_more = highest > promised * (1.0 + ENERGY_ROUNDING);
-            is_more.then(|| format!("an energy of {highest}, promised {promised}"))
+            is_more.then(|| format!("an energy of {highest}, bound {promised}"))
         }
-        // So much energy that the promise is not told from delta.
-        None => (flight.certificate.void != [Void::Unresolved]).then(|| "no promise".to_owned()),
+        // The energy is so large that the bound cannot be distinguished from delta.
+        None => (flight.certificate.void != [Void::Unresolved]).then(|| "no certificate".to_owned()),
     };
-    let (breaths, assignments) = (flight.breaths.len(), flight.assignments.len());
-    Flown { reached_at_s, breaths, assignments, separation_m, broken }
+    let (recoveries, assignments) = (flight.deadlock_recoveries.len(), flight.assignments.len());
+    Flown { reached_at_s, recoveries, assignments, separation_m, broken }
 }
 
-/// Flies a case, prints its row of the table, and tells what did not come out as it must.
+/// Flies a case, prints its row of the table, and returns the failures.
 fn judge(name: &str, scenarios: impl Iterator<Item = Scenario>) -> Vec<String> {
     let flown: Vec<Flown> = scenarios.map(|scenario| fly(&scenario)).collect();
     let mut times_s: Vec<f64> = flown.iter().filter_map(|flown| flown.reached_at_s).collect();
@@ -177,18 +180,19 @@ fn judge(name: &str, scenarios: impl Iterator<Item = Scenario>) -> Vec<String> {
         flown.len(),
         times_s.get(times_s.len() / 2).unwrap_or(&f64::NAN),
         times_s.last().unwrap_or(&f64::NAN),
-        counted(|flown| flown.breaths),
+        counted(|flown| flown.recoveries),
         counted(|flown| flown.assignments),
         flown.iter().map(|flown| flown.separation_m).fold(f64::INFINITY, f64::min),
     );
     let wrong = |(start, flown): (usize, &Flown)| {
-        let late = flown.reached_at_s.is_none().then(|| format!("not reached, {} breaths", flown.breaths));
+        let late =
+            flown.reached_at_s.is_none().then(|| format!("not reached, {} deadlock recoveries", flown.recoveries));
         Some(format!("{name}, start {start}: {}", flown.broken.clone().or(late)?))
     };
     flown.iter().enumerate().filter_map(wrong).collect()
 }
 
-/// Flies random starts to slots on each of these graphs.
+/// Flies random starts to slots on several graphs.
 fn reach(slots: Slots, name: &str, graphs: &[&str], starts: u64) {
     let case = |graph: &&str| {
         judge(
@@ -203,7 +207,7 @@ fn reach(slots: Slots, name: &str, graphs: &[&str], starts: u64) {
 const ALL_GRAPHS: [&str; 5] = ["complete", "star", "ring", "path", "random"];
 const DENSE_GRAPHS: [&str; 3] = ["complete", "star", "random"];
 
-/// Near a line, 3 m apart, in this order of the pentagon's vehicles.
+/// Returns a start near a line, 3 m apart, with an order of the pentagon's vehicles.
 fn ordering(order: [usize; 5], number: u64) -> Scenario {
     let mut numbers = Numbers(number.wrapping_add(1).wrapping_mul(0xd6e8_feb8_6659_fd93));
     let mut places = [[0.0; 2]; 5];
@@ -219,16 +223,16 @@ fn ordering(order: [usize; 5], number: u64) -> Scenario {
     ))
 }
 
-/// All orders of five, one of each pair of mirror images.
+/// Returns all orders of five, one of each pair of mirror images.
 fn orderings() -> Vec<[usize; 5]> {
     let codes = (0..5_usize.pow(5)).map(|code| [4, 3, 2, 1, 0].map(|place| code / 5_usize.pow(place) % 5));
     codes.filter(|order| (0..5).all(|vehicle| order.contains(&vehicle)) && order[0] < order[4]).collect()
 }
 
-/// The paper's law reaches it from 26 of them.
+/// The law of the paper reaches the pentagon from 26 of them.
 #[test]
 fn the_pentagon_is_reached_from_every_order_of_its_vehicles() {
-    let every = if starts_asked_for().is_some() { 1 } else { 10 };
+    let every = if starts_per_case().is_some() { 1 } else { 10 };
     let starts = orderings().into_iter().zip(0..).step_by(every).map(|(order, number)| ordering(order, number));
     let wrong = judge("pentagon from every ordering, complete", starts);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -236,22 +240,22 @@ fn the_pentagon_is_reached_from_every_order_of_its_vehicles() {
 
 #[test]
 fn a_circle_of_12_is_reached_on_every_graph() {
-    reach(Slots::Circle(12), "on a circle", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Circle(12), "on a circle", &ALL_GRAPHS, starts_per_case().unwrap_or(2));
 }
 
 #[test]
 fn a_sphere_of_30_is_reached_on_every_graph() {
-    reach(Slots::Sphere(30), "on a sphere", &ALL_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Sphere(30), "on a sphere", &ALL_GRAPHS, starts_per_case().unwrap_or(2));
 }
 
 #[test]
 fn a_grid_of_100_is_reached() {
-    reach(Slots::Grid(vehicles(16, 100)), "in a grid", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Grid(vehicles(16, 100)), "in a grid", &DENSE_GRAPHS, starts_per_case().unwrap_or(2));
 }
 
 #[test]
 fn a_grid_of_100_is_reached_by_interchangeable_vehicles() {
-    let starts = starts_asked_for().unwrap_or(2);
+    let starts = starts_per_case().unwrap_or(2);
     let slots = Slots::Grid(vehicles(16, 100));
     let case = |assignment: &str| {
         let scenarios = (0..starts).map(|seed| slots.scenario("complete", assignment, seed));
@@ -261,10 +265,10 @@ fn a_grid_of_100_is_reached_by_interchangeable_vehicles() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What is left over: on a path of 100 vehicles stand in each other's way through eight breaths. Nothing is broken there
-/// either. Steps are up to 34 times shorter, so two starts are enough.
+/// Remaining limitation: on a path, 100 vehicles block each other through eight deadlock recoveries, without a
+/// violation. Steps are up to 34 times shorter, so two starts suffice.
 #[test]
-fn a_grid_of_100_is_reached_on_a_ring_and_on_a_path_nothing_is_broken() {
+fn a_grid_of_100_is_reached_on_a_ring_and_clear_on_a_path() {
     let slots = Slots::Grid(vehicles(16, 100));
     reach(slots, "in a grid", &["ring"], 2);
     let scenarios = (0..2).map(|seed| slots.scenario("path", "given", seed));
@@ -274,25 +278,25 @@ fn a_grid_of_100_is_reached_on_a_ring_and_on_a_path_nothing_is_broken() {
 
 #[test]
 fn a_sphere_of_100_is_reached() {
-    reach(Slots::Sphere(vehicles(16, 100)), "on a sphere", &DENSE_GRAPHS, starts_asked_for().unwrap_or(2));
+    reach(Slots::Sphere(vehicles(16, 100)), "on a sphere", &DENSE_GRAPHS, starts_per_case().unwrap_or(2));
 }
 
 #[test]
 fn a_cube_of_500_is_reached() {
-    reach(Slots::Cube(vehicles(27, 500)), "in a cube", &DENSE_GRAPHS[..2], starts_asked_for().unwrap_or(2));
+    reach(Slots::Cube(vehicles(27, 500)), "in a cube", &DENSE_GRAPHS[..2], starts_per_case().unwrap_or(2));
 }
 
-/// Negative twin: some do not arrive without a breath.
+/// Negative control: without deadlock recovery some flights do not arrive.
 #[test]
-fn who_breathes_arrives_and_who_does_not_may_be_stuck() {
-    let reached = |mode: BreathingMode| {
+fn stalled_flights_arrive_only_with_deadlock_recovery() {
+    let reached = |mode: DeadlockMode| {
         let flown = (0..3).map(|seed| {
             let mut scenario = Slots::Circle(12).scenario("path", "given", seed);
-            scenario.breathing.mode = mode;
+            scenario.deadlock.mode = mode;
             fly(&scenario)
         });
         flown.filter(|flown| flown.reached_at_s.is_some()).count()
     };
-    assert_eq!(reached(BreathingMode::Auto), 3);
-    assert!(reached(BreathingMode::Off) < 3);
+    assert_eq!(reached(DeadlockMode::Auto), 3);
+    assert!(reached(DeadlockMode::Off) < 3);
 }

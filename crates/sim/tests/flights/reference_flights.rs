@@ -1,5 +1,5 @@
-//! The built-in scenarios, flown in Rapier, agree with the reference solution of the ODE (an 8th-order Runge-Kutta
-//! integration at a relative tolerance of 1e-10), and their error vanishes with the square of the step.
+//! The built-in scenarios in Rapier agree with the reference solution of the ODE (an 8th-order Runge-Kutta integration
+//! at a relative tolerance of 1e-10). Their error vanishes with the square of the step.
 
 use crate::flight::{Log, builtin, fly};
 use nalgebra::Vector3;
@@ -11,24 +11,24 @@ use tautline_sim::metrics::{Metrics, Summary};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{Ending, Flight};
 
-/// Kick, drift, kick at dt = 1/240 s is off by 1e-6 m after 10 s.
+/// Kick, drift, kick at dt = 1/240 s has an error of 1e-6 m after 10 s.
 const POSITION_TOLERANCE_M: f64 = 3e-6;
-/// The table has six decimals.
+/// Reference table with six decimals.
 const SEPARATION_TOLERANCE_M: f64 = 5e-6;
-/// A few steps of 4 ms; the minimum is flat, so its time is known less well than its depth.
+/// A few steps of 4 ms: the minimum is flat, so its time is less accurate than its depth.
 const TIME_TOLERANCE_S: f64 = 0.02;
-/// The circle passes its minimum at 0.1 m/s or less, and its table gives two decimals.
+/// The circle passes its minimum at 0.1 m/s or less, and its table has two decimals.
 const CIRCLE_TIME_TOLERANCE_S: f64 = 0.05;
-/// The reference has six decimals of E(0) and of the certificate.
+/// E(0) and the certificate of the reference have six decimals.
 const START_TOLERANCE: f64 = 1e-6;
-/// The error e of a second-order method measured at two steps gives an order of 2 up to terms of the order of dt.
+/// Measured order of a second-order method from two steps: 2 up to terms of the order of dt.
 const ORDER: std::ops::RangeInclusive<f64> = 1.9..=2.1;
 
 /// Position of vehicle 1 at t = 10 s in the pentagon \[m\].
 const PENTAGON_FIRST_AT_10_S_M: [f64; 3] = [4.318_055_1, -1.043_487_6, 0.0];
 const PENTAGON_MIN_M: f64 = 2.460_353;
 const PENTAGON_MIN_AT_S: f64 = 2.151;
-/// The pentagon's start under the baseline.
+/// Minimum of the pentagon's start under the baseline.
 const BASELINE_MIN_M: f64 = 1.5327;
 const BASELINE_MIN_AT_S: f64 = 3.63;
 
@@ -44,7 +44,7 @@ fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance, "{what}: {found}, expected {expected} within {tolerance}");
 }
 
-/// What every flight that went well has in common.
+/// Checks the properties of every successful flight.
 fn assert_completed(scenario: &Scenario, flight: &Flight) {
     assert_eq!(flight.ending, Ending::Completed);
     assert_eq!(flight.steps, scenario.time.steps());
@@ -60,7 +60,7 @@ fn position_of_first_at(log: &Log, time_s: f64) -> Vector3<f64> {
 }
 
 #[test]
-fn the_pentagon_is_flown_clear_and_reached_as_the_reference_says() {
+fn the_pentagon_is_clear_and_reached_as_in_the_reference() {
     let scenario = builtin("pentagon", &[]);
     let (flight, log) = fly(&scenario);
     assert_completed(&scenario, &flight);
@@ -92,7 +92,7 @@ fn the_first_command_of_the_pentagon_is_the_reference_command() {
 }
 
 #[test]
-fn the_circle_is_flown_clear_and_reached_as_the_reference_says() {
+fn the_circle_is_clear_and_reached_as_in_the_reference() {
     let scenario = builtin("circle", &[]);
     let (flight, log) = fly(&scenario);
     assert_completed(&scenario, &flight);
@@ -121,23 +121,23 @@ fn the_baseline_reaches_the_pentagon_through_a_violation() {
     let deepest_m = flight.audit.violations.iter().map(|violation| violation.min_m).fold(f64::INFINITY, f64::min);
     assert_eq!(deepest_m, closest.separation_m);
     assert_eq!(flight.certificate.certified_m, None);
-    assert!(!flight.certificate.void.is_empty(), "a law without a barrier says why it promises nothing");
+    assert!(!flight.certificate.void.is_empty(), "a law without a barrier has a reason for its missing certificate");
     let seen_by_engine = |pair| flight.engine_contacts.contains(&pair);
     assert!(
         flight.audit.violations.iter().all(|violation| seen_by_engine(violation.pair)),
-        "the engine saw it as well"
+        "the engine reports it as well"
     );
-    assert!(summary(&scenario, &log).reached_at_s.is_some(), "it converges, and avoids nothing");
+    assert!(summary(&scenario, &log).reached_at_s.is_some(), "the baseline converges");
 }
 
 #[test]
-fn the_depth_of_the_baselines_violation_is_the_reference_depth_once_the_step_is_taken_out() {
+fn the_extrapolated_depth_of_the_baselines_violation_matches_the_reference() {
     let [coarse_m, fine_m] = [120, 240].map(|steps_per_s| {
         let flight = fly(&in_steps("pentagon-laplacian", steps_per_s, 5)).0;
         flight.audit.closest.expect("five vehicles have a closest pair").separation_m
     });
     assert!((coarse_m - BASELINE_MIN_M).abs() < 1e-3, "a step of 1/120 s is off by {}", coarse_m - BASELINE_MIN_M);
-    // The error with the square of the step cancels; the reference has four decimals.
+    // The error of second order in the step cancels; the reference has four decimals.
     assert_near((4.0 * fine_m - coarse_m) / 3.0, BASELINE_MIN_M, 1e-4, "smallest separation");
 }
 
@@ -161,7 +161,7 @@ fn a_start_on_a_line_stays_on_it_exactly_and_forms_nothing() {
     assert_eq!(scenario.formation().affine_dimension(1e-9), 2);
 }
 
-/// A built-in scenario for so many seconds in steps of 1/`steps_per_s` long.
+/// Returns a built-in scenario with a duration and steps of 1/`steps_per_s`.
 fn in_steps(name: &str, steps_per_s: u32, duration_s: u32) -> Scenario {
     let mut scenario = builtin(name, &[]);
     scenario.time.dt_s = 1.0 / f64::from(steps_per_s);
@@ -169,7 +169,7 @@ fn in_steps(name: &str, steps_per_s: u32, duration_s: u32) -> Scenario {
     scenario
 }
 
-/// How far vehicle 1 is from the reference at t = 10 s with steps of 1/`steps_per_s` \[m\].
+/// Returns the distance of vehicle 1 from the reference at t = 10 s with steps of 1/`steps_per_s` \[m\].
 fn error_at_10_s(steps_per_s: u32) -> f64 {
     let scenario = in_steps("pentagon", steps_per_s, 10);
     let (flight, log) = fly(&scenario);

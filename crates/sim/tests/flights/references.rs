@@ -1,4 +1,4 @@
-//! References that cannot be followed are refused: files, and laws that follow no reference.
+//! References that cannot be followed are refused: invalid files, and laws without references.
 
 use std::fs;
 
@@ -18,7 +18,7 @@ duration_s = 3.0
 [reference]
 "#;
 
-/// Reads the scenario with this reference under this law, beside a file of places.
+/// Reads the scenario with a reference and a law, next to a file of points.
 fn read(reference: &str, places: &str, law: &str) -> Result<Scenario, ScenarioError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("carried.toml");
@@ -29,7 +29,7 @@ fn read(reference: &str, places: &str, law: &str) -> Result<Scenario, ScenarioEr
 }
 
 #[test]
-fn a_file_that_is_no_reference_is_refused_in_its_line() {
+fn a_wrong_reference_file_is_refused_at_its_line() {
     let (file, reference) = ("scenario/file", "scenario/reference");
     for (places, code, line) in [
         ("t,x,z\n0,0,0\n3,1,1\n", file, "path.csv:1:"),
@@ -53,7 +53,7 @@ fn a_file_that_is_no_reference_is_refused_in_its_line() {
 }
 
 #[test]
-fn a_law_that_follows_no_such_reference_is_refused() {
+fn a_reference_that_the_law_cannot_follow_is_refused() {
     let rest = "kind = \"rest\"\n";
     for (law, keys) in [
         ("edge-tension", ""),
@@ -62,14 +62,14 @@ fn a_law_that_follows_no_such_reference_is_refused() {
         ("orca", "leader = 2\n"),
         ("cbf-qp", "known_by = [1, 2]\n"),
         ("flocking", "known_by = [3]\n"),
-        ("orca", "[breathing]\nmode = \"start\"\n"),
+        ("orca", "[deadlock]\nmode = \"start\"\n"),
     ] {
         let error = read(&format!("{rest}{keys}"), "", law).expect_err(law);
         assert_eq!(error.code(), "scenario/unsupported-by-law", "{law}: {error}");
         assert!(error.help().is_some() && error.place().is_some(), "{law}: {error}");
     }
     for law in ["orca", "cbf-qp", "flocking"] {
-        for known in ["", "known_by = \"all\"\n", "known_by = [1, 2, 3]\n[breathing]\nmode = \"auto\"\n"] {
+        for known in ["", "known_by = \"all\"\n", "known_by = [1, 2, 3]\n[deadlock]\nmode = \"auto\"\n"] {
             assert!(read(&format!("{rest}{known}"), "", law).is_ok(), "{law} {known}");
         }
     }

@@ -1,4 +1,4 @@
-//! Ellipsoids in the place of balls: what is kept empty around a vehicle reaches farther up and down than aside.
+//! Ellipsoids instead of balls: the empty space around a vehicle extends farther vertically than horizontally.
 
 use tautline_audit::{Auditor, Status};
 use tautline_core::swarm::{Rows, Swarm};
@@ -8,7 +8,7 @@ use tautline_sim::scenario::{Override, Safety, Scenario, ScenarioError, Source};
 
 use crate::flight::{Log, fly, read};
 
-/// Two vehicles that change sides, the second 0.5 m above the first.
+/// Returns two vehicles that swap sides, the second 0.5 m above the first.
 fn above_each_other(safety: &str) -> Scenario {
     read(&format!(
         "[start]\npositions_m = [[-2.0, 0.1, 0.0], [2.0, 0.0, 0.5]]\n\
@@ -17,7 +17,7 @@ fn above_each_other(safety: &str) -> Scenario {
     ))
 }
 
-/// The status of the flight by a judge of ellipsoids so much higher than wide.
+/// Returns the status of a flight audited with ellipsoids of a ratio of height to width.
 fn judged(log: &Log, width_m: f64, ratio: f64) -> Status {
     let metric = Metric::of_ratio(ratio);
     let mut auditor = Auditor::new(2, width_m).expect("a judge");
@@ -30,7 +30,7 @@ fn judged(log: &Log, width_m: f64, ratio: f64) -> Status {
 }
 
 #[test]
-fn two_that_may_pass_above_each_other_as_balls_go_around_as_ellipsoids() {
+fn vehicles_that_pass_above_each_other_as_balls_go_around_as_ellipsoids() {
     let ellipsoid = "delta_m = 0.4\n[safety]\nshape = \"ellipsoid\"\nhalf_axes_m = [0.2, 0.2, 0.6]";
     let (balls, ellipsoids) = (fly(&above_each_other("delta_m = 0.4")), fly(&above_each_other(ellipsoid)));
     assert_eq!((balls.0.audit.status, ellipsoids.0.audit.status), (Status::Clear, Status::Clear));
@@ -46,15 +46,15 @@ fn two_that_may_pass_above_each_other_as_balls_go_around_as_ellipsoids() {
     assert!((apart[0] - 0.7).abs() < 0.05 && (apart[2] + 0.5).abs() < 0.05, "on the other side: {apart}");
 }
 
-/// A hundred flights from random starts to random slots over ellipsoids of many shapes: no pair ever nearer than certified in
-/// scaled lengths, and the energy never above its start.
+/// A hundred flights from random starts to random slots over ellipsoids of many shapes: scaled separations keep the
+/// certificate, and the energy never exceeds its initial value.
 #[test]
-fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
+fn a_hundred_random_flights_keep_the_scaled_certificate() {
     let mut unlike = 0;
     for flight in 0..100 {
         let random = |k: usize| ((flight * 7919 + k * 104_729 + 31) % 4099) as f64 / 4099.0;
         let ratio = [3.0, 2.0, 0.5, 5.0][flight % 4];
-        // Points of a lattice in scaled lengths, 1.5 apart and each off by less than 0.2.
+        // Points of a lattice in scaled lengths, 1.5 apart, each moved by less than 0.2.
         let cloud = |seed: usize| {
             let place = |i: usize, axis: usize| 1.5 * [i % 2, (i / 2) % 2, i / 4][axis] as f64;
             let off = |i: usize, axis: usize| 0.4 * (random(seed + 3 * i + axis) - 0.5);
@@ -70,7 +70,7 @@ fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
             ..five_seconds(start, slots)
         };
         scenario.hull_radius_m.fill(0.1);
-        scenario.validate().expect("a scenario that can be flown");
+        scenario.validate().expect("a valid scenario");
         let (flight, log) = fly(&scenario);
         let certified_m = flight.certificate.certified_m.expect("a promise");
         let closest_m = flight.audit.closest.expect("a closest approach").separation_m;
@@ -82,7 +82,7 @@ fn a_hundred_random_flights_keep_what_is_certified_of_scaled_lengths() {
         let nearest_m = log.samples.iter().filter_map(in_metres).fold(f64::INFINITY, f64::min);
         unlike += u32::from((nearest_m - closest_m).abs() > 0.1);
     }
-    assert!(unlike > 20, "scaled lengths were those in metres in all but {unlike} flights");
+    assert!(unlike > 20, "scaled and metric separations differ in only {unlike} flights");
 }
 
 fn five_seconds(start: Swarm, slots: Rows) -> Scenario {
@@ -104,7 +104,7 @@ fn an_ellipsoid_is_written_back_and_its_width_is_delta() {
 }
 
 #[test]
-fn what_is_no_ellipsoid_or_cannot_be_kept_is_refused_with_its_remedy() {
+fn wrong_ellipsoids_are_refused_with_a_remedy() {
     let wrong = |sets: &[&str]| -> ScenarioError {
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
         let refused: Result<Scenario, ScenarioError> =

@@ -1,4 +1,4 @@
-//! No bytes, no change of a scenario file and no override make its reader panic.
+//! Neither arbitrary bytes, nor changes of a scenario file, nor overrides make the reader panic.
 
 use proptest::prelude::*;
 use tautline_sim::scenario::{Override, builtin};
@@ -18,7 +18,10 @@ proptest! {
     #[test]
     fn no_change_of_a_built_in_makes_the_reader_panic(
         which in 0..4_usize,
-        edits in prop::collection::vec((any::<prop::sample::Index>(), 0..9_usize, "[-\\[\\]{}=.,\"0-9a-z\n]{0,6}"), 1..6),
+        edits in prop::collection::vec(
+            (any::<prop::sample::Index>(), 0..9_usize, "[-\\[\\]{}=.,\"0-9a-z\n]{0,6}"),
+            1..6
+        ),
     ) {
         let mut text: Vec<char> = builtin::all()[which].toml.chars().collect();
         for (at, cut, insert) in edits {

@@ -1,4 +1,4 @@
-//! What a scenario file may say, what it must not, and where its errors point.
+//! Reading of scenario files: valid texts, invalid texts, and the places of their errors.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use tautline_core::swarm::{Rows, Swarm, separation};
 use tautline_laws::formation::Formation;
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, ScenarioError, Source, Space, builtin};
 
-/// A minimal flight that is right: what the wrong ones below are changed from.
+/// A minimal valid scenario, from which the invalid ones are derived.
 pub(crate) const RIGHT: &str = r#"name = "pair"
 [start]
 positions_m = [
@@ -23,7 +23,7 @@ delta_m = 2.0
 duration_s = 1.0
 "#;
 
-/// Bits of the first coordinate that seed 1 gives for a half extent of 8 m.
+/// Bits of the first coordinate for seed 1 and a half extent of 8 m.
 const GOLDEN_RANDOM_X: u64 = 13_833_077_504_487_939_064;
 
 pub(crate) fn read(text: &str) -> Result<Scenario, ScenarioError> {
@@ -35,14 +35,14 @@ pub(crate) fn read_builtin(name: &str, sets: &[&str]) -> Result<Scenario, Scenar
     Scenario::read(&Source::Builtin(name.to_owned()), &overrides)
 }
 
-/// Line and column at which an error stands; 0:0 without a place.
+/// Returns line and column of an error; 0:0 without a place.
 fn place(error: &ScenarioError) -> (usize, usize) {
     error.place().map_or((0, 0), |place| (place.line, place.column))
 }
 
 #[test]
-fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
-    // Text of RIGHT to replace, its replacement, the code of the error, line and column.
+fn wrong_input_is_refused_at_its_place_with_a_remedy() {
+    // Text of RIGHT, its replacement, the code of the error, line and column.
     let cases: &[(&str, &str, &str, (usize, usize))] = &[
         ("[time]", "[time", "scenario/syntax", (13, 6)),
         ("name", "naem = 1\nname", "scenario/unknown-key", (1, 1)),
@@ -108,7 +108,7 @@ fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
         ("\"pair\"", "\"a/../b\"", "scenario/name", (1, 8)),
         ("\"pair\"", "\"\"", "scenario/name", (1, 8)),
     ];
-    read(RIGHT).expect("the text that the cases change is right");
+    read(RIGHT).expect("the base text is valid");
     for &(from, to, code, at) in cases {
         assert!(RIGHT.contains(from), "{from}");
         let text = RIGHT.replacen(from, to, 1);
@@ -121,7 +121,7 @@ fn every_wrong_input_is_refused_at_its_place_with_a_remedy() {
 }
 
 #[test]
-fn the_number_of_vehicles_must_come_from_somewhere() {
+fn the_number_of_vehicles_is_required() {
     let text = RIGHT.replace("positions_m = [\n    [0.0, 0.0],\n    [4.0, 0.0],\n]", "shape = \"line\"\nspacing_m = 3");
     let error = read(&text).expect_err("no number is given");
     assert_eq!(error.code(), "scenario/missing-key", "{error}");
@@ -130,7 +130,7 @@ fn the_number_of_vehicles_must_come_from_somewhere() {
 }
 
 #[test]
-fn a_million_vehicles_on_the_complete_graph_are_refused_with_the_memory_they_would_take() {
+fn a_million_vehicles_on_the_complete_graph_are_refused_with_their_memory() {
     let text = format!(
         "{}[swarm]\ncount = 1000000\n",
         RIGHT.replace("positions_m = [\n    [0.0, 0.0],\n    [4.0, 0.0],\n]", "shape = \"line\"\nspacing_m = 3")
@@ -143,7 +143,7 @@ fn a_million_vehicles_on_the_complete_graph_are_refused_with_the_memory_they_wou
 }
 
 #[test]
-fn an_empty_file_is_said_to_be_empty() {
+fn an_empty_file_is_reported_as_empty() {
     for text in ["", "\n\n", "# nothing but a comment\n"] {
         let error = read(text).expect_err("nothing to fly");
         assert_eq!(error.code(), "scenario/empty", "{error}");
@@ -151,7 +151,7 @@ fn an_empty_file_is_said_to_be_empty() {
 }
 
 #[test]
-fn a_file_that_cannot_be_a_scenario_is_refused_before_it_is_understood() {
+fn directories_and_large_files_are_refused_before_parsing() {
     let folder = tempfile::tempdir().expect("a folder for the files");
     let error = |path: &std::path::Path| Scenario::read(&Source::File(path.to_owned()), &[]).expect_err("refused");
 
@@ -177,7 +177,7 @@ fn a_file_that_cannot_be_a_scenario_is_refused_before_it_is_understood() {
 }
 
 #[test]
-fn an_unknown_name_is_answered_with_the_names_that_are_known() {
+fn an_unknown_name_is_refused_with_the_known_names() {
     let error = Source::resolve("pentagn").expect_err("no such built-in");
     let help = error.help().unwrap_or_default();
     assert!(help.contains("did you mean `pentagon`?"), "{error}");
@@ -187,7 +187,7 @@ fn an_unknown_name_is_answered_with_the_names_that_are_known() {
 }
 
 #[test]
-fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
+fn an_override_sets_existing_and_missing_keys() {
     let set = |sets: &[&str]| read_builtin("pentagon", sets).expect("right overrides");
     let says = |sets: &[&str], line: &str| set(sets).resolved_toml().lines().any(|written| written.trim() == line);
     assert!(says(&["law.delta_m=1.5"], "delta_m = 1.5"));
@@ -204,7 +204,7 @@ fn an_override_sets_any_key_and_makes_those_that_are_not_there() {
 }
 
 #[test]
-fn another_kind_leaves_the_keys_of_the_one_before_and_nothing_else() {
+fn another_kind_drops_only_the_keys_of_the_previous_kind() {
     let law = |sets: &[&str]| read_builtin("pentagon", sets).map(|scenario| scenario.law);
     let laplacian = law(&["law={kind=\"laplacian\", delta_m=2}"]).expect("a law");
     assert_eq!(law(&["law.kind=laplacian"]), Ok(laplacian), "the pentagon's file gives law.alpha");
@@ -230,7 +230,7 @@ fn another_kind_leaves_the_keys_of_the_one_before_and_nothing_else() {
 }
 
 #[test]
-fn what_is_not_given_has_its_default() {
+fn missing_keys_have_their_defaults() {
     let named = |name: &str, text: &str| {
         Scenario::read(&Source::Text { name: name.to_owned(), text: text.to_owned() }, &[]).expect("right")
     };
@@ -257,7 +257,7 @@ fn a_scenario_has_no_choice_of_precision() {
 }
 
 #[test]
-fn an_error_that_an_override_causes_stands_in_the_override() {
+fn an_error_caused_by_an_override_is_placed_in_the_override() {
     let cases: &[(&str, &str, usize)] = &[
         ("law={kind=\"laplacian\", delta_m=2, alpha=1}", "scenario/unknown-key", 35),
         ("formation.side_m=2", "scenario/within-delta", 18),
@@ -291,19 +291,19 @@ fn an_error_that_an_override_causes_stands_in_the_override() {
     let left = read_builtin("pentagon", &["formation.side_m=5", "formation.shape=circle", "formation.radius_m=4"]);
     let left = left.expect_err("a circle has no side");
     assert!(left.place().is_some_and(|place| place.text == "formation.side_m=5"), "{left}");
-    // One of two keys is in the file.
+    // The file gives one of the two keys.
     let short = read(&RIGHT.replace("duration_s = 1.0", "duration_s = 0.5")).expect_err("shorter than the hold");
     assert_eq!((short.code(), place(&short)), ("scenario/outside-flight", (14, 14)), "{short}");
 }
 
 #[test]
-fn an_error_of_the_file_stays_in_the_file_whatever_is_overridden() {
+fn an_error_of_the_file_is_placed_in_the_file_with_any_override() {
     let source = Source::Text { name: "f".to_owned(), text: RIGHT.replace("spacing_m = 3.0", "spacing_m = 1.0") };
     let overrides = [Override::parse("time.dt_s=0.1").expect("an override")];
     let error = Scenario::read(&source, &overrides).expect_err("slots within delta");
     assert_eq!(error.place().map(|place| (place.source.as_str(), place.line)), Some(("f", 9)));
     let overrides = [Override::parse("formation.spacing_m=3").expect("an override")];
-    assert!(Scenario::read(&source, &overrides).is_ok(), "an override heals the file");
+    assert!(Scenario::read(&source, &overrides).is_ok(), "an override corrects the file");
 }
 
 #[test]
@@ -339,13 +339,13 @@ fn the_hash_changes_with_the_last_bit_of_a_start_position() {
 }
 
 #[test]
-fn random_starts_are_the_same_on_every_machine_and_keep_their_distance() {
+fn random_starts_are_the_same_on_every_machine_and_keep_their_separation() {
     let random = |seed: u64, dimensions: u8| {
         let start = format!("start={{shape=\"random\", half_extent_m=8, min_separation_m=2.5, seed={seed}}}");
         read_builtin("pentagon", &[&start, &format!("swarm.dimensions={dimensions}")]).expect("room enough")
     };
     let plane = random(1, 2);
-    // Fixes the generator and the arithmetic that makes positions of its words.
+    // Fixes the generator and the conversion of its words into positions.
     assert_eq!(plane.start.positions_m[(0, 0)].to_bits(), GOLDEN_RANDOM_X);
     assert_eq!(plane, random(1, 2));
     assert_ne!(plane, random(2, 2));
@@ -375,7 +375,7 @@ fn jitter_stays_in_the_plane_and_within_its_bound() {
 }
 
 #[test]
-fn the_dimension_follows_from_what_leaves_the_plane() {
+fn the_dimension_follows_from_vectors_outside_the_plane() {
     let space = |sets: &[&str]| read_builtin("pentagon", sets).expect("right").space;
     assert_eq!(space(&[]), Space::Plane);
     assert_eq!(space(&["swarm.dimensions=3"]), Space::Volume);
@@ -385,7 +385,7 @@ fn the_dimension_follows_from_what_leaves_the_plane() {
 }
 
 #[test]
-fn a_scenario_built_in_code_is_the_one_that_a_file_gives() {
+fn a_scenario_built_in_code_equals_that_of_a_file() {
     let file = read(RIGHT).expect("right");
     let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 4.0, 0.0, 0.0]));
     let code = Scenario::new("pair", start, Formation::line(2, 3.0), 2.0, 1.0);
@@ -399,7 +399,7 @@ fn a_scenario_built_in_code_is_the_one_that_a_file_gives() {
 }
 
 #[test]
-fn a_scenario_broken_in_code_is_refused_and_never_panics() {
+fn an_invalid_scenario_built_in_code_is_refused_without_panic() {
     let right = read_builtin("circle", &[]).expect("a built-in");
     let breaks: &[fn(&mut Scenario)] = &[
         |s| s.start.velocities_m_s = Rows::zeros(0),
@@ -417,7 +417,7 @@ fn a_scenario_broken_in_code_is_refused_and_never_panics() {
         let mut scenario = right.clone();
         break_it(&mut scenario);
         assert!(scenario.validate().is_err(), "break {number}");
-        // Still text, and still no panic.
+        // The text must not make the reader panic either.
         let _ = read(&scenario.resolved_toml());
     }
 }

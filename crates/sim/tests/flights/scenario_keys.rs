@@ -1,4 +1,4 @@
-//! Keys that may be left out, and graphs from their keys.
+//! Optional keys and their defaults, and graphs from their keys.
 
 use tautline_laws::graph::Graph;
 use tautline_sim::preflight::{Code, Preflight};
@@ -28,7 +28,7 @@ start_s = "reached"
 kind = "way-points"
 points_m = [[0, 0], [5, 0]]
 times_s = [0, 10]
-[breathing]
+[deadlock]
 mode = "start"
 hold_s = 3
 [time]
@@ -36,12 +36,12 @@ duration_s = 60.0
 "#;
 
 fn refusal(text: &str) -> ScenarioError {
-    read(text).expect_err("it is wrong")
+    read(text).expect_err("an invalid scenario")
 }
 
 #[test]
-fn a_key_has_one_name_and_a_wrong_one_is_refused_at_its_place() {
-    read(MISSION).expect("it is right");
+fn a_wrong_key_is_refused_at_its_place() {
+    read(MISSION).expect("a valid scenario");
     for (name, other, code, at) in [
         ("move_m = [0, 5]", "offset_m = [0, 5]", "scenario/unknown-key", (15, 1)),
         ("\"circle\"", "\"ring\"", "scenario/unknown-choice", (5, 9)),
@@ -57,7 +57,7 @@ fn a_key_has_one_name_and_a_wrong_one_is_refused_at_its_place() {
 }
 
 #[test]
-fn spread_slots_are_not_held_to_the_end_of_the_flight() {
+fn slots_must_not_be_spread_to_the_end_of_the_flight() {
     let held = refusal(&MISSION.replace("hold_s = 3", "hold_s = 60"));
     assert_eq!(held.code(), "scenario/outside-flight", "{held}");
     assert!(read(&MISSION.replace("hold_s = 3", "hold_s = 59.9")).is_ok());
@@ -75,7 +75,7 @@ fn a_reference_without_a_kind_is_at_rest() {
 }
 
 #[test]
-fn a_star_has_the_hub_that_it_is_given() {
+fn a_star_has_the_given_hub() {
     let graph = |sets: &[&str]| read_builtin("pentagon", sets).map(|scenario| scenario.graph);
     assert_eq!(graph(&["graph.kind=star"]).expect("right"), Graph::star(5));
     let third = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
@@ -89,7 +89,7 @@ fn a_star_has_the_hub_that_it_is_given() {
 }
 
 #[test]
-fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for() {
+fn a_random_graph_is_connected_and_has_the_given_degree_and_seed() {
     let graph = |keys: &str| {
         let set = format!("graph={{kind=\"random\"{keys}}}");
         read_builtin("thousand", &["law.kind=displacement", &set]).map(|scenario| scenario.graph)
@@ -109,10 +109,11 @@ fn a_random_graph_is_connected_drawn_from_its_seed_and_as_dense_as_is_asked_for(
 }
 
 #[test]
-fn a_step_that_nobody_gives_is_as_short_as_the_links_ask_for_and_one_that_is_given_stays() {
+fn only_the_default_step_is_shortened_for_the_links() {
     let ring = |more: &str| {
         read(&format!(
-            "[swarm]\ncount = 3000\n[start]\nshape = \"grid\"\nspacing_m = 2\n[formation]\nshape = \"grid\"\nspacing_m = 1.6\n\
+            "[swarm]\ncount = 3000\n[start]\nshape = \"grid\"\nspacing_m = 2\n[formation]\nshape = \"grid\"\n\
+             spacing_m = 1.6\n\
              [law]\nkind = \"displacement\"\ndelta_m = 1\n[graph]\nkind = \"ring\"\n[time]\nduration_s = 1\n{more}"
         ))
         .expect("a scenario")
@@ -123,16 +124,17 @@ fn a_step_that_nobody_gives_is_as_short_as_the_links_ask_for_and_one_that_is_giv
     let halvings = (1.0 / 240.0 / chosen.time.dt_s).log2();
     assert!(halvings >= 1.0 && halvings.fract() == 0.0, "{halvings}");
     assert_eq!(ring("dt_s = 0.004").time.dt_s, 0.004);
-    assert!(ring("max_halvings = 20").time.dt_s == 1.0 / 240.0, "its parts are short enough");
+    assert!(ring("max_halvings = 20").time.dt_s == 1.0 / 240.0, "its substeps are short enough");
     assert!(ring("max_halvings = 0\n").time.dt_s <= needed_s);
-    assert_eq!(ring("control_hz = 25").time.dt_s, 1.0 / 240.0, "the law is not asked more often");
+    assert_eq!(ring("control_hz = 25").time.dt_s, 1.0 / 240.0, "the law is not evaluated more often");
 }
 
 #[test]
-fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
+fn a_step_that_cannot_be_short_enough_is_kept_and_refused() {
     let stiff = |more: &str, zeta_per_s: f64| {
         read(&format!(
-            "[swarm]\ncount = 5\n[start]\nshape = \"circle\"\nradius_m = 5\n[formation]\nshape = \"circle\"\nradius_m = 3\n\
+            "[swarm]\ncount = 5\n[start]\nshape = \"circle\"\nradius_m = 5\n[formation]\nshape = \"circle\"\n\
+             radius_m = 3\n\
              [law]\nkind = \"displacement\"\ndelta_m = 1\nk_per_s2 = 1e3\nzeta_per_s = {zeta_per_s}\n[time]\n{more}"
         ))
         .expect("a scenario")
@@ -141,20 +143,20 @@ fn a_step_that_no_flight_can_make_short_enough_stays_and_is_refused() {
         Preflight::of(scenario).expect("a law").warnings.iter().any(|warning| warning.code == Code::StepTooLong)
     };
     let short = stiff("duration_s = 100", 1e6);
-    assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "parts that a flight can have");
+    assert!(short.time.dt_s < 1.0 / 240.0 && !refused(&short), "substeps within the limit");
     let (many, crazyflie) =
         (stiff("duration_s = 100", 1e9), stiff("duration_s = 100\n[vehicle]\nmodel = \"crazyflie\"", 1e6));
-    assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 parts of steps");
-    // A step of 5e-7 s would be enough; halving comes to 2.5e-7 s.
+    assert!(many.time.dt_s == 1.0 / 240.0 && refused(&many), "5e9 substeps");
+    // A step of 5e-7 s suffices; halving gives 2.5e-7 s.
     for (duration_s, is_chosen) in [(200, true), (400, false), (499, false), (600, false)] {
         let whole = stiff(&format!("max_halvings = 0\nduration_s = {duration_s}"), 1e6);
         assert_eq!((whole.time.dt_s < 5e-7, refused(&whole)), (is_chosen, !is_chosen), "{duration_s}");
     }
-    assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "asked 100 times a second");
+    assert!(crazyflie.time.dt_s == 1.0 / 500.0 && refused(&crazyflie), "evaluated 100 times a second");
 }
 
 #[test]
-fn a_limit_that_is_none_is_refused_where_the_step_is_chosen_by_it() {
+fn an_invalid_limit_is_refused_where_it_chooses_the_step() {
     for none in ["-1", "0", "nan"] {
         let error = read(&format!(
             "[start]\npositions_m = [[0, 0], [4, 3]]\n[formation]\nshape = \"line\"\nspacing_m = 3\n\
@@ -166,7 +168,7 @@ fn a_limit_that_is_none_is_refused_where_the_step_is_chosen_by_it() {
 }
 
 #[test]
-fn a_flight_that_is_shorter_than_the_hold_is_told_of_where_it_was_made_so() {
+fn a_flight_shorter_than_hold_s_is_refused_at_the_override() {
     let sets = [Override::parse("time.duration_s=0.5").expect("an override")];
     let error = Scenario::read(&Source::Builtin("thousand".to_owned()), &sets).expect_err("too short");
     assert_eq!(error.code(), "scenario/outside-flight", "{error}");
@@ -174,10 +176,11 @@ fn a_flight_that_is_shorter_than_the_hold_is_told_of_where_it_was_made_so() {
 }
 
 #[test]
-fn around_a_leader_who_keeps_its_slot_the_ways_of_the_others_are_least() {
+fn an_assignment_around_a_leader_is_optimal_and_keeps_its_slot() {
     let (starts, slots) = ([[-5.0, 4.0], [-2.0, -2.0], [-3.0, 0.0]], [[5.0, 2.0], [-6.0, -3.0], [2.0, 1.0]]);
     let scenario = read(&format!(
-        "[start]\npositions_m = {starts:?}\n[formation]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = {slots:?}\n\
+        "[start]\npositions_m = {starts:?}\n[formation]\nshape = \"points\"\nassignment = \"optimal\"\n\
+         points_m = {slots:?}\n\
          [law]\nkind = \"displacement\"\ndelta_m = 1.0\n[reference]\nleader = 3\n[time]\nduration_s = 2\n\
          [[leg]]\nshape = \"points\"\nassignment = \"optimal\"\npoints_m = [[9, 0], [0, 9], [0, 0]]\nstart_s = 1\n"
     ))

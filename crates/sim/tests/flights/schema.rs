@@ -1,4 +1,4 @@
-//! The schema of the scenario file says what its reader does.
+//! The schema of the scenario file agrees with its reader.
 
 use tautline_sim::scenario::{self, Override, Scenario, Source};
 
@@ -23,7 +23,7 @@ fn the_schema_describes_every_key_and_refuses_null() {
     assert!(schema["$defs"].as_object().is_some_and(|defs| defs.values().all(|def| described(&def["properties"]))));
 }
 
-/// Every bound of the schema is one that the reader keeps, by the one walk over both.
+/// The reader checks every bound of the schema.
 #[test]
 fn a_number_beyond_a_bound_of_the_schema_is_refused_at_its_key() {
     let bounded = [
@@ -38,7 +38,7 @@ fn a_number_beyond_a_bound_of_the_schema_is_refused_at_its_key() {
         ("swarm.dimensions", "4"),
         ("start.jitter_m", "-1"),
         ("formation.scale", "0"),
-        ("breathing.scale", "0.5"),
+        ("deadlock.scale", "0.5"),
         ("arrival.edge_error_m", "0"),
         ("network.loss", "1.5"),
         ("sensing.rate_hz", "0"),
@@ -66,7 +66,7 @@ fn a_number_beyond_a_bound_of_the_schema_is_refused_at_its_key() {
     assert_eq!(schema["$defs"]["PerVehicle"]["anyOf"][0]["exclusiveMinimum"], 0);
 }
 
-/// Whether every key of a table has a description.
+/// Returns whether every key of a table has a description.
 fn described(properties: &serde_json::Value) -> bool {
     properties.as_object().is_none_or(|keys| keys.values().all(|key| key["description"].is_string()))
 }

@@ -1,12 +1,11 @@
-//! Formations that have a shape of their own: their slots, where their files are looked for, and what is refused of
-//! them.
+//! Shapes of formations: their slots, the location of their files, and their errors.
 
 use std::fs;
 use std::path::Path;
 
 use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Space};
 
-/// Fifty vehicles on a grid; the formation is a line below its heading.
+/// Fifty vehicles on a grid; the keys of the formation follow.
 const FRAME: &str = r#"name = "shape"
 [start]
 shape = "grid"
@@ -23,7 +22,7 @@ count = 50
 /// Line of the first key of the formation.
 const LINE: usize = 13;
 
-const KEEPS_WHAT_IT_ASKS: f64 = 1e-9;
+const SPACING_ROUNDING: f64 = 1e-9;
 
 fn read(formation: &str) -> Result<Scenario, ScenarioError> {
     Scenario::read(&Source::Text { name: "test.toml".to_owned(), text: format!("{FRAME}{formation}") }, &[])
@@ -33,14 +32,14 @@ fn nearest_m(scenario: &Scenario) -> f64 {
     scenario.formation().min_distance().expect("slots").1
 }
 
-/// Height of the slots themselves.
+/// Returns the extent of the slots along an axis.
 fn extent_m(scenario: &Scenario, axis: usize) -> f64 {
     let along = scenario.formation().slots_m.column(axis).clone_owned();
     along.max() - along.min()
 }
 
 #[test]
-fn every_shape_keeps_the_spacing_that_is_asked_for_and_one_and_a_half_delta_unasked() {
+fn every_shape_has_the_given_spacing_or_one_and_a_half_delta() {
     let flat = [
         "\"v\"",
         "\"v\"\nangle_deg = 60",
@@ -61,7 +60,7 @@ fn every_shape_keeps_the_spacing_that_is_asked_for_and_one_and_a_half_delta_unas
             let scenario = read(&shape).expect(&shape);
             assert_eq!((scenario.count(), scenario.space), (50, space), "{shape}");
             let off = nearest_m(&scenario) / spacing_m - 1.0;
-            assert!(off.abs() < KEEPS_WHAT_IT_ASKS, "{shape}: {off:e}");
+            assert!(off.abs() < SPACING_ROUNDING, "{shape}: {off:e}");
             let resolved = scenario.resolved_toml();
             assert!(resolved.contains("shape = \"points\""), "{resolved}");
             let again = Scenario::read(&Source::Text { name: "again".to_owned(), text: resolved }, &[]);
@@ -69,12 +68,12 @@ fn every_shape_keeps_the_spacing_that_is_asked_for_and_one_and_a_half_delta_unas
         }
     }
     let turns = read("shape = \"helix\"\nradius_m = 30\npitch_m = 9\nturns = 3").expect("a helix");
-    assert!((extent_m(&turns, 2) - 27.0).abs() < KEEPS_WHAT_IT_ASKS);
+    assert!((extent_m(&turns, 2) - 27.0).abs() < SPACING_ROUNDING);
 }
 
 #[test]
-fn a_drawing_is_as_high_or_as_wide_as_asked() {
-    // Slots stand a little inside of what is drawn.
+fn a_drawing_has_the_given_height_or_width() {
+    // Slots lie slightly inside the drawing.
     for (asked, axis) in [("height_m = 80", 1), ("width_m = 80", 0)] {
         let scenario = read(&format!("shape = \"text\"\ntext = \"TAUT\"\n{asked}")).expect(asked);
         assert!((70.0..=80.0).contains(&extent_m(&scenario, axis)), "{}", extent_m(&scenario, axis));
@@ -84,7 +83,7 @@ fn a_drawing_is_as_high_or_as_wide_as_asked() {
 }
 
 #[test]
-fn the_least_height_that_a_refusal_names_is_enough_and_nothing_much_less_is() {
+fn the_least_height_of_a_refusal_is_sufficient_and_tight() {
     let of = |height_m: f64| read(&format!("shape = \"text\"\ntext = \"HELLO\"\nheight_m = {height_m}"));
     let error = of(3.0).expect_err("too small");
     assert!(error.message().starts_with("in a drawing 3 m high, 50 vehicles come as near as 0."), "{error}");
@@ -97,7 +96,7 @@ fn the_least_height_that_a_refusal_names_is_enough_and_nothing_much_less_is() {
 }
 
 #[test]
-fn files_are_looked_for_beside_the_scenario() {
+fn files_are_relative_to_the_scenario() {
     let folder = tempfile::tempdir().expect("a folder");
     let below = folder.path().join("below");
     fs::create_dir(&below).expect("a folder");
@@ -123,7 +122,7 @@ fn files_are_looked_for_beside_the_scenario() {
     );
     let set = read("shape = \"line\"\nspacing_m = 7", &["formation.shape=svg", "formation.file=\"ring.svg\""])
         .expect("a ring");
-    assert!((nearest_m(&set) - 7.0).abs() < KEEPS_WHAT_IT_ASKS);
+    assert!((nearest_m(&set) - 7.0).abs() < SPACING_ROUNDING);
     let elsewhere = read("shape = \"file\"\nfile = \"../points.csv\"", &[]).expect_err("it is below");
     assert!(elsewhere.code() == "scenario/file" && elsewhere.help().is_some(), "{elsewhere}");
     assert_eq!(elsewhere.place().map(|place| (place.line, place.column)), Some((LINE + 1, 8)));
@@ -169,7 +168,7 @@ fn a_file_of_points_may_name_its_columns_and_gives_the_number_of_vehicles() {
 }
 
 #[test]
-fn what_a_shape_cannot_be_is_refused_at_its_key() {
+fn a_wrong_shape_is_refused_at_its_key() {
     let missing = Path::new("no such").join("file.png");
     let image = format!("shape = \"image\"\nfile = '{}'", missing.display());
     for (formation, code, place) in [
@@ -204,12 +203,12 @@ fn what_a_shape_cannot_be_is_refused_at_its_key() {
 }
 
 #[test]
-fn the_pitch_that_a_refusal_names_is_enough() {
+fn the_pitch_of_a_refusal_is_sufficient() {
     let of = |pitch: &str| read(&format!("shape = \"helix\"\nradius_m = 9\npitch_m = {pitch}"));
     for flat in ["1", "1e-9", "2.5"] {
         let help = of(flat).expect_err("too flat").help().expect("a remedy").to_owned();
         let named = help.strip_prefix("enlarge formation.pitch_m to ").and_then(|rest| rest.split(',').next());
         let enough = of(named.expect(&help)).expect(&help);
-        assert!((nearest_m(&enough) - 3.0).abs() < KEEPS_WHAT_IT_ASKS, "{help}");
+        assert!((nearest_m(&enough) - 3.0).abs() < SPACING_ROUNDING, "{help}");
     }
 }

@@ -1,5 +1,4 @@
-//! A simulation is stepped, saved and loaded, takes commands from outside, goes from leg to leg, and knows the world
-//! through its link.
+//! Simulations: stepping, saving and loading, commands from outside, legs, and knowledge through the link.
 
 use std::ops::ControlFlow;
 
@@ -20,7 +19,7 @@ use tautline_sim::sim::{self, Ending, Parts, SimError, Simulation};
 
 use crate::flight::{Log, builtin, fly};
 
-/// Hands what is due to a hash.
+/// Passes a due sample to a hash.
 fn record(simulation: &mut Simulation, hash: &mut StateHash) {
     if let Some(sample) = simulation.sample() {
         hash.observe(&sample);
@@ -35,7 +34,7 @@ fn finish(simulation: &mut Simulation, hash: &mut StateHash) {
     }
 }
 
-/// Vehicles that hit each other's hulls on the way, so that the engine has contacts to remember.
+/// Returns vehicles whose hulls collide, so that the engine has contacts to remember.
 fn bouncing() -> Scenario {
     let mut scenario = builtin("pentagon-laplacian", &["time.duration_s=4", "time.record_hz=240", "law.delta_m=1.0"]);
     scenario.hull_radius_m.fill(0.48);
@@ -46,7 +45,7 @@ fn bouncing() -> Scenario {
 }
 
 #[test]
-fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_never_interrupted() {
+fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_same_hash() {
     let mut runner = proptest::test_runner::TestRunner::deterministic();
     let tension = builtin("pentagon", &["time.duration_s=4", "time.record_hz=240"]);
     let ideal = builtin("pentagon", &["time.duration_s=4", "plant.kind=ideal", "time.dt_s=0.05", "time.record_hz=20"]);
@@ -68,7 +67,7 @@ fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_
                 record(&mut whole.0, &mut whole.1);
             }
             let (saved, mut hash) = (whole.0.save(), whole.1.clone());
-            // Loaded into a simulation that has been elsewhere.
+            // Loads into a simulation in another state.
             (0..7).for_each(|_| other.step());
             other.load(&saved, None);
             finish(&mut other, &mut hash);
@@ -87,13 +86,13 @@ fn a_simulation_loaded_at_any_of_fifty_steps_ends_with_the_hash_of_one_that_was_
 }
 
 #[test]
-fn a_twin_that_was_pushed_for_one_step_ends_with_another_hash() {
+fn a_simulation_pushed_for_one_step_ends_with_another_hash() {
     let scenario = bouncing();
     let mut whole = Simulation::new(&scenario).expect("a simulation");
     let (mut hash, mut twin_hash) = (StateHash::new(), StateHash::new());
     (0..300).for_each(|_| whole.step());
     let mut twin = whole.clone();
-    // One vehicle pushed for one step by a hundredth of a m/s^2.
+    // One vehicle is pushed by 0.01 m/s^2 for one step.
     let mut commands = twin.control().clone();
     commands[(0, 0)] += 1e-2;
     twin.step_with(&commands).expect("finite commands");
@@ -104,7 +103,7 @@ fn a_twin_that_was_pushed_for_one_step_ends_with_another_hash() {
 }
 
 #[test]
-fn stepping_is_flying() {
+fn stepping_equals_flying() {
     let scenario = builtin("pentagon", &["time.duration_s=3"]);
     let mut flown = StateHash::new();
     let parts = Parts::of(&scenario).expect("the parts of a valid scenario");
@@ -119,11 +118,11 @@ fn stepping_is_flying() {
 }
 
 #[test]
-fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
+fn commands_from_outside_replace_those_of_the_law() {
     let scenario = builtin("pentagon", &["time.duration_s=3", "swarm.a22_per_s=0"]);
     let mut by_law = Simulation::new(&scenario).expect("a simulation");
     let mut by_hand = by_law.clone();
-    // What comes from outside is held over the step: the law's own commands, held so, are another flight.
+    // Commands from outside are held over the step, so the law's own commands then give another flight.
     let mut held = scenario.clone();
     held.time.control_hz = Some(240.0);
     let mut by_law_held = Simulation::new(&held).expect("a simulation");
@@ -139,7 +138,7 @@ fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
     let mut known = Simulation::new(&Scenario { start: by_law_held.state().clone(), ..scenario.clone() }).expect("one");
     known.step();
     let off_m = (&by_hand.state().positions_m - &known.state().positions_m).amax();
-    assert!(off_m < 1e-14, "the law takes over at the state that it finds: {off_m}");
+    assert!(off_m < 1e-14, "the law continues from the present state: {off_m}");
 
     let mut still = Simulation::new(&scenario).expect("a simulation");
     still.step_with(&Rows::zeros(5)).expect("finite commands");
@@ -147,10 +146,10 @@ fn commands_from_outside_are_flown_in_the_place_of_the_laws() {
     for wrong in [Rows::zeros(4), Rows::from_element(5, f64::NAN)] {
         assert!(matches!(still.step_with(&wrong), Err(SimError::Commands { expected: 5, .. })));
     }
-    assert_eq!(still.steps(), 1, "what is refused is not flown");
+    assert_eq!(still.steps(), 1, "a refused step is not flown");
 }
 
-/// The pentagon, and then a larger one.
+/// Returns a flight to the pentagon and then to a larger one.
 fn two_legs(begins: Begins) -> Scenario {
     let mut scenario = builtin("pentagon", &["time.duration_s=120", "swarm.a22_per_s=-0.1"]);
     scenario.legs.push(Leg { begins, ..Leg::first(Formation::pentagon(4.0)) });
@@ -158,7 +157,7 @@ fn two_legs(begins: Begins) -> Scenario {
 }
 
 #[test]
-fn a_flight_goes_from_leg_to_leg_by_time_or_when_the_leg_before_is_reached() {
+fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
     for (begins, expected_s) in [(Begins::At(50.0), 50.0..=50.0), (Begins::Reached, 20.0..=60.0)] {
         let scenario = two_legs(begins);
         let mut log = Log::default();
@@ -183,8 +182,8 @@ fn a_flight_goes_from_leg_to_leg_by_time_or_when_the_leg_before_is_reached() {
     assert_eq!(metrics.finish().reached_at_s, None, "a leg that has only begun is not reached");
 }
 
-/// Two vehicles under the baseline in continuous time, whose relative motion is the one mode g = 1 of
-/// s^2 - a22 s + g (f1 + f2 s) e^(-s tau) = 0; the largest distance from the goal over the last 20 s of 200 s.
+/// Returns the largest distance from the goal over the last 20 s of 200 s, for two vehicles under the baseline in
+/// continuous time. Their relative motion has the single mode g = 1 of s^2 - a22 s + g (f1 + f2 s) e^(-s tau) = 0.
 fn left_after(delay_s: f64) -> f64 {
     let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 3.01, 0.0, 0.0]));
     let mut scenario = Scenario::new("late", start, Formation::line(2, 3.0), 0.5, 200.0);
@@ -219,7 +218,7 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
         scenario.sensing.latency_s = 0.05;
         let (flight, log) = fly(&scenario);
         let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
-        assert!(flight.certificate.void.contains(&Void::KnownLate), "nothing is promised about late knowledge");
+        assert!(flight.certificate.void.contains(&Void::KnownLate), "late knowledge voids the certificate");
         (flight.last.positions_m, refused)
     };
     let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));
@@ -228,7 +227,7 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
     assert!((coarse - fine).amax() < 1e-9);
 }
 
-/// A hub, and two vehicles without a link that fly at each other.
+/// Returns a hub and two vehicles without a link that fly at each other.
 fn head_on() -> Scenario {
     let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 30.0, 0.0, -5.0, 0.0, 0.0, 5.0, 0.0, 0.0]));
     (start.velocities_m_s[(1, 0)], start.velocities_m_s[(2, 0)]) = (20.0, -20.0);
@@ -240,13 +239,13 @@ fn head_on() -> Scenario {
 }
 
 #[test]
-fn a_step_that_takes_too_much_from_a_pair_without_a_link_is_refused_where_the_law_senses_it() {
+fn a_step_is_refused_for_a_pair_without_a_link_if_the_law_senses_it() {
     let scenario = head_on();
     let (flight, log) = fly(&scenario);
     assert!(log.events.iter().any(|event| matches!(event, Event::StepRefined { .. })));
     let (closest, certified_m) = (flight.audit.closest.expect("pairs"), flight.certificate.certified_m);
-    assert!(closest.separation_m > certified_m.expect("a promise on a star"), "{closest:?} {certified_m:?}");
-    // Taken as they are, the same steps jump the barrier.
+    assert!(closest.separation_m > certified_m.expect("a certificate on a star"), "{closest:?} {certified_m:?}");
+    // Without halving, the same steps jump the barrier.
     let mut blind = scenario;
     blind.time.max_halvings = 0;
     blind.time.dt_s = 0.1;
@@ -254,7 +253,7 @@ fn a_step_that_takes_too_much_from_a_pair_without_a_link_is_refused_where_the_la
 }
 
 #[test]
-fn a_law_that_senses_is_solved_as_it_is_flown() {
+fn a_law_that_senses_has_the_same_flight_in_both_solvers() {
     let mut scenario = head_on();
     let mut law = scenario.law().expect("a law");
     let solved = continuous::solve(&scenario, law.as_mut(), &[5.0], Tolerances::default()).expect("a solution");
@@ -267,16 +266,16 @@ fn a_law_that_senses_is_solved_as_it_is_flown() {
 }
 
 #[test]
-fn commands_from_outside_are_flown_in_continuous_time_too_and_void_the_certificate() {
+fn commands_from_outside_void_the_certificate_in_continuous_time() {
     let scenario = builtin("pentagon", &["time.duration_s=3", "plant.kind=ideal", "swarm.a22_per_s=0"]);
     let mut still = Simulation::new(&scenario).expect("a simulation");
     (0..240).for_each(|_| still.step_with(&Rows::zeros(5)).expect("finite commands"));
-    assert_eq!(still.state(), &scenario.start, "nobody is accelerated");
+    assert_eq!(still.state(), &scenario.start, "no vehicle is accelerated");
     let certificate = still.finish().certificate;
     assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::CommandsFromOutside]));
 }
 
-/// Two that drift at each other, a thousandth of a metre before the barrier.
+/// Returns two vehicles that drift at each other, 1 mm before the barrier.
 fn at_the_barrier(speed_m_s: f64) -> Scenario {
     let mut start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 2.001, 0.0, 0.0]));
     start.velocities_m_s[(1, 0)] = -speed_m_s;
@@ -284,7 +283,7 @@ fn at_the_barrier(speed_m_s: f64) -> Scenario {
 }
 
 #[test]
-fn commands_from_outside_are_not_refined_for_a_law_that_is_not_asked() {
+fn steps_with_commands_from_outside_are_not_divided_for_the_law() {
     let scenario = at_the_barrier(0.0);
     let mut by_hand = Simulation::new(&scenario).expect("a simulation");
     let mut by_law = by_hand.clone();
@@ -294,11 +293,11 @@ fn commands_from_outside_are_not_refined_for_a_law_that_is_not_asked() {
     }
     let (by_hand, by_law) = (by_hand.finish(), by_law.finish());
     assert_eq!((by_hand.refined_steps, by_hand.audit.steps), (0, 100));
-    assert!(by_law.refined_steps > 0 && by_law.audit.steps > 100, "the law asks for shorter steps");
+    assert!(by_law.refined_steps > 0 && by_law.audit.steps > 100, "the law requires shorter steps");
 }
 
 #[test]
-fn commands_from_outside_are_judged_past_the_barrier_of_the_law_and_the_law_is_refined_for_again() {
+fn commands_from_outside_are_audited_past_the_barrier_of_the_law() {
     let mut by_hand = Simulation::new(&at_the_barrier(0.1)).expect("a simulation");
     (0..10).for_each(|_| by_hand.step_with(&Rows::zeros(2)).expect("finite commands"));
     let flight = by_hand.finish();
@@ -311,7 +310,7 @@ fn commands_from_outside_are_judged_past_the_barrier_of_the_law_and_the_law_is_r
 }
 
 #[test]
-fn a_certificate_for_one_leg_is_none_for_two_and_every_law_follows_its_target() {
+fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
     for law in [LawSpec::EdgeTension(EdgeTensionKeys::default()), LawSpec::Potential(PotentialKeys::default())] {
         let slots = Formation::pentagon(4.0);
         let mut scenario = Scenario::new("nearer", Swarm::at_rest(slots.slots_m.clone()), slots, 1.0, 60.0);
@@ -348,7 +347,7 @@ fn legs_that_cannot_be_flown_are_refused() {
     assert!(Simulation::new(&none).is_err());
 }
 
-/// Goes to a leg that the scenario does not have.
+/// Supervisor that begins a leg that the scenario does not have.
 #[derive(Clone)]
 struct Astray;
 
@@ -361,7 +360,7 @@ impl Supervisor for Astray {
 }
 
 #[test]
-fn a_leg_that_nobody_knows_is_never_reached() {
+fn a_leg_that_the_scenario_does_not_have_is_never_reached() {
     let scenario = builtin("pentagon", &["time.duration_s=60"]);
     let parts = Parts { supervisor: Box::new(Astray), ..Parts::of(&scenario).expect("parts") };
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
@@ -369,7 +368,7 @@ fn a_leg_that_nobody_knows_is_never_reached() {
     assert_eq!((metrics.finish().reached_at_s, metrics.ended_legs().len()), (None, 7));
 }
 
-/// What everybody knows, as a picture of its own for each.
+/// Imperfections that give each vehicle its own copy of the true state.
 #[derive(Clone)]
 struct Copied(Option<Held>);
 
@@ -386,7 +385,7 @@ impl Imperfections for Copied {
 }
 
 #[test]
-fn what_each_vehicle_holds_is_flown_like_what_all_share() {
+fn copies_of_the_true_state_give_the_same_flight() {
     let laws = [
         LawSpec::EdgeTension(EdgeTensionKeys::default()),
         LawSpec::Laplacian(LaplacianKeys::default()),
@@ -405,7 +404,7 @@ fn what_each_vehicle_holds_is_flown_like_what_all_share() {
     }
 }
 
-/// A sink that refuses.
+/// Sink that refuses every record.
 struct Full;
 
 impl Sink for Full {

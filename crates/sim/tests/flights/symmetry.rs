@@ -1,4 +1,4 @@
-//! Where a scenario lies, how it is turned and how its vehicles are numbered makes no difference.
+//! Rotations, translations and permutations of a scenario change no result.
 
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use tautline_sim::scenario::Scenario;
 
 use crate::flight::{builtin, fly};
 
-/// Where the vehicles of a scenario are after its flight.
+/// Returns the state after the flight of a scenario.
 fn end(scenario: &Scenario) -> Swarm {
     scenario.validate().unwrap_or_else(|error| panic!("{error}"));
     fly(scenario).0.last
@@ -54,7 +54,7 @@ proptest! {
 }
 
 #[test]
-fn a_start_that_is_another_one_is_not_taken_for_the_same() {
+fn a_different_start_gives_a_different_end() {
     let mut other = small_flight();
     other.start.positions_m[(0, 0)] += 1e-6;
     assert!((end(&other).positions_m - end(&small_flight()).positions_m).amax() > 1e-8);

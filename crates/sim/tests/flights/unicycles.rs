@@ -1,5 +1,5 @@
-//! Unicycles: a plant in one file, for vehicles that cannot stop. Their way is that of their equations, they keep to their
-//! limits, a saved flight goes on with the same bits, and the judge says what became of a law that was not made for them.
+//! Unicycles, which cannot stop: their motion solves their equations within their limits. Saved flights continue with
+//! the same bits, and the audit judges a law that is not made for them.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +15,7 @@ use tautline_sim::vehicle::Unicycle;
 
 use crate::flight::{fly, read};
 
-/// Five that fly along x, spread about the corners of a pentagon of side 3 m.
+/// Five unicycles that fly along x from near the corners of a pentagon with sides of 3 m.
 const FLIGHT: &str = r#"
 [vehicle]
 model = "unicycle"
@@ -36,7 +36,8 @@ fn one(velocity_m_s: [f64; 2]) -> Swarm {
     Swarm { positions_m: Rows::zeros(1), velocities_m_s: Rows::from_row_slice(&[x, y, 0.0]) }
 }
 
-/// Where one ends that is commanded u(t, v) over `steps` steps, and the largest bend of a step.
+/// Returns the end of a flight of one unicycle under commands u(t, v) over `steps` steps, and the largest bend of a
+/// step.
 fn flown(
     unicycle: Unicycle,
     start: &Swarm,
@@ -65,7 +66,7 @@ fn left(v: Vector3<f64>) -> Vector3<f64> {
 
 #[test]
 fn a_command_across_flies_a_circle_and_comes_back() {
-    // u = omega x v turns at omega whatever the step, and the chords end on the circle.
+    // u = omega x v turns at omega for any step, and the chords end on the circle.
     let (speed, omega) = (1.5, 0.8);
     let lap_s = TAU / omega;
     for steps in [8, 100] {
@@ -88,7 +89,7 @@ fn under_a_changing_command_the_error_falls_with_the_square_of_the_step() {
         let order = (pair[0] / pair[1]).log2();
         assert!((1.9..2.1).contains(&order), "{errors:?}");
     }
-    // Within their limits they carry out any acceleration, as points do: p'' = u.
+    // Within their limits unicycles execute any acceleration, as points do: p'' = u.
     let velocity =
         Vector3::new(1.0 + 0.4 / 1.3 * (1.3_f64 * 4.0).sin(), 0.3 + 0.4 / 0.7 * (1.0 - (0.7_f64 * 4.0).cos()), 0.0);
     let flown = row(&flown(Unicycle::default(), &one([1.0, 0.3]), (4.0, 4096), command).0.velocities_m_s, 0);
@@ -96,11 +97,11 @@ fn under_a_changing_command_the_error_falls_with_the_square_of_the_step() {
 }
 
 #[test]
-fn one_that_is_told_to_stop_flies_on_and_one_told_to_turn_back_flies_an_arc() {
+fn a_unicycle_cannot_stop_and_turns_back_on_an_arc() {
     let unicycle = Unicycle::default();
     let (end, _) = flown(unicycle, &one([1.0, 0.0]), (5.0, 500), |_, v| -v.normalize());
     assert!((row(&end.velocities_m_s, 0) - Vector3::new(unicycle.min_speed_m_s, 0.0, 0.0)).norm() < 1e-12);
-    // Dubins' vehicle: half a turn takes pi/omega, and is as wide as the circle of its speed.
+    // Dubins vehicle: half a turn takes pi/omega, and its width is the diameter of the circle.
     let dubins = Unicycle { min_speed_m_s: 1.0, max_speed_m_s: 1.0, ..unicycle };
     let (end, _) = flown(dubins, &one([1.0, 0.0]), (0.5 * PI, 1000), |_, v| 1e3 * left(v) - 7.0 * v);
     let aside = Vector3::new(0.0, 2.0 / dubins.max_turn_rad_s, 0.0);
@@ -109,7 +110,7 @@ fn one_that_is_told_to_stop_flies_on_and_one_told_to_turn_back_flies_an_arc() {
 }
 
 #[test]
-fn five_fly_on_in_a_pentagon_and_nothing_is_promised_of_them() {
+fn five_unicycles_fly_in_a_pentagon_without_a_certificate() {
     let scenario = read(FLIGHT);
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.ending.clone(), flight.audit.status), (Ending::Completed, Status::Clear));
@@ -123,12 +124,12 @@ fn five_fly_on_in_a_pentagon_and_nothing_is_promised_of_them() {
     }
     let slowest = log.samples.iter().flat_map(|sample| sample.channels[0].values.chunks(2).map(|of| of[1]));
     let slowest = slowest.fold(f64::INFINITY, f64::min);
-    assert!((0.2..1.0).contains(&slowest), "they slow down and never stop: {slowest} m/s");
+    assert!((0.2..1.0).contains(&slowest), "unicycles slow down but never stop: {slowest} m/s");
     assert!(last.mean_velocity_m_s().norm() > 0.5, "the formation flies on");
 }
 
 #[test]
-fn a_saved_flight_goes_on_with_the_same_bits_and_a_refused_step_leaves_no_trace() {
+fn a_saved_flight_continues_with_the_same_bits_and_a_refused_step_has_no_effect() {
     let scenario = read(&FLIGHT.replace("60.0", "4.0"));
     let mut simulation = Simulation::new(&scenario).expect("a flight");
     (0..300).for_each(|_| simulation.step());
@@ -153,7 +154,7 @@ fn a_saved_flight_goes_on_with_the_same_bits_and_a_refused_step_leaves_no_trace(
 }
 
 #[test]
-fn what_a_unicycle_cannot_fly_is_refused_with_its_place_and_remedy() {
+fn keys_that_unicycles_do_not_support_are_refused_with_a_remedy() {
     for (set, code) in [
         ("start.velocities_m_s.2.x=0", "scenario/out-of-range"),
         ("start.velocities_m_s.3.x=4", "scenario/out-of-range"),

@@ -1,4 +1,4 @@
-//! Points that are pushed by the air: how they drift, what a wind does to distances, and what is still certified.
+//! Points in wind: their drift, the effect of wind on separations, and certificates.
 
 use tautline_core::record::StateHash;
 use tautline_core::swarm::{Rows, Swarm, row, separation};
@@ -14,16 +14,17 @@ use crate::flight::{Log, builtin, fly, read};
 
 type Vector = nalgebra::Vector3<f64>;
 
-/// Five vehicles on their way to a line under the displacement law.
+/// Returns five vehicles on their way to a line under the displacement law.
 fn five(more: &str) -> Scenario {
     read(&format!(
-        "[swarm]\ndimensions = 3\n[start]\npositions_m = [[0.0, 0.1], [2.0, 0.0, 0.2], [4.0, -0.1], [6.0, 0.2], [8.0, 0.0]]\n\
+        "[swarm]\ndimensions = 3\n[start]\n\
+         positions_m = [[0.0, 0.1], [2.0, 0.0, 0.2], [4.0, -0.1], [6.0, 0.2], [8.0, 0.0]]\n\
          [formation]\nshape = \"circle\"\nradius_m = 2.0\n[law]\nkind = \"displacement\"\ndelta_m = 1.0\n\
          {more}"
     ))
 }
 
-/// Five vehicles near their slots, under the same law.
+/// Returns five vehicles near their slots, under the same law.
 fn settled(more: &str) -> Scenario {
     let start = Formation::circle(5, 2.05).slots_m;
     Scenario { start: Swarm::at_rest(start), ..five(more) }
@@ -33,7 +34,7 @@ fn gust(at_s: f64, velocity_m_s: Vector, vehicles: Option<Vec<usize>>) -> Gust {
     Gust { at_s, rise_s: 1.0, hold_s: 0.5, fall_s: Some(1.5), velocity_m_s, vehicles }
 }
 
-/// Distances of all pairs at all samples.
+/// Returns the distances of all pairs at all samples.
 fn distances(log: &Log) -> Vec<f64> {
     let pairs = |rows: &Rows| {
         let count = rows.nrows();
@@ -44,7 +45,7 @@ fn distances(log: &Log) -> Vec<f64> {
 
 /// v' = a22 v + d (W - v): from rest to d W/(d - a22), as 1 - exp(-(d - a22) t).
 #[test]
-fn a_point_drifts_as_fast_as_the_wind_less_what_else_brakes_it() {
+fn a_point_drifts_with_the_wind_up_to_its_other_drag() {
     for (a22_per_s, plant) in [(0.0, "rapier"), (-0.2, "rapier"), (-0.2, "ideal")] {
         let toml = format!(
             "[swarm]\na22_per_s = {a22_per_s}\n[vehicle]\ndrag_per_s = 0.5\n[wind]\nmean_m_s = [3.0, -1.0]\n\
@@ -56,7 +57,7 @@ fn a_point_drifts_as_fast_as_the_wind_less_what_else_brakes_it() {
             let rate_per_s = 0.5 - a22_per_s;
             let share = 1.0 - (-rate_per_s * sample.time_s).exp();
             let expected = Vector::new(3.0, -1.0, 0.0) * (0.5 / rate_per_s * share);
-            // The engine's step leaves (rate dt)^2/12 of it.
+            // The relative error of the engine's step is (rate dt)^2/12.
             assert!((row(&sample.swarm.velocities_m_s, 1) - expected).norm() < 3e-6, "{plant} at {} s", sample.time_s);
         }
         assert_eq!(log.samples[3].channels[0].name.as_ref(), "wind");
@@ -102,7 +103,7 @@ fn the_engine_is_of_second_order_in_a_wind() {
 }
 
 #[test]
-fn one_turbulence_for_all_changes_no_distance_and_an_own_one_does() {
+fn only_individual_turbulence_changes_separations() {
     let flown = |wind: &str| distances(&fly(&five(&format!("{wind}\n[time]\nduration_s = 20.0"))).1);
     let still = flown("[vehicle]\ndrag_per_s = 0.4");
     let windy = |shared: bool| {
@@ -114,10 +115,11 @@ fn one_turbulence_for_all_changes_no_distance_and_an_own_one_does() {
     assert!(windy(false) > 0.1, "{}", windy(false));
 }
 
-/// Both plants feel the same turbulence: it is a function of time and seed.
+/// Both plants have the same turbulence: it is a function of time and seed.
 #[test]
-fn the_ideal_plant_flies_in_the_same_turbulence() {
-    let wind = "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\ndryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
+fn the_ideal_plant_has_the_same_turbulence() {
+    let wind = "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\n\
+     dryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
                 [time]\nduration_s = 3.0";
     let mut scenario = five(wind);
     scenario.time = TimeSpec { dt_s: 1.0 / 1024.0, record_hz: 64.0, ..scenario.time };
@@ -138,7 +140,8 @@ fn the_ideal_plant_flies_in_the_same_turbulence() {
 
 #[test]
 fn a_saved_flight_in_turbulence_goes_on_with_the_same_bits_and_another_seed_with_others() {
-    let wind = "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\ndryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
+    let wind = "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\n\
+     dryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
                 [time]\nduration_s = 4.0";
     for plant in [PlantSpec::Rapier, PlantSpec::Ideal] {
         let scenario = Scenario { plant, ..five(wind) };
@@ -159,9 +162,9 @@ fn a_saved_flight_in_turbulence_goes_on_with_the_same_bits_and_another_seed_with
     }
 }
 
-/// A step that is taken back and flown in halves is in the same air.
+/// A step that is undone and halved has the same wind.
 #[test]
-fn a_step_taken_back_is_flown_in_the_same_air() {
+fn an_undone_step_is_repeated_in_the_same_wind() {
     let scenario = five(
         "[vehicle]\ndrag_per_s = 0.4\n[wind]\nshared = false\ndryden = { speed_20ft_m_s = 10.0, height_m = 10.0 }\n\
          [time]\nduration_s = 4.0",
@@ -183,16 +186,16 @@ fn a_step_taken_back_is_flown_in_the_same_air() {
             }
         }
     }
-    // Going back rounds to where positions are counted from.
+    // Undoing rounds positions relative to the origin.
     assert!((&state.positions_m - &other.positions_m).amax() < 1e-12);
     assert!((&state.velocities_m_s - &other.velocities_m_s).amax() < 1e-12);
     assert!(state.velocities_m_s.amax() > 0.1);
 }
 
-/// Random gusts on random vehicles over three graphs: no pair ever nearer than was certified before the first step, and no
-/// energy above its bound, which is often above that of the start.
+/// Random gusts on random vehicles over three graphs: separations keep the certificate, and the energy stays below its
+/// bound, which often exceeds the initial energy.
 #[test]
-fn no_flight_in_gusts_breaks_its_certificate() {
+fn no_flight_in_gusts_violates_its_certificate() {
     let mut rises = 0;
     for flight in 0..15_u32 {
         let random = |k: u32| f64::from((flight * 7919 + k * 104_729 + 13) % 1009) / 1009.0 - 0.5;
@@ -206,7 +209,7 @@ fn no_flight_in_gusts_breaks_its_certificate() {
         });
         let gusts = gusts.filter(|gust| gust.vehicles.as_ref().is_some_and(|met| !met.is_empty())).collect();
         scenario.wind = WindSpec { mean_m_s: Vector::x(), gusts, ..WindSpec::default() };
-        scenario.validate().expect("a scenario that can be flown");
+        scenario.validate().expect("a valid scenario");
         let (flight, log) = fly(&scenario);
         let certified_m = flight.certificate.certified_m.expect("a promise");
         let closest_m = flight.audit.closest.expect("a closest approach").separation_m;
@@ -215,11 +218,11 @@ fn no_flight_in_gusts_breaks_its_certificate() {
         rises +=
             u32::from(energies.fold(0.0, f64::max) > 1.001 * flight.certificate.energy_initial.unwrap_or_default());
     }
-    assert!(rises >= 6, "only {rises} flights gained energy: the bound was not tried");
+    assert!(rises >= 6, "only {rises} flights gained energy");
 }
 
 #[test]
-fn what_is_certified_of_a_wind_is_certified_for_as_long_as_it_is() {
+fn a_certificate_in_wind_ends_at_its_time() {
     let certificate = |more: &str| {
         let scenario = five(&format!("[vehicle]\ndrag_per_s = 0.4\n{more}\n[time]\nduration_s = 30.0"));
         scenario.certificate(scenario.law().expect("a law").as_ref())
@@ -227,7 +230,11 @@ fn what_is_certified_of_a_wind_is_certified_for_as_long_as_it_is() {
     let (rest, mean) = ("[reference]\nkind = \"rest\"\n", "[wind]\nmean_m_s = [2.0, 0.0]\n");
     let still = certificate("");
     let carried = certificate(mean);
-    assert_eq!((carried.certified_m, carried.certified_until_s), (still.certified_m, None), "all are pushed alike");
+    assert_eq!(
+        (carried.certified_m, carried.certified_until_s),
+        (still.certified_m, None),
+        "the push is common to all vehicles"
+    );
     let held = certificate(&format!("{rest}{mean}"));
     assert_eq!(held.certified_until_s, Some(30.0));
     assert!(held.certified_m < certificate(rest).certified_m);
@@ -246,17 +253,17 @@ fn what_is_certified_of_a_wind_is_certified_for_as_long_as_it_is() {
 }
 
 #[test]
-fn a_leader_that_is_blown_off_its_reference_leaves_nothing_certified() {
+fn a_leader_blown_off_its_reference_voids_the_certificate() {
     let scenario = builtin("pentagon-leader", &["vehicle.drag_per_s=0.3", "wind.mean_m_s=[1.0, 0.0]"]);
     assert!(scenario.certificate(scenario.law().expect("a law").as_ref()).void.contains(&Void::LeaderBlown));
 }
 
 #[test]
-fn a_windy_scenario_is_written_back_and_read_again_bit_for_bit() {
+fn a_scenario_with_wind_is_written_and_read_back_bit_for_bit() {
     let scenario = builtin("gusts", &[]);
     let again = read(&scenario.resolved_toml());
     assert_eq!(again, scenario);
-    assert_eq!(again.wind.gusts[0].fall_s(), 1.5, "as long as it rises");
+    assert_eq!(again.wind.gusts[0].fall_s(), 1.5, "the fall time defaults to the rise time");
     let own = read(&builtin("gusts", &["wind.shared=false"]).resolved_toml());
     assert!(!own.wind.shared);
 }
@@ -276,7 +283,7 @@ fn the_show_in_gusts_is_clear_reached_and_certified_to_its_end() {
 }
 
 #[test]
-fn a_wind_that_cannot_be_flown_in_is_refused_with_its_place_and_remedy() {
+fn a_wrong_wind_is_refused_at_its_place_with_a_remedy() {
     let wrong = |sets: &[&str]| {
         let sets = [&["vehicle.drag_per_s=0.3", "time.duration_s=10"], sets].concat();
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();

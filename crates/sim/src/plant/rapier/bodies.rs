@@ -1,4 +1,4 @@
-//! Points: rigid bodies without rotation that carry out commanded accelerations.
+//! Points: rigid bodies without rotation that execute commanded accelerations.
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
@@ -11,25 +11,25 @@ use crate::scenario::{Scenario, Space};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
-/// A swarm of rigid bodies, one a vehicle, in vehicle order.
+/// Swarm of rigid bodies, one per vehicle, in vehicle order.
 pub(super) struct Bodies {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
-    /// Accelerations held over the step, and what the wind adds to them at its beginning \[m/s^2\].
+    /// Accelerations held over the step, with the push of the wind at its beginning \[m/s^2\].
     held: Rows,
-    /// What blows, where anything does.
+    /// Wind, if any.
     air: Option<Air>,
-    /// Velocities of the last drift, as they were before contacts changed them \[m/s\].
+    /// Velocities of the last drift before contacts changed them \[m/s\].
     drift_m_s: Rows,
-    /// Where it began, from the engine's origin \[m\].
+    /// Positions at the beginning of the last drift, from the engine's origin \[m\].
     began_m: Rows,
-    /// Length of the drift that waits for the second half of its kick \[s\]; 0 for a completed state.
+    /// Length of a drift whose second half kick is pending \[s\]; 0 for a completed state.
     drifted_s: f64,
-    /// Where the engine's origin is: the middle of the start, so that single precision resolves the swarm's own extent
-    /// wherever it flies.
+    /// Origin of the engine's coordinates: the centre of the start. The engine then resolves the extent of the swarm
+    /// wherever it starts.
     origin_m: Vector3<f64>,
     mass_kg: Vec<f64>,
-    /// Drag of the air included.
+    /// Velocity coefficient, drag of the air included.
     a22_per_s: f64,
     /// Whether z is locked.
     is_flat: bool,
@@ -56,12 +56,12 @@ impl Bodies {
         }
     }
 
-    /// What half a step of free motion multiplies a velocity by: exp(a22 dt/2).
+    /// Returns the factor of a velocity over half a step of free motion: exp(a22 dt/2).
     fn half_decay(&self, dt_s: f64) -> f64 {
         libm::exp(0.5 * self.a22_per_s * dt_s)
     }
 
-    /// The command with what the wind adds to it now.
+    /// Updates the held accelerations: the command plus the present push of the wind.
     fn hold(&mut self) {
         if let Some(air) = &self.air {
             air.write_held(&mut self.held);
@@ -71,7 +71,7 @@ impl Bodies {
         }
     }
 
-    /// Each vehicle's velocity \[m/s\] with the second half of the held acceleration's kick, where a drift waits for it.
+    /// Returns each velocity \[m/s\], completed by the second half kick of the held acceleration if that is pending.
     fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
         let half_decay = self.half_decay(self.drifted_s);
         self.handles.iter().enumerate().map(move |(i, &handle)| {
@@ -98,7 +98,7 @@ impl Plant for Bodies {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
         self.world.integration_parameters.dt = dt_s;
-        // A drift that waits for its command is completed with the one that is held.
+        // The held command completes a pending drift.
         let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];

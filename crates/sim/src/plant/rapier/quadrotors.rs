@@ -1,4 +1,4 @@
-//! Quadrotors: rigid bodies that turn, lifted by rotors.
+//! Quadrotors: rotating rigid bodies lifted by rotors.
 
 use std::time::{Duration, Instant};
 
@@ -14,22 +14,22 @@ use crate::vehicle::{Drift, Fleet};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
-/// Friction of hulls that turn: a hit makes them tumble.
+/// Friction of rotating hulls, which tumble after a collision.
 const HULL_FRICTION: Real = 0.5;
 
-/// A swarm of quadrotors, one body each, in vehicle order. The engine moves and turns them and sees what they hit; forces and
-/// torques, and with them the velocities around its step, are those of the fleet.
+/// Swarm of quadrotors, one body per vehicle, in vehicle order. The engine moves and turns the bodies and detects
+/// collisions; the fleet computes forces, torques and the velocities around the engine's step.
 pub(super) struct Fliers {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
     fleet: Fleet,
-    /// The first half of the step that is being flown.
+    /// First half of the current step.
     drifts: Vec<Drift>,
-    /// Its velocities, and where it began from the engine's origin, for hits.
+    /// Velocities of the step and positions at its beginning, from the engine's origin, for collisions.
     drift_m_s: Rows,
     began_m: Rows,
     origin_m: Vector3<f64>,
-    /// Spent beside the engine.
+    /// Wall-clock time spent outside the engine.
     airframe: Duration,
 }
 
@@ -72,7 +72,7 @@ impl Fliers {
         }
     }
 
-    /// Half of the kick, and what the engine is to drift with.
+    /// Applies half of the kick and sets the engine's velocities for the drift.
     fn begin(&mut self, dt_s: f64) {
         self.drifts.clear();
         for (i, &handle) in self.handles.iter().enumerate() {
@@ -86,7 +86,7 @@ impl Fliers {
         }
     }
 
-    /// Where the engine brought them, and the other half of the kick.
+    /// Reads the positions from the engine and applies the other half of the kick.
     fn end(&mut self, dt_s: f64) {
         let lag = self.fleet.dynamics.rotor_lag(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
@@ -104,7 +104,7 @@ impl Fliers {
             self.fleet.dynamics.predict(state, drift);
         }
         self.fleet.blow(dt_s);
-        // Also what begins the next step: it differs from what the velocities make of it by the square of the step.
+        // Also begins the next step: forces differ from those of the completed velocities by the square of the step.
         self.fleet.feel();
         self.fleet.complete(&self.drifts, dt_s);
     }
@@ -199,7 +199,7 @@ impl Plant for Fliers {
     }
 }
 
-/// As the engine has it, which keeps its length: the same numbers go back into it.
+/// Converts an attitude of the engine without normalization, so that it converts back to the same numbers.
 fn attitude(rotation: Rotation) -> UnitQuaternion<f64> {
     let [x, y, z, w] = rotation.to_array();
     UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))

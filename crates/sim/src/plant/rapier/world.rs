@@ -1,4 +1,4 @@
-//! Bodies, colliders and contacts of the engine's world, as both plants of rigid bodies use them.
+//! Bodies, colliders and contacts of the engine, common to both plants of rigid bodies.
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
@@ -11,15 +11,15 @@ use crate::scenario::CONTACT_PREDICTION_M;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::{Obstacle, Shape};
 
-/// Hulls meet hulls.
+/// Group of hulls, which collide with hulls.
 const HULL: Group = Group::GROUP_1;
-/// Keep-out balls meet keep-out balls.
+/// Group of keep-out balls, which detect keep-out balls.
 const KEEP_OUT: Group = Group::GROUP_2;
 /// Share of the closing speed that two hulls keep after a bounce.
 const HULL_RESTITUTION: Real = 0.5;
 
-/// Everything that the engine carries from step to step: bodies, contacts, islands, bounding volumes. What it leaves out is
-/// working memory.
+/// Copies the state that the engine carries from step to step: bodies, contacts, islands, bounding volumes. Working
+/// memory is not copied.
 pub(super) fn copied(world: &PhysicsWorld) -> PhysicsWorld {
     PhysicsWorld {
         gravity: world.gravity,
@@ -44,7 +44,7 @@ pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
         keeps_out.then_some(usize::try_from(collider.user_data).ok()?)
     };
     for contact in world.narrow_phase.contact_pairs() {
-        // A manifold also holds contacts predicted for the near future: only an overlap counts.
+        // A manifold also holds predicted contacts; only an overlap counts.
         let overlaps = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.dist < 0.0));
         if overlaps && let (Some(i), Some(j)) = (vehicle(contact.collider1), vehicle(contact.collider2)) {
             pairs.push(Pair::new(i, j));
@@ -53,12 +53,12 @@ pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
     pairs[before..].sort_unstable();
 }
 
-/// Appends the pairs whose hulls pushed each other in a drift from these places \[m\] at these velocities \[m/s\], in index
+/// Appends the pairs whose hulls collided in a drift from given positions \[m\] with given velocities \[m/s\], in index
 /// order.
 pub(super) fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Rows, contacts: &mut Vec<HullContact>) {
     let before = contacts.len();
     for contact in world.narrow_phase.contact_pairs() {
-        // Keep-out balls push nothing.
+        // Keep-out balls have no impulse.
         let pushed = contact.manifolds().iter().any(|m| m.points.iter().any(|point| point.data.impulse > 0.0));
         let vehicle = |handle: ColliderHandle| {
             world.colliders.get(handle).and_then(|collider| usize::try_from(collider.user_data).ok())
@@ -75,19 +75,19 @@ pub(super) fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Ro
 pub(super) fn empty_world() -> PhysicsWorld {
     let mut world = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
     let parameters = &mut world.integration_parameters;
-    // One iteration: motion within a step is a straight line (module documentation).
+    // With one iteration, motion within a step is a straight line (module documentation).
     parameters.num_solver_iterations = 1;
-    // The engine would clamp speeds at 400 m/s.
+    // The default of the engine clamps speeds at 400 m/s.
     parameters.normalized_max_linear_velocity = Real::MAX;
     parameters.normalized_prediction_distance = CONTACT_PREDICTION_M;
-    // Reused contacts report stale distances: evidence must be of this step.
+    // Recycled contacts report stale distances; evidence must be of this step.
     parameters.contact_recycling = false;
-    // Continuous collision detection would shorten motion; the audit judges what happened.
+    // Continuous collision detection would shorten motion; the audit handles violations.
     parameters.max_ccd_substeps = 0;
     world
 }
 
-/// The solid ball of a vehicle.
+/// Returns the solid ball of a vehicle.
 pub(super) fn hull(radius_m: f64, vehicle: usize) -> ColliderBuilder {
     ColliderBuilder::ball(radius_m)
         .restitution(HULL_RESTITUTION)
@@ -96,7 +96,7 @@ pub(super) fn hull(radius_m: f64, vehicle: usize) -> ColliderBuilder {
         .user_data(vehicle as u128)
 }
 
-/// The ball that keeps two vehicles a distance apart, in what it sees.
+/// Returns the sensor ball of a vehicle: two overlap if the vehicles are closer than delta.
 pub(super) fn keep_out(delta_m: f64, vehicle: usize) -> ColliderBuilder {
     ColliderBuilder::ball(delta_m / 2.0)
         .density(0.0)
@@ -105,7 +105,7 @@ pub(super) fn keep_out(delta_m: f64, vehicle: usize) -> ColliderBuilder {
         .user_data(vehicle as u128)
 }
 
-/// A solid that hulls meet and nothing moves. It is the hull of no vehicle.
+/// Adds a fixed solid that hulls collide with. It has the index of no vehicle.
 pub(super) fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, origin_m: Vector3<f64>) {
     let place_m = obstacle.place_m - origin_m;
     let collider = match obstacle.shape {
@@ -122,12 +122,12 @@ pub(super) fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, ori
     world.colliders.insert(collider.collision_groups(hulls).user_data(u128::MAX));
 }
 
-/// A vector in the engine's type.
+/// Converts a vector to the engine's type.
 pub(super) fn to_engine(v: Vector3<f64>) -> Vector {
     Vector::new(v.x, v.y, v.z)
 }
 
-/// A vector of the engine in ours.
+/// Converts a vector from the engine's type.
 pub(super) fn from_engine(v: Vector) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
 }

@@ -1,4 +1,4 @@
-//! One step: as many parts as are honest, each moved, judged and answered by the law.
+//! One step of a simulation: divided into substeps as required; each is moved, audited and answered by the law.
 
 use std::time::{Duration, Instant};
 
@@ -14,24 +14,24 @@ use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
 use tautline_laws::law::{Law, LawError, RateQuery, Void};
 
-/// From this many vehicles on, law and audit of a step run side by side when two threads are at hand. Both read the
-/// same state and share nothing, so the answer has the same bits either way; below, starting a thread costs more.
+/// Number of vehicles from which law and audit of a step run concurrently, if two threads are available. Both only read
+/// the state, so the bits are the same. For fewer vehicles, starting a thread costs more.
 const SIDE_BY_SIDE_FROM: usize = 512;
 
-/// Into how many parts a step had to be cut, and whether that was enough.
+/// Division of a step.
 struct Substeps {
-    /// The fewest parts that were flown at once.
+    /// Fewest smallest substeps flown at once.
     shortest: u64,
-    /// A part that cannot be halved was still too long for the law.
+    /// Whether a substep that cannot be halved was too long for the law.
     is_overlong: bool,
 }
 
-/// Product of a part of a step and the fastest rate that the law has anywhere on its way above which it is refused: where it
-/// began, the law was slower by [`TimeSpec::max_rate_dt`]; a part that is stable for what it lands in is no leap.
+/// Largest product of a substep and the fastest rate of the law anywhere on its way. A substep beyond it is refused
+/// even if [`TimeSpec::max_rate_dt`] held at its beginning: it may leap over the law's barrier.
 const MAX_RATE_DT_ON_THE_WAY: f64 = 1.0;
 
 impl Simulation {
-    /// Flies one step, in halves where it is refused.
+    /// Flies one step, and halves it when refused.
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
         let mut parts = Substeps { shortest: whole, is_overlong: false };
@@ -51,8 +51,8 @@ impl Simulation {
         flown
     }
 
-    /// Fastest rate of the law at the present state \[1/s\]. It is 0 in continuous time, which chooses its own steps, and
-    /// under commands from outside, for which the law is not asked.
+    /// Returns the fastest rate of the law in the present state \[1/s\]. It is 0 in continuous time, which chooses its
+    /// own steps, and under given commands.
     fn rate_per_s(&self, length_s: f64) -> f64 {
         if self.overruled || !self.plant.holds_commands() {
             return 0.0;
@@ -60,20 +60,20 @@ impl Simulation {
         let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.room_m));
         let of_any_pair = rate(judge.nearest_m);
-        // The nearest pair may be one that the law does not act on: the exact distance costs a look at every edge.
+        // The nearest pair may not be one that the law acts on. The exact distance visits every edge.
         if of_any_pair * length_s <= scenario.time.stable_rate_dt() {
             return of_any_pair;
         }
         rate(judge.nearest_acted_on_m(law.as_ref(), links, state))
     }
 
-    /// Whether every part that the law asks for changes the motion: where a command is held for a period of its own, or
-    /// comes from outside, the vehicles move as they are commanded however long a part is.
+    /// Returns whether substeps of the law's length change the motion. Under a control rate or given commands, the
+    /// motion does not depend on the substeps.
     fn follows_the_law(&self) -> bool {
         !self.overruled && self.scenario.time.control_hz.is_none()
     }
 
-    /// Flies the `whole` parts of a step, as many at once as are honest and not refused.
+    /// Flies the `whole` smallest substeps of a step, as many at once as the law's rate and the checks allow.
     fn fly_parts(&mut self, step: u64, whole: u64, substeps: &mut Substeps) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
@@ -120,10 +120,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Bounds the error of integration after a part of a step, and lets the judge know of it, from the first part on that is
-    /// too long for the law.
+    /// Updates the bound of the integration error after a substep, from the first overlong one on, and passes it to the
+    /// judge.
     fn note_error(&mut self, length_s: f64, rate_per_s: f64, is_overlong: bool) {
-        // Commands that are made of late or wrong states do not change at the rate that the law has in the true one.
+        // Commands from delayed or wrong states do not change at the law's rate in the true state.
         if !self.controller.link.is_exact() || (!is_overlong && self.error.is_none()) {
             return;
         }
@@ -136,7 +136,8 @@ impl Simulation {
         self.judge.may_err_by(error.position_m());
     }
 
-    /// Moves the vehicles from `state` to `next`. The result is why the law had no answer on the way, where they moved on without.
+    /// Moves the vehicles from `state` to `next`. Returns the law's error if the law was undefined on the way and the
+    /// vehicles moved on.
     fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Option<LawError>, Ending> {
         let began = Instant::now();
         self.path.begin();
@@ -159,9 +160,9 @@ impl Simulation {
         }
     }
 
-    /// Whether the move that was just made is to be made in halves: it comes too near to the barrier, or to where the law is
-    /// too fast for a step of this length \[s\]. Behind it the fastest rate that the law had on the way \[1/s\], at most; that at
-    /// its start where the law has no barrier, or is not asked.
+    /// Returns whether the last move must be halved: it comes too close to the barrier, or to states in which the law
+    /// is too fast for this length \[s\]. The second result is the fastest rate of the law on the way \[1/s\]. It is
+    /// that at the start if the law has no barrier or is not evaluated.
     fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self {
             controller: Controller { law, links, link, .. },
@@ -190,13 +191,13 @@ impl Simulation {
         let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
         let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
-        // A law may know no rate at or inside its barrier, and no part is short enough to leap it.
+        // A law may have no rate at or inside its barrier; no substep is short enough there.
         let leaps = may_leap && nearest_m <= barrier_m;
         (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
     }
 
-    /// Audits the way that led to `state` (or the start), asks the law for the next command and lets the vehicles hold it.
-    /// Between whole steps a command that is held for a period of its own is kept.
+    /// Audits the way to `state` (or the start), evaluates the law and applies its command. With a control rate, the
+    /// command is kept between whole steps.
     pub(super) fn judge_and_command(&mut self, step: Option<(u64, f64)>, is_whole: bool) -> Result<(), Ending> {
         let (number, from_s) = step.unwrap_or((0, self.time_s));
         let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
@@ -243,14 +244,14 @@ impl Simulation {
         commanded
     }
 
-    /// Asks the law about the present state.
+    /// Evaluates the law for the present state.
     pub(super) fn ask(&mut self) -> Result<(), Ending> {
         let began = Instant::now();
         let commanded = self.controller.command(self.time_s, &self.state, &mut self.control);
         self.hold(self.steps, commanded.map_err(Ending::from), began.elapsed())
     }
 
-    /// Lets the vehicles hold the command from now on, where there is one.
+    /// Applies the command to the plant, if the law has one.
     fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
         self.performance.law += took;
         let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
@@ -277,7 +278,7 @@ impl Simulation {
     }
 }
 
-/// The fastest rate of a law \[1/s\] where no two are nearer and no obstacle leaves less room \[m\].
+/// Returns the fastest rate of a law \[1/s\] while no pair and no obstacle is closer than given \[m\].
 fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, room_m): (f64, f64)) -> f64 {
     let query = RateQuery::new(scenario.velocity_coefficient_per_s(), Some(nearest_m));
     let rates = law.rates(&RateQuery { obstacle_room_m: Some(room_m), ..query });

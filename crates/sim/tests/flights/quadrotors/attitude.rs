@@ -1,4 +1,4 @@
-//! The attitude loop: the poles that rotors with a lag give it, and quadrotors against their solution in continuous time.
+//! Attitude loop: its poles with lagging rotors, and quadrotors against their solution in continuous time.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use tautline_sim::continuous;
@@ -7,7 +7,7 @@ use tautline_sim::vehicle::{Model, ModelError, State};
 
 use super::{alone, fly, model, orders, without_drag};
 
-/// Angles \[rad\] about x, a period \[s\] apart, of a vehicle that begins tilted a little.
+/// Returns angles \[rad\] about x at intervals \[s\] of a vehicle that begins with a small tilt.
 fn angles(model: &Model, hz: f64, period_s: f64, samples: usize) -> Vec<f64> {
     let (scenario, mut fleet) = alone(model.clone(), hz);
     fleet.states[0].attitude = UnitQuaternion::from_euler_angles(1e-4, 0.0, 0.0);
@@ -20,8 +20,8 @@ fn angles(model: &Model, hz: f64, period_s: f64, samples: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Coefficients of s^2, s and 1 of the monic cubic whose exponentials these samples are sums of: from the recursion that four
-/// neighbours obey, z = e^(s T), and the sums of roots s = ln(z)/T.
+/// Returns the coefficients of s^2, s and 1 of the monic cubic whose exponentials sum to these samples. They follow
+/// from the recursion of four neighbours with z = e^(s T), and the sums of roots s = ln(z)/T.
 fn cubic(samples: &[f64], period_s: f64) -> [f64; 3] {
     let row = |k: usize| Vector3::new(samples[k + 2], samples[k + 1], samples[k]);
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -45,7 +45,7 @@ fn the_attitude_obeys_tau_s3_plus_s2_plus_2_zeta_omega_s_plus_omega2() {
         let found = cubic(&angles(model, hz, 0.05, 16), 0.05);
         found.iter().zip(expected).map(|(found, expected)| (found / expected - 1.0).abs()).fold(0.0, f64::max)
     };
-    // Half of a period of the loop is one more lag: 0.1 % of each coefficient at 8 kHz, and half of it at twice the rate.
+    // Half a period of the loop adds to the lag: 0.1 % of each coefficient at 8 kHz, and half of it at twice the rate.
     let errors = [4000.0, 8000.0, 16_000.0].map(|hz| error(&model, hz));
     assert!(errors[2] <= 2e-3 && orders(&errors).iter().all(|order| (0.8..1.2).contains(order)), "{errors:?}");
     let prompt = Model { lag_up_s: 0.5 * lag_s, lag_down_s: 0.5 * lag_s, ..model };
@@ -53,7 +53,7 @@ fn the_attitude_obeys_tau_s3_plus_s2_plus_2_zeta_omega_s_plus_omega2() {
 }
 
 #[test]
-fn gains_that_the_lag_makes_unstable_are_refused_and_do_grow() {
+fn unstable_gains_are_refused_and_grow_in_flight() {
     let tuned = |rad_s: f64| Model { attitude_rad_s: rad_s, ..without_drag("crazyflie") };
     // 2 zeta/tau is 30.8 rad/s.
     let largest = |model: &Model| {
@@ -67,15 +67,15 @@ fn gains_that_the_lag_makes_unstable_are_refused_and_do_grow() {
     assert!(largest(&tuned(33.0)) > 1e-4, "{}", largest(&tuned(33.0)));
 }
 
-/// A manoeuvre that tilts, climbs and turns, in commands of 20 ms.
+/// Returns the command of a manoeuvre that tilts, climbs and turns, in commands of 20 ms.
 fn manoeuvre(time_s: f64, _: &State) -> Vector3<f64> {
     let time_s = 0.02 * (time_s / 0.02 + 1e-6).floor();
     Vector3::new(2.0 * (3.0 * time_s).sin(), 1.5 * (5.0 * time_s).cos(), (4.0 * time_s).sin())
 }
 
 #[test]
-fn the_engine_comes_to_the_solution_of_order_8_at_second_order() {
-    // What is left at 500 Hz after a second, in m and m/s: more where rotors are faster.
+fn the_engine_converges_to_the_solution_of_order_8_at_second_order() {
+    // Error at 500 Hz after a second, in m and m/s: larger for faster rotors.
     for (name, left) in [("crazyflie", 2e-4), ("hummingbird", 5e-3)] {
         let start = |hz: f64| {
             let (scenario, mut fleet) = alone(model(name), hz);

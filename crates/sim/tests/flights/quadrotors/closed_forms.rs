@@ -1,4 +1,4 @@
-//! What has a closed form: falling, drag, rotors, hover in wind.
+//! Motions with a closed form: fall, drag, rotors, hover in wind.
 
 use nalgebra::{Vector3, Vector4};
 use tautline_sim::plant::rapier;
@@ -16,7 +16,7 @@ fn still(state: &mut State) {
 }
 
 #[test]
-fn without_air_and_rotors_it_falls_by_g_t_squared_over_two() {
+fn a_vehicle_without_drag_and_thrust_falls_by_g_t_squared_over_two() {
     for dt_s in [1.0 / 500.0, 1.0 / 1000.0] {
         let fallen = open_loop(without_drag("crazyflie"), &still, STILL, (0.5, dt_s));
         assert!((fallen.position_m.z + 0.125 * GRAVITY_M_S2).abs() <= ROUNDING, "{}", fallen.position_m);
@@ -24,7 +24,7 @@ fn without_air_and_rotors_it_falls_by_g_t_squared_over_two() {
     }
 }
 
-/// Speed \[m/s\] and depth \[m\] after a time \[s\] of a fall against a drag c v^2.
+/// Returns speed \[m/s\] and depth \[m\] after a time \[s\] of a fall with a drag c v^2.
 fn fallen(model: &Model, time_s: f64) -> (f64, f64) {
     let terminal_m_s = (model.weight_n() / model.parasitic_drag_n_s2_m2[2]).sqrt();
     let time = GRAVITY_M_S2 * time_s / terminal_m_s;
@@ -44,7 +44,7 @@ fn a_fall_in_air_comes_to_the_terminal_speed_at_second_order() {
     let state = open_loop(dragged(1.0), &still, STILL, (5.0, 1.0 / 500.0));
     let (terminal_m_s, _) = fallen(&dragged(1.0), 1e3);
     assert!((state.velocity_m_s.z + terminal_m_s).abs() <= 1e-9, "{}", state.velocity_m_s);
-    // A drag that pushes: faster than in a vacuum.
+    // A negative drag: faster than in a vacuum.
     let pushed = open_loop(dragged(-1.0), &still, STILL, (0.5, 1.0 / 500.0));
     assert!(-pushed.velocity_m_s.z > 0.5 * GRAVITY_M_S2, "{}", pushed.velocity_m_s);
 }
@@ -60,7 +60,7 @@ fn rotor_drag_in_hover_slows_a_glide_exponentially() {
     let model = model("crazyflie");
     let expected_m_s = 3.0 * (-model.rotor_drag_n_s_m[0] / model.mass_kg).exp();
     let found_m_s = glide(model.clone());
-    // 1e-7 of it, of (dt D/m)^2.
+    // Relative error 1e-7, of order (dt D/m)^2.
     assert!((found_m_s.x - expected_m_s).abs() <= 3e-7 * expected_m_s, "{found_m_s}, {expected_m_s}");
     let flipped = Model { rotor_drag_n_s_m: model.rotor_drag_n_s_m.map(|drag| -drag), ..model };
     assert!(glide(flipped).x > 3.0);
@@ -81,11 +81,11 @@ fn rotors_hover_at_the_published_speeds_and_the_vehicle_stays() {
     }
 }
 
-/// Height \[m\] and speed \[m/s\] of a climb in a vacuum, a time after all rotors were asked for another speed.
+/// Returns height \[m\] and speed \[m/s\] of a climb in a vacuum, a time after a new speed of all rotors was commanded.
 fn climbed(model: &Model, from_rpm: f64, to_rpm: f64, time_s: f64) -> (f64, f64) {
     let (a, b) = (model.thrust_n_per_rpm2, model.thrust_n_per_rpm);
     let (lag_s, off) = (model.lag_up_s, from_rpm - to_rpm);
-    // Integrals, once and twice, of exp(-t/lag).
+    // First and second integrals of exp(-t/lag).
     let once = |lag_s: f64| lag_s * (1.0 - (-time_s / lag_s).exp());
     let twice = |lag_s: f64| lag_s * (time_s - once(lag_s));
     let held = to_rpm * (a * to_rpm + b);
@@ -97,7 +97,7 @@ fn climbed(model: &Model, from_rpm: f64, to_rpm: f64, time_s: f64) -> (f64, f64)
 }
 
 #[test]
-fn a_step_of_the_rotors_lags_and_makes_the_climb_that_follows() {
+fn a_step_of_the_rotor_command_lags_and_gives_the_computed_climb() {
     let model = without_drag("crazyflie");
     let (_, fleet) = alone(model.clone(), 500.0);
     let hover_rpm = fleet.dynamics.hover_rpm();
@@ -129,7 +129,8 @@ fn rotors_that_turn_one_way_faster_turn_the_vehicle_the_other_way() {
     assert!(state.position_m.norm() <= ROUNDING);
 }
 
-/// Tangent of the tilt that holds a vehicle in a wind: `D_x s w/(m g)`, where s is the rotors' speed over that of hover.
+/// Returns the tangent of the tilt that holds a vehicle in a wind: `D_x s w/(m g)` with the rotor speed s relative to
+/// hover.
 fn tilt_in_wind(model: &Model, hover_rpm: f64, wind_m_s: f64) -> f64 {
     let curve = RotorCurve::of(model);
     let [along, _, axial] = model.rotor_drag_n_s_m;
@@ -143,7 +144,7 @@ fn tilt_in_wind(model: &Model, hover_rpm: f64, wind_m_s: f64) -> f64 {
 }
 
 #[test]
-fn in_a_steady_wind_it_hovers_at_the_tilt_whose_tangent_is_drag_over_weight() {
+fn the_tangent_of_the_tilt_in_a_steady_wind_is_drag_over_weight() {
     for (wind_m_s, axial) in [(2.0, 1.0), (6.0, 1.0), (6.0, 0.0), (6.0, 4.0)] {
         let mut model = model("crazyflie");
         model.rotor_drag_n_s_m[2] *= axial;

@@ -1,4 +1,4 @@
-//! Whole flights: the built-in one, saved ones, undone steps, hits, ground and downwash.
+//! Whole flights: the built-in one, saved ones, undone steps, collisions, ground effect and downwash.
 
 use nalgebra::{Vector3, Vector4};
 use tautline_audit::Status;
@@ -16,7 +16,7 @@ use crate::flight::{builtin, fly, read};
 
 const DT_S: f64 = 1.0 / 500.0;
 
-/// Two Crazyflies at these places, in space.
+/// Returns two Crazyflies with given positions, in space.
 fn two(positions_m: &[f64; 6], velocities_m_s: &[f64; 6], change: &dyn Fn(&mut Quadrotor)) -> (Scenario, Fleet) {
     let start =
         Swarm { positions_m: Rows::from_row_slice(positions_m), velocities_m_s: Rows::from_row_slice(velocities_m_s) };
@@ -46,7 +46,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
     assert!(flown.certificate.void.contains(&Void::NotAPoint) && flown.certificate.certified_m.is_none());
     let error_m = largest_edge_error_m(&flown.last.positions_m, scenario.formation(), &scenario.graph);
     assert!(error_m < scenario.arrival.edge_error_m, "{error_m} m");
-    // The height is held to the sag of a tilt that no command asks for.
+    // The height is held up to the sag of a tilt.
     let off_m = log.samples.iter().map(|sample| sample.swarm.positions_m.column(2).amax()).fold(0.0, f64::max);
     assert!(off_m > 0.0 && off_m < 1e-3, "{off_m} m");
     let weight_n = model("crazyflie").weight_n();
@@ -93,7 +93,7 @@ fn a_loaded_flight_of_quadrotors_goes_on_with_the_same_bits() {
 }
 
 #[test]
-fn a_step_that_is_taken_back_leaves_nothing_behind() {
+fn an_undone_step_has_no_effect() {
     let (scenario, mut fleet) = two(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0], &[0.0; 6], &|_| {});
     fleet.states[0].rates_rad_s = Vector3::new(1.0, 2.0, 3.0);
     let mut plant = rapier::quadrotors(&scenario, fleet);
@@ -147,7 +147,7 @@ fn a_flight_into_each_other_is_a_violation_with_a_hit_and_ends_in_time() {
     assert_eq!(flown.last.first_not_finite(), None);
 }
 
-/// Towards each other, faster than the law brakes.
+/// Returns the start with velocities towards each other, faster than the law can brake.
 fn crossing(scenario: &Scenario) -> Swarm {
     let velocities_m_s = Rows::from_row_slice(&[2.5, 0.0, 0.0, -2.5, 0.0, 0.0]);
     Swarm { velocities_m_s, ..scenario.start.clone() }
@@ -163,7 +163,7 @@ fn continuous_time_flies_the_same_flight() {
 }
 
 #[test]
-fn near_a_ground_thrust_grows_and_only_there() {
+fn thrust_grows_only_near_a_ground() {
     let ground = Ground { place_m: Vector3::new(0.0, 0.0, -1.0), normal: Vector3::z() };
     let (scenario, _) = two(&[0.0; 6], &[0.0; 6], &|_| {});
     let felt = Quadrotor { ground_effect: true, ..scenario.airframe.quadrotor().expect("a quadrotor").clone() };
@@ -186,7 +186,7 @@ fn near_a_ground_thrust_grows_and_only_there() {
 }
 
 #[test]
-fn rotors_blow_on_a_vehicle_below_and_on_none_beside() {
+fn downwash_acts_below_rotors_and_not_beside() {
     // Momentum theory: 4.42 m/s through the discs of a Crazyflie in hover.
     let quarter_n = 0.25 * model("crazyflie").weight_n();
     let jet = Downwash::new(Vector3::zeros(), model("crazyflie").rotor_radius_m, quarter_n);
@@ -200,16 +200,16 @@ fn rotors_blow_on_a_vehicle_below_and_on_none_beside() {
         (1.0 - fleet.wrench(1).force_n.z / weight_n, 1.0 - fleet.wrench(0).force_n.z / weight_n)
     };
     let below = [0.3, 0.6, 1.0].map(|depth_m| push(Vector3::new(0.0, 0.0, -depth_m), true));
-    // Drag alone, without the thrust that an inflow takes.
+    // Drag alone, without the loss of thrust by the inflow.
     for ((found, above), expected) in below.into_iter().zip([0.22, 0.13, 0.10]) {
         assert!((found - expected).abs() < 0.01 && above.abs() < 1e-12, "{found} of the weight, {above}");
     }
     assert!(push(Vector3::new(0.5, 0.0, -0.3), true).0.abs() < 1e-9, "half a metre beside");
-    assert!(push(Vector3::new(0.0, 0.0, -0.3), false).0.abs() < 1e-12, "not unless asked for");
+    assert!(push(Vector3::new(0.0, 0.0, -0.3), false).0.abs() < 1e-12, "off by default");
 }
 
 #[test]
-fn what_rotors_cannot_do_they_do_as_far_as_they_go() {
+fn rotor_speeds_saturate_at_their_limits() {
     let (_, fleet) = two(&[0.0; 6], &[0.0; 6], &|_| {});
     let (dynamics, state) = (&fleet.dynamics, &fleet.states[0]);
     let most_rpm = tautline_sim::vehicle::RotorCurve::of(dynamics.model()).speed_rpm(dynamics.model().max_thrust_n);
@@ -217,7 +217,7 @@ fn what_rotors_cannot_do_they_do_as_far_as_they_go() {
         let asked_rpm: Vector4<f64> = dynamics.asked_rpm(state, command_m_s2);
         assert!(asked_rpm.iter().all(|rpm| (0.0..=most_rpm).contains(rpm)), "{command_m_s2}: {asked_rpm}");
     }
-    // Held level it is the weight that the rotors are asked for, and a tilted vehicle turns back before it climbs.
+    // A level hover needs the rotors to carry the weight; a tilted vehicle turns back before it climbs.
     let level = dynamics.asked_rpm(state, Vector3::zeros());
     assert!((level - Vector4::repeat(dynamics.hover_rpm())).amax() <= 1e-6);
     let climbing = dynamics.asked_rpm(state, Vector3::z() * GRAVITY_M_S2);
@@ -252,7 +252,7 @@ fn a_dead_quadrotor_falls_and_one_that_loses_a_rotor_turns_over_in_either_plant(
         };
         let (ending, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"dead\"}");
         assert_eq!(ending, Ending::Completed);
-        // A second of fall, less what rotors still push as they slow down and what their drag brakes.
+        // A second of fall, less the remaining push and drag of the slowing rotors.
         assert!((-4.9..-3.5).contains(&heights_m[3]) && heights_m[0].abs() < 1e-3, "{plant}: {heights_m:?}");
         let (_, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"rotor\", rotor=2}");
         assert!(heights_m[3] < -0.5 && heights_m[0].abs() < 1e-3, "{plant}: {heights_m:?}");

@@ -13,18 +13,18 @@ use tautline_sim::plant::{Path, Quadrotors, rapier};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::vehicle::{self, Airframe, Fleet, MODELS, Model, Quadrotor, State};
 
-/// A built-in model.
+/// Returns a built-in model.
 fn model(name: &str) -> Model {
     let (_, text) = MODELS.iter().find(|(known, _)| *known == name).expect("a built-in model");
     vehicle::read(text).expect("a right model")
 }
 
-/// A model that no air slows down.
+/// Returns a model without drag.
 fn without_drag(name: &str) -> Model {
     Model { rotor_drag_n_s_m: [0.0; 3], parasitic_drag_n_s2_m2: [0.0; 3], ..model(name) }
 }
 
-/// One of them by itself at the origin, in space, with an attitude loop at this rate.
+/// Returns one vehicle at the origin, in space, with a rate of the attitude loop.
 fn alone(model: Model, attitude_hz: f64) -> (Scenario, Fleet) {
     let start = Swarm::at_rest(Rows::zeros(1));
     let mut scenario = Scenario::new("alone", start, Formation::line(1, 1.0), 1.0, 1.0);
@@ -39,7 +39,8 @@ fn alone(model: Model, attitude_hz: f64) -> (Scenario, Fleet) {
     (scenario, fleet)
 }
 
-/// Steps a plant of quadrotors for a time \[s\] under a law of acceleration \[m/s^2\], from time and state, asked once a step.
+/// Advances a plant of quadrotors for a time \[s\] under accelerations \[m/s^2\] that depend on time and state, once
+/// per step.
 fn fly(
     plant: &mut dyn Quadrotors,
     (duration_s, dt_s): (f64, f64),
@@ -55,7 +56,7 @@ fn fly(
     plant.fleet().states[0]
 }
 
-/// The same in the engine, with rotors that turn at these speeds \[rpm\] and no attitude loop.
+/// Advances the engine with constant rotor speeds \[rpm\] and no attitude loop.
 fn open_loop(
     model: Model,
     from: &dyn Fn(&mut State),
@@ -69,7 +70,7 @@ fn open_loop(
     fly(plant.as_mut(), (duration_s, dt_s), &mut |_, _| Vector3::zeros())
 }
 
-/// Observed orders of convergence: of errors over a ladder of steps, each half of the one before.
+/// Returns the observed orders of convergence for errors of steps, each half of the previous.
 fn orders(errors: &[f64]) -> Vec<f64> {
     errors.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect()
 }

@@ -1,4 +1,4 @@
-//! Torque-free rotation: symmetric and triaxial tops, in the plant and as the engine turns bodies by itself.
+//! Torque-free rotation: symmetric and triaxial tops, in the plant and in the bare engine.
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder, Vector};
@@ -6,10 +6,10 @@ use tautline_sim::vehicle::{Model, State};
 
 use super::{open_loop, orders, without_drag};
 
-/// Rates at the beginning \[rad/s\].
+/// Initial rates \[rad/s\].
 const SPIN_RAD_S: Vector3<f64> = Vector3::new(5.0, 0.0, 20.0);
 
-/// Spins in a vacuum for a time \[s\].
+/// Spins a body in a vacuum for a time \[s\].
 fn spun(model: Model, rates_rad_s: Vector3<f64>, duration_s: f64, hz: f64) -> State {
     let from = |state: &mut State| {
         state.rotors_rpm.fill(0.0);
@@ -18,7 +18,7 @@ fn spun(model: Model, rates_rad_s: Vector3<f64>, duration_s: f64, hz: f64) -> St
     open_loop(model, &from, nalgebra::Vector4::zeros(), (duration_s, 1.0 / hz))
 }
 
-/// Rates of a symmetric top: they turn about its axis at `(Jz - Jx)/Jx W_z`.
+/// Returns the rates of a symmetric top, which rotate about its axis at `(Jz - Jx)/Jx W_z`.
 fn symmetric(model: &Model, time_s: f64) -> Vector3<f64> {
     let [jx, _, jz] = model.inertia_kg_m2;
     let angle = (jz - jx) / jx * SPIN_RAD_S.z * time_s;
@@ -33,13 +33,13 @@ fn a_symmetric_top_wobbles_at_its_rate_to_second_order() {
         .map(|hz| (spun(model.clone(), SPIN_RAD_S, 1.0, hz).rates_rad_s - expected).norm());
     assert!(errors[0] <= 0.01, "{errors:?} rad/s");
     assert!(orders(&errors).iter().all(|order| (1.95..2.05).contains(order)), "{errors:?}");
-    // A body without a gyroscopic term, for its moments of inertia are equal, does not wobble.
+    // A body with equal moments of inertia has no gyroscopic term and does not wobble.
     let ball = Model { inertia_kg_m2: [16.8e-6; 3], ..model };
     assert!((spun(ball, SPIN_RAD_S, 1.0, 500.0).rates_rad_s - SPIN_RAD_S).norm() <= 1e-9);
     assert!((expected - SPIN_RAD_S).norm() > 1.0);
 }
 
-/// Rates after a second of the same body as the engine turns it by itself, with its own gyroscopic term.
+/// Returns the rates of the same body after a second in the bare engine, with its own gyroscopic term.
 fn spun_by_the_engine(model: &Model, hz: u32) -> Vector3<f64> {
     let mut world = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
     world.integration_parameters.num_solver_iterations = 1;
@@ -65,7 +65,7 @@ fn the_engines_own_gyroscopic_term_is_of_first_order() {
     assert!(errors[0] > 100.0 * ours, "{} and {ours} rad/s", errors[0]);
 }
 
-/// Jacobi's sn, cn and dn of an argument and a parameter m = k^2, by the arithmetic-geometric mean.
+/// Returns Jacobi's sn, cn and dn of an argument and a parameter m = k^2, by the arithmetic-geometric mean.
 fn jacobi(u: f64, m: f64) -> (f64, f64, f64) {
     let (mut a, mut b) = (vec![1.0], (1.0 - m).sqrt());
     let mut c = vec![m.sqrt()];
@@ -85,14 +85,14 @@ fn jacobi(u: f64, m: f64) -> (f64, f64, f64) {
 
 #[test]
 fn jacobis_functions_are_those_of_the_tables() {
-    // Abramowitz and Stegun, 16.1: sn(K) = 1; and for m = 0 and near 1 circular and hyperbolic functions.
+    // Abramowitz and Stegun, 16.1: sn(K) = 1; circular functions for m = 0 and hyperbolic ones near 1.
     let (sn, cn, _) = jacobi(1.854_074_677_301_372, 0.5);
     assert!((sn - 1.0).abs() <= 1e-12 && cn.abs() <= 1e-7, "{sn}, {cn}");
     let (sn, cn, dn) = jacobi(0.7, 0.0);
     assert!((sn - 0.7_f64.sin()).abs() + (cn - 0.7_f64.cos()).abs() + (dn - 1.0).abs() <= 1e-15);
 }
 
-/// Rates of a triaxial top with Jx < Jy < Jz that begins with `W_y = 0`, turning about z for the most part.
+/// Returns the rates of a triaxial top with Jx < Jy < Jz and `W_y = 0` at the start, rotating mostly about z.
 fn triaxial(model: &Model, begin: Vector3<f64>, time_s: f64) -> Vector3<f64> {
     let [x, y, z] = model.inertia_kg_m2;
     let energy = x * begin.x.powi(2) + z * begin.z.powi(2);

@@ -1,4 +1,4 @@
-//! The table `[vehicle]`: what it means, how it is written back, and what it refuses.
+//! The table `[vehicle]`: its meaning, its round trip, and its errors.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ fn refused(sets: &[&str]) -> ScenarioError {
 }
 
 #[test]
-fn what_cannot_be_flown_is_told_with_its_place_and_remedy() {
+fn wrong_vehicles_are_refused_at_their_place_with_a_remedy() {
     let rotor = |keys: &str| format!("failure=[{{vehicle=1, at_s=1, kind=\"rotor\", {keys}}}]");
     for (sets, code, remedy) in [
         (&["vehicle.model=\"crazyfly\""][..], "scenario/unknown-choice", "did you mean `crazyflie`?"),
@@ -38,7 +38,7 @@ fn what_cannot_be_flown_is_told_with_its_place_and_remedy() {
 }
 
 #[test]
-fn a_model_of_ones_own_is_a_file_beside_the_scenario() {
+fn a_custom_model_is_a_file_relative_to_the_scenario() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = format!("{}\n", builtin_text().replace("\"crazyflie\"", "\"mine.toml\""));
     fs::write(folder.path().join("own.toml"), scenario).expect("written");
@@ -47,7 +47,7 @@ fn a_model_of_ones_own_is_a_file_beside_the_scenario() {
     fs::write(folder.path().join("mine.toml"), &model).expect("written");
     let own = read().unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(own.mass_kg, [0.03; 5]);
-    // What was read is in the scenario, whatever becomes of the file.
+    // The scenario contains the model and no longer needs the file.
     let again = Source::Text { name: "again".to_owned(), text: own.resolved_toml() };
     fs::remove_file(folder.path().join("mine.toml")).expect("removed");
     assert_eq!(Scenario::read(&again, &[]).unwrap_or_else(|error| panic!("{error}")), own);
@@ -65,7 +65,7 @@ fn builtin_text() -> &'static str {
 }
 
 #[test]
-fn a_scenario_of_quadrotors_is_written_back_bit_for_bit() {
+fn a_scenario_of_quadrotors_is_written_and_read_back_bit_for_bit() {
     for sets in
         [&[][..], &["vehicle.attitude_rad_s=5.5", "vehicle.downwash=true"], &["time.control_hz=250", "time.dt_s=0.001"]]
     {
@@ -75,7 +75,7 @@ fn a_scenario_of_quadrotors_is_written_back_bit_for_bit() {
 }
 
 #[test]
-fn rates_mass_hull_and_drag_are_those_of_the_kind_of_vehicle() {
+fn rates_mass_hull_and_drag_depend_on_the_model() {
     let sets = ["swarm.mass_kg=7", "swarm.hull_radius_m=0.15", "swarm.a22_per_s=0.1"];
     let flown = builtin("crazyflies", &sets);
     assert_eq!((flown.mass_kg[0], flown.hull_radius_m[0], flown.a22_per_s), (0.0328, 0.07, 0.0));

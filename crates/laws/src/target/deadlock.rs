@@ -12,7 +12,7 @@ use tautline_core::swarm::{Rows, Swarm, mean_row, row};
 /// Condition for spreading slots or reassigning interchangeable vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum BreathingMode {
+pub enum DeadlockMode {
     /// When the swarm is stalled, under a law whose certificate can be computed again.
     #[default]
     Auto,
@@ -25,9 +25,9 @@ pub enum BreathingMode {
 /// Spreading of slots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Breathing {
+pub struct DeadlockOptions {
     /// Condition for spreading slots.
-    pub mode: BreathingMode,
+    pub mode: DeadlockMode,
     /// First scale of the slots about their centre; each further time on a leg it is larger by one.
     #[schemars(extend("minimum" = 1))]
     pub scale: f64,
@@ -44,17 +44,17 @@ fn is_zero(hold_s: &f64) -> bool {
     *hold_s == 0.0
 }
 
-impl Default for Breathing {
+impl Default for DeadlockOptions {
     fn default() -> Self {
-        Self { mode: BreathingMode::Auto, scale: 2.0, most: 8, hold_s: 0.0 }
+        Self { mode: DeadlockMode::Auto, scale: 2.0, most: 8, hold_s: 0.0 }
     }
 }
 
-impl Breathing {
+impl DeadlockOptions {
     /// Whether slots may be spread at all.
     #[must_use]
     pub fn is_on(&self) -> bool {
-        self.mode != BreathingMode::Off && self.most > 0
+        self.mode != DeadlockMode::Off && self.most > 0
     }
 }
 
@@ -125,14 +125,14 @@ enum Phase {
 /// Interchangeable vehicles are first reassigned to the slots with the least sum of squared distances. Slots are spread
 /// if the assignment is optimal already, or after `most` assignments on the leg.
 #[derive(Clone, Debug)]
-pub(super) struct Breather {
-    breathing: Breathing,
+pub(super) struct DeadlockResolver {
+    deadlock: DeadlockOptions,
     settling: Settling,
     tolerance_m: f64,
     freedom: Freedom,
     leader: Option<usize>,
     phase: Phase,
-    breaths: u32,
+    recoveries: u32,
     assignments: u32,
     /// Last change, until it is taken.
     change: Option<Change>,
@@ -164,9 +164,9 @@ impl Errors {
     }
 }
 
-impl Breather {
+impl DeadlockResolver {
     pub(super) fn new(
-        breathing: Breathing,
+        deadlock: DeadlockOptions,
         settling: Settling,
         leader: Option<usize>,
         arrival: Arrival,
@@ -174,7 +174,7 @@ impl Breather {
     ) -> Self {
         let phase = Phase::Flying { idle_since_s: None };
         let tolerance_m = MIN_ERROR * arrival.edge_error_m;
-        Self { breathing, settling, tolerance_m, freedom, leader, phase, breaths: 0, assignments: 0, change: None }
+        Self { deadlock, settling, tolerance_m, freedom, leader, phase, recoveries: 0, assignments: 0, change: None }
     }
 
     /// Removes the common position error of all vehicles from the errors.
@@ -185,7 +185,7 @@ impl Breather {
     /// Resets the recovery at the beginning of a leg.
     pub(super) fn begin_leg(&mut self) {
         self.phase = Phase::Flying { idle_since_s: None };
-        (self.breaths, self.assignments) = (0, 0);
+        (self.recoveries, self.assignments) = (0, 0);
     }
 
     /// Whether slots are those of the leg.
@@ -208,12 +208,12 @@ impl Breather {
     }
 
     /// Spreads the slots of a leg, unless the limit of times is reached.
-    fn breathe(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
-        if self.breaths >= self.breathing.most {
+    fn spread(&mut self, since_s: f64, leg: &Leg, target: &mut CurrentTarget) {
+        if self.recoveries >= self.deadlock.most {
             return;
         }
-        let scale = self.breathing.scale + f64::from(self.breaths);
-        self.breaths += 1;
+        let scale = self.deadlock.scale + f64::from(self.recoveries);
+        self.recoveries += 1;
         self.change = Some(Change::Spread { scale });
         self.phase = Phase::Spread { scale, since_s, idle_since_s: None };
         target.spread_formation(&leg.formation, scale, self.leader);
@@ -222,7 +222,7 @@ impl Breather {
     /// Reassigns interchangeable vehicles. Returns false if no assignment is better or the limit of assignments is
     /// reached.
     fn assign(&mut self, sensed: &Swarm, leg: &Leg, target: &mut CurrentTarget) -> bool {
-        if !leg.interchangeable || self.assignments >= self.breathing.most {
+        if !leg.interchangeable || self.assignments >= self.deadlock.most {
             return false;
         }
         let Some(slots) = better_assignment(&sensed.positions_m, &leg.formation, self.leader) else { return false };
@@ -238,12 +238,12 @@ impl Breather {
         let errors = Errors::of(sensed, &target.view(), self.freedom);
         match self.phase {
             Phase::Flying { idle_since_s } => {
-                let first = self.breathing.mode == BreathingMode::Start && self.breaths == 0;
+                let first = self.deadlock.mode == DeadlockMode::Start && self.recoveries == 0;
                 let since_s = self.is_idle(&errors).then(|| idle_since_s.unwrap_or(time_s));
                 self.phase = Phase::Flying { idle_since_s: since_s };
                 let stalled = since_s.is_some_and(|since_s| time_s - since_s >= self.stalled_s());
                 if first || (stalled && !self.assign(sensed, leg, target)) {
-                    self.breathe(time_s, leg, target);
+                    self.spread(time_s, leg, target);
                 }
             }
             Phase::Spread { scale, since_s, idle_since_s } => {
@@ -252,7 +252,7 @@ impl Breather {
                 self.phase = Phase::Spread { scale, since_s, idle_since_s };
                 // Vehicles without progress towards spread slots are not blocked by each other.
                 let gives_up = idle_since_s.is_some_and(|since_s| time_s - since_s >= GIVEN_UP_S.max(self.stalled_s()));
-                let is_held = time_s - since_s >= self.breathing.hold_s;
+                let is_held = time_s - since_s >= self.deadlock.hold_s;
                 if is_held && (errors.max_m < SETTLED * slots_m || gives_up) {
                     self.phase = Phase::Closing { scale, since_s: time_s };
                 }
@@ -306,16 +306,16 @@ mod tests {
     const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
 
     /// Returns the spread at times 0, 0.5, 1, ... while vehicle 2 is at x = `off_m(time)` \[m\].
-    fn spreads(breathing: Breathing, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
+    fn spreads(deadlock: DeadlockOptions, off_m: impl Fn(f64) -> f64, steps: u32) -> Vec<f64> {
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Fixed);
+        let mut resolver = DeadlockResolver::new(deadlock, SETTLING, None, ARRIVAL, Freedom::Fixed);
         (0..steps)
             .map(|k| {
                 let time_s = 0.5 * f64::from(k);
                 let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
                 swarm.positions_m[(1, 1)] = off_m(time_s);
-                breather.supervise(time_s, &swarm, &leg, &mut target);
+                resolver.supervise(time_s, &swarm, &leg, &mut target);
                 target.view().spread
             })
             .collect()
@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn slots_spread_after_a_stall_and_close_again() {
-        let found = spreads(Breathing::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
+        let found = spreads(DeadlockOptions::default(), |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 40);
         assert_eq!(found[..13], [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
         // Settled at 6 s: from then on 1 + exp(-t/2), until it falls below 1.01.
         assert!((found[14] - (1.0 + libm::exp(-0.5))).abs() < 1e-15, "{found:?}");
@@ -332,8 +332,8 @@ mod tests {
 
     #[test]
     fn spread_slots_are_held_for_the_given_time() {
-        let breathing = Breathing { hold_s: 9.0, ..Breathing::default() };
-        let found = spreads(breathing, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
+        let deadlock = DeadlockOptions { hold_s: 9.0, ..DeadlockOptions::default() };
+        let found = spreads(deadlock, |time_s| if time_s < 6.0 { 0.5 } else { 0.0 }, 60);
         // Spread at 2 s, settled at 6 s, held to 11 s.
         assert!(found[4..=22].iter().all(|&spread| spread == 2.0), "{found:?}");
         assert!((found[23] - (1.0 + libm::exp(-0.25))).abs() < 1e-15, "{found:?}");
@@ -341,17 +341,17 @@ mod tests {
 
     #[test]
     fn slots_spread_further_each_time_up_to_the_limit() {
-        let breathing = Breathing { most: 2, ..Breathing::default() };
+        let deadlock = DeadlockOptions { most: 2, ..DeadlockOptions::default() };
         // Settles whenever slots are spread, and has an error again when they are not.
         let leg = Leg::first(Formation::line(2, 2.0));
         let mut target = CurrentTarget::first_of(std::slice::from_ref(&leg)).expect("a leg");
-        let mut breather = Breather::new(breathing, SETTLING, None, ARRIVAL, Freedom::Translation);
+        let mut resolver = DeadlockResolver::new(deadlock, SETTLING, None, ARRIVAL, Freedom::Translation);
         let mut begun = Vec::new();
         for k in 0..400 {
             let mut swarm = Swarm::at_rest(target.view().formation.slots_m.clone());
-            swarm.positions_m[(1, 1)] += if breather.is_closed() { 0.5 } else { 0.0 };
-            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
-            begun.extend(breather.take_change());
+            swarm.positions_m[(1, 1)] += if resolver.is_closed() { 0.5 } else { 0.0 };
+            resolver.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            begun.extend(resolver.take_change());
         }
         assert_eq!(begun, [2.0, 3.0].map(|scale| Change::Spread { scale }));
         assert_eq!(target.view().spread, 1.0);
@@ -359,10 +359,10 @@ mod tests {
 
     #[test]
     fn slots_stay_on_arrival_or_with_mode_off_and_spread_with_mode_start() {
-        assert!(spreads(Breathing::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
-        let off = Breathing { mode: BreathingMode::Off, most: 0, ..Breathing::default() };
+        assert!(spreads(DeadlockOptions::default(), |_| 0.02, 20).iter().all(|&spread| spread == 1.0), "near enough");
+        let off = DeadlockOptions { mode: DeadlockMode::Off, most: 0, ..DeadlockOptions::default() };
         assert!(spreads(off, |_| 0.5, 20).iter().all(|&spread| spread == 1.0));
-        let start = Breathing { mode: BreathingMode::Start, ..Breathing::default() };
+        let start = DeadlockOptions { mode: DeadlockMode::Start, ..DeadlockOptions::default() };
         assert_eq!(spreads(start, |_| 0.0, 1), [2.0]);
     }
 
@@ -370,13 +370,13 @@ mod tests {
     fn changes(leg: &Leg, leader: Option<usize>, at_m: [f64; 3]) -> Vec<Change> {
         let mut target = CurrentTarget::first_of(std::slice::from_ref(leg)).expect("a leg");
         let mut leg = leg.clone();
-        let mut breather = Breather::new(Breathing::default(), SETTLING, leader, ARRIVAL, Freedom::Fixed);
+        let mut resolver = DeadlockResolver::new(DeadlockOptions::default(), SETTLING, leader, ARRIVAL, Freedom::Fixed);
         let mut swarm = Swarm::at_rest(leg.formation.slots_m.clone());
         (0..3).for_each(|i| swarm.positions_m[(i, 0)] = at_m[i]);
         let mut found = Vec::new();
         for k in 0..20 {
-            breather.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
-            if let Some(change) = breather.take_change() {
+            resolver.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
+            if let Some(change) = resolver.take_change() {
                 if let Change::Assigned { slots } = &change {
                     super::super::assign_anew(std::slice::from_mut(&mut leg), 0, slots);
                     assert_eq!(target.view().formation, &leg.formation);
