@@ -333,7 +333,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     circle.graph.clone().pretend_a_bound();
     let bound = check(&circle);
     assert_eq!(serde_json::to_value(&bound).expect("plain data")["connectivity_is"], "bound");
-    assert!(bound.text().contains("a bound from below"), "{}", bound.text());
+    assert!(bound.text().contains("a lower bound"), "{}", bound.text());
     assert_eq!(json["rigidity"], serde_json::json!({"rank": 9, "needed": 12, "rigid": false}));
     for warning in json["warnings"].as_array().expect("a list") {
         assert_eq!(warning.as_object().expect("a table").keys().collect::<Vec<_>>(), ["code", "message"]);

@@ -184,8 +184,8 @@ const PLACES: Columns = Columns {
     names: &[&["t", "time"], &["x"], &["y"], &["z"]],
     needed: 3,
     row: "a point has t, x, y and optionally z",
-    help: "write a time in s and a position in m per line, in order of time, such as 0.5,1.0,2.0. A first line may name \
-           the columns t, x, y, z",
+    help: "write a time in s and a position in m per line, in order of time, such as 0.5,1.0,2.0. A first line may \
+           name the columns t, x, y, z",
 };
 
 /// Reads slots from a file with the columns x, y and optionally z in m.

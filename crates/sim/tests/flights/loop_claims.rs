@@ -318,7 +318,7 @@ impl Law for Asked {
     }
 
     fn command(&mut self, _: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        self.by.lock().expect("nobody panicked").insert(format!("{:?}", std::thread::current().id()));
+        self.by.lock().expect("no thread panicked").insert(format!("{:?}", std::thread::current().id()));
         command.fill(0.0);
         Ok(())
     }
@@ -337,7 +337,7 @@ fn a_law_that_requires_the_calling_thread_runs_on_no_other() {
         let by = Arc::new(Mutex::new(BTreeSet::new()));
         let parts =
             Parts { law: Box::new(Asked { stays, by: Arc::clone(&by) }), ..Parts::of(&scenario).expect("parts") };
-        let many = || by.lock().expect("nobody panicked").len();
+        let many = || by.lock().expect("no thread panicked").len();
         let enough = |step: u64| stays && step == 300 || many() > 1;
         let mut go_on = |step| if enough(step) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         pool.install(|| sim::fly(&scenario, parts, &mut (), &mut go_on)).expect("a flight");
