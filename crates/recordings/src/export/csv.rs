@@ -1,6 +1,6 @@
-//! A long table in text: `t_s,id,x,y,z`, and where they are known `vx,vy,vz` and `radius`.
+//! Writes a long table in CSV: `t_s,id,x,y,z`, and if known `vx,vy,vz` and `radius`.
 //!
-//! Numbers are written with as few digits as give the same bits again.
+//! Each number has the fewest digits that give the same bits when read back.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -8,7 +8,7 @@ use std::io::{BufWriter, Write};
 use super::ExportError;
 use super::source::{About, Column, Source};
 
-/// From here on a reader counts times from an epoch again \[s\].
+/// Smallest epoch that a reader restores from absolute times \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<Option<String>, ExportError> {
@@ -46,10 +46,11 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     })?;
     out.flush()?;
     let lost = about.clock.epoch_ns != 0 && !absolute;
-    Ok(lost.then(|| format!("times count from {} ns, which the table does not say", about.clock.epoch_ns)))
+    Ok(lost.then(|| format!("the table does not contain its epoch: times count from {} ns", about.clock.epoch_ns)))
 }
 
-/// A time from an epoch on in decimal digits: whole seconds are added exactly. An epoch lies after 1970.
+/// Formats an absolute time in decimal digits; the whole seconds are added exactly. The epoch is after 1970, or 0 for
+/// none.
 fn time_text(epoch_s: i64, time_s: f64) -> String {
     if epoch_s == 0 {
         return format!("{time_s:?}");
@@ -60,8 +61,8 @@ fn time_text(epoch_s: i64, time_s: f64) -> String {
     let (whole, fraction) = if time_s >= 0.0 {
         (whole.and_then(|whole| epoch_s.checked_add(whole)), fraction.to_owned())
     } else {
-        let (lent_s, rest) = short_of_a_second(fraction);
-        (whole.and_then(|whole| epoch_s.checked_sub(whole + lent_s)), rest)
+            let (borrowed_s, rest) = complement_of_fraction(fraction);
+            (whole.and_then(|whole| epoch_s.checked_sub(whole + borrowed_s)), rest)
     };
     match whole {
         Some(whole @ 0..) => format!("{whole}.{fraction}"),
@@ -69,15 +70,15 @@ fn time_text(epoch_s: i64, time_s: f64) -> String {
     }
 }
 
-/// What is left of a second without these decimals: 1, and the ten's complement of the digits; 0 where there are none.
-fn short_of_a_second(decimals: &str) -> (i64, String) {
+/// Returns `1 - 0.decimals` as a borrowed second and the ten's complement of the digits; 0 and "0" if all digits are 0.
+fn complement_of_fraction(decimals: &str) -> (i64, String) {
     let digits = decimals.trim_end_matches('0').as_bytes();
     let Some((last, leading)) = digits.split_last() else { return (0, "0".to_owned()) };
     let nines = leading.iter().map(|digit| char::from(b'0' + b'9' - digit));
     (1, nines.chain([char::from(b'0' + (b'0' + 10 - last))]).collect())
 }
 
-/// A name as a field of a line.
+/// Quotes a name as a CSV field if needed.
 fn quoted(name: &str) -> Result<String, ExportError> {
     if name.is_empty() || name.trim() != name || name.contains(['\n', '\r']) {
         return Err(ExportError::Name(name.to_owned()));

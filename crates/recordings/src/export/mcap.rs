@@ -1,5 +1,6 @@
-//! An MCAP file with the messages of [`crate::read`]'s exported recordings, `/vehicles` and `/tracks`, and a topic for each
-//! channel as in `run.mcap`, with a row for each vehicle of the message on `/tracks` behind it.
+//! Writes an MCAP file with the topics `/vehicles` and `/tracks`, and one topic per channel as in `run.mcap`.
+//!
+//! A channel message has one row per vehicle of the `/tracks` message that follows it.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -13,7 +14,7 @@ use crate::mcap::{ChannelMessage, channel_topic, topic_of_channel};
 use crate::read::mcap::own::{Instant, TRACKS, VEHICLES, Vehicles};
 use tautline_core::track::Sample;
 
-/// Size at which a chunk is closed \[bytes\].
+/// Chunk size \[bytes\].
 const CHUNK_BYTES: u64 = 1024 * 1024;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {

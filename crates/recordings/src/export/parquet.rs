@@ -1,4 +1,4 @@
-//! A long table in Parquet, with the columns of the table in text.
+//! Writes a long table in Parquet with the columns of the CSV export.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use super::source::{About, Source};
 use crate::read::parquet::EPOCH_KEY;
 use tautline_core::track::Sample;
 
-/// Rows of a group, which is built in memory.
+/// Number of rows of a row group, which is built in memory.
 const GROUP_ROWS: usize = 200_000;
 
 pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
