@@ -61,8 +61,8 @@ fn time_text(epoch_s: i64, time_s: f64) -> String {
     let (whole, fraction) = if time_s >= 0.0 {
         (whole.and_then(|whole| epoch_s.checked_add(whole)), fraction.to_owned())
     } else {
-            let (borrowed_s, rest) = complement_of_fraction(fraction);
-            (whole.and_then(|whole| epoch_s.checked_sub(whole + borrowed_s)), rest)
+        let (borrowed_s, rest) = complement_of_fraction(fraction);
+        (whole.and_then(|whole| epoch_s.checked_sub(whole + borrowed_s)), rest)
     };
     match whole {
         Some(whole @ 0..) => format!("{whole}.{fraction}"),

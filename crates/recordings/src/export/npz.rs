@@ -83,7 +83,7 @@ struct FailsOnce<W> {
 impl<W> FailsOnce<W> {
     fn attempt<T>(&mut self, discarded: T, action: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
         if self.failed {
-                return Ok(discarded);
+            return Ok(discarded);
         }
         let done = action(&mut self.inner);
         self.failed = done.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
@@ -158,8 +158,11 @@ impl<'a> Archive<'a> {
     /// Writes a channel, NaN for unknown values, and the names of its columns.
     fn channel(&mut self, channel: &Written, times: usize) -> Result<(), ExportError> {
         let (source, vehicles, width) = (self.source, self.vehicles, channel.columns.len());
-        let name =
-            if RESERVED.contains(&&*channel.name) { format!("channel_{}", channel.name) } else { channel.name.to_string() };
+        let name = if RESERVED.contains(&&*channel.name) {
+            format!("channel_{}", channel.name)
+        } else {
+            channel.name.to_string()
+        };
         let unknown = vec![f64::NAN; width];
         let mut out = BufWriter::new(self.begin(&name, "<f8", &[times, vehicles, width])?);
         source.each_instant(|instant, channels| {

@@ -187,7 +187,7 @@ fn chunk_records(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     let packed = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
     let mut packed = packed.ok_or("the chunk is shorter than its header declares")?;
     if unpacked_bytes > RECORD_LIMIT_BYTES {
-            return Err("the chunk declares an unpacked size above 256 MiB");
+        return Err("the chunk declares an unpacked size above 256 MiB");
     }
     let mut records = Vec::new();
     let read = match compression {
@@ -198,7 +198,7 @@ fn chunk_records(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     };
     read.map_err(|_| "the packed content of the chunk is wrong")?;
     if records.len() as u64 != unpacked_bytes {
-            return Err("the chunk is shorter than its header declares");
+        return Err("the chunk is shorter than its header declares");
     }
     if crc != 0 && crc32fast::hash(&records) != crc { Err("the checksum of the chunk is wrong") } else { Ok(records) }
 }

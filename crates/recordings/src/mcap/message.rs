@@ -344,8 +344,8 @@ impl EventMessage<String> {
             !slots.is_empty() && sorted.into_iter().eq(0..slots.len())
         };
         slots
-                .filter(is_permutation)
-                .ok_or_else(|| Own::Events.fault("the slots are not a permutation of the vehicles".to_owned()))
+            .filter(is_permutation)
+            .ok_or_else(|| Own::Events.fault("the slots are not a permutation of the vehicles".to_owned()))
     }
 
     fn leg(&self) -> Result<usize, ReadFault> {

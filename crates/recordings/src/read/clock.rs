@@ -253,8 +253,8 @@ impl Timing {
         };
         let (unit, why, by_steps) = known.map_or_else(inferred, |unit| (unit, None, false));
         let name = unit.name();
-        let note =
-            why.map(|why| format!("times carry no unit and are taken as {name}, {why} (confirm with --time-unit {name})"));
+        let note = why
+            .map(|why| format!("times carry no unit and are taken as {name}, {why} (confirm with --time-unit {name})"));
         let per_second = unit.per_second();
         let seconds = probe.first.digits().0.div_euclid(per_second);
         let fits = probe.first.approximately().abs() < TOP;
@@ -369,11 +369,7 @@ pub(super) fn time_columns(header: &[String], options: &ReadOptions) -> Result<O
             if options.time_unit.is_some() || options.times_per_second.is_some() {
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
-                return refuse(
-                    "recording/contradicts-option",
-                    problem,
-                        "omit --time-unit, --fps and --time-scale",
-                );
+                return refuse("recording/contradicts-option", problem, "omit --time-unit, --fps and --time-scale");
             }
             Ok(Some((whole.column, Some(rest))))
         }
@@ -412,11 +408,7 @@ fn split(whole: &Candidate, rest: &Candidate) -> Option<Rest> {
 fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     let (first, second) = (quoted(&header[a.column]), quoted(&header[b.column]));
     let problem = format!("the columns {first} and {second} both give the time");
-    Fault::coded(
-        "recording/ambiguous-column",
-        problem,
-        "name one of them with --column t=NAME, or remove the other",
-    )
+    Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
 }
 
 /// Returns the unit in the name of a time column, unless the user gives the unit.
@@ -432,8 +424,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
-        let remedy =
-                "set its length in seconds with --time-scale, such as 60 for minutes, or name it with --time-unit";
+        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes, or name it with --time-unit";
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }

@@ -139,11 +139,9 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
-        _ if options.dimensions.is_some() => refuse(
-            "recording/contradicts-option",
-            "its header defines the numbers of a vehicle",
-            "omit --dimensions",
-        ),
+        _ if options.dimensions.is_some() => {
+            refuse("recording/contradicts-option", "its header defines the numbers of a vehicle", "omit --dimensions")
+        }
         // A line above numbers may be a comment instead of a header.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
@@ -208,8 +206,7 @@ impl Text {
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
         if format == Format::TRAJNET && !(numeric && self.header.len() == TRAJNET_COLUMNS.len()) {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
-            let remedy =
-                "a TrajNet table has frame, vehicle, x and y in each line, and no header; omit --format";
+            let remedy = "a TrajNet table has frame, vehicle, x and y in each line, and no header; omit --format";
             return refuse("recording/wrong-format", problem, remedy);
         }
         if numeric {
@@ -567,7 +564,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             return refuse(
                 "recording/field-count",
                 problem,
-                    "write t x y z x y z ..., one line per time, or set --dimensions",
+                "write t x y z x y z ..., one line per time, or set --dimensions",
             );
         }
     };

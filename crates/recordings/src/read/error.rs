@@ -9,8 +9,7 @@ use super::readers::Format;
 const LONGEST_QUOTE: usize = 60;
 
 /// Remedy for a position that is not finite.
-pub(super) const UNSEEN: &str =
-    "remove the row, or leave the cells empty: a vehicle that was not seen has no position";
+pub(super) const UNSEEN: &str = "remove the row, or leave the cells empty: a vehicle that was not seen has no position";
 
 const NOTHING_RECORDED: &str = "record again, or give another file";
 
@@ -42,7 +41,7 @@ impl ReadError {
     /// Adds the remedy for one of several files, which may not belong to the recording.
     pub(super) fn among_others(mut self) -> Self {
         if let Fault::Content { remedy, .. } = &mut self.fault {
-                remedy.push_str("; or remove the file if it does not belong to the recording");
+            remedy.push_str("; or remove the file if it does not belong to the recording");
         }
         self
     }
@@ -214,11 +213,7 @@ impl Fault {
 
     /// Returns the fault of a value that overflows in metres or seconds.
     pub(super) fn out_of_range() -> Self {
-        Self::coded(
-            "recording/overflow",
-            "a value exceeds the range of numbers",
-            "check --scale and the values",
-        )
+        Self::coded("recording/overflow", "a value exceeds the range of numbers", "check --scale and the values")
     }
 
     fn code(&self) -> &'static str {

@@ -142,7 +142,7 @@ impl Layout {
         layout.notes.extend(convention.note.clone());
         if is_planar {
             let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
-                layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
+            layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
         }
         layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
         layout.convention = convention;
@@ -175,7 +175,7 @@ impl Layout {
                 refuse(
                     "recording/several-frames",
                     problem,
-                        "name the axes of all positions alike, as in `x_ned` or `north`",
+                    "name the axes of all positions alike, as in `x_ned` or `north`",
                 )
             }
             _ => Ok(()),
@@ -194,11 +194,7 @@ impl Layout {
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return refuse(
-                "recording/contradicts-option",
-                format!("{namer} names the vehicles"),
-                    "omit --one-vehicle",
-            );
+            return refuse("recording/contradicts-option", format!("{namer} names the vehicles"), "omit --one-vehicle");
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -221,7 +217,7 @@ impl Layout {
             return refuse(
                 "recording/ambiguous-column",
                 problem,
-                    "rename the columns of each vehicle, or remove these columns",
+                "rename the columns of each vehicle, or remove these columns",
             );
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
@@ -229,7 +225,7 @@ impl Layout {
         if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { code, problem, remedy } => {
-                        let remedy = format!("{remedy}; if all rows are of one vehicle, use --one-vehicle");
+                    let remedy = format!("{remedy}; if all rows are of one vehicle, use --one-vehicle");
                     Fault::coded(code, problem, remedy)
                 }
                 fault => fault,
@@ -495,11 +491,7 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
-                    Fault::coded(
-                        "recording/unknown-unit",
-                        problem,
-                            "write degrees, without a unit in the column name",
-                    )
+                    Fault::coded("recording/unknown-unit", problem, "write degrees, without a unit in the column name")
                 })?;
                 continue;
             }
@@ -511,7 +503,7 @@ impl<'a> Columns<'a> {
             let size = heading::size_of(unit, is_velocity(role)).ok_or_else(|| {
                 let problem = format!("column {name} has an unknown unit of {what}, {}", quoted(unit));
                 let remedy =
-                        "use m, cm, mm, km, ft or in, or name the column with --column and set its unit with --scale";
+                    "use m, cm, mm, km, ft or in, or name the column with --column and set its unit with --scale";
                 Fault::coded("recording/unknown-unit", problem, remedy)
             })?;
             metres[column] = size;
@@ -538,7 +530,7 @@ impl<'a> Columns<'a> {
             return refuse(
                 "recording/unit-conflict",
                 problem,
-                    "put a unit into the name of each column, as in `x [mm]`",
+                "put a unit into the name of each column, as in `x [mm]`",
             );
         }
         if scale != 1.0 {
@@ -546,7 +538,7 @@ impl<'a> Columns<'a> {
             return refuse(
                 "recording/contradicts-option",
                 problem,
-                    "omit --scale, or remove the units from the header",
+                "omit --scale, or remove the units from the header",
             );
         }
         Ok(metres)

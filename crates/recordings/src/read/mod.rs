@@ -131,12 +131,12 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
         if bag::is_bag(path) {
-                let remedy = "open it without --join; its topics are the vehicles";
-                return refuse("recording/several-vehicles", "it is a ROS 2 bag, not a file with one vehicle", remedy);
+            let remedy = "open it without --join; its topics are the vehicles";
+            return refuse("recording/several-vehicles", "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
         let folder = Folder::open(path)?;
         let remedy =
-                "give a folder with one table or polynomial file (.csv) per vehicle, or with one folder per vehicle";
+            "give a folder with one table or polynomial file (.csv) per vehicle, or with one folder per vehicle";
         return if folder.is_empty() { Err(folder.without_tables("folder", remedy).into()) } else { Ok(Some(folder)) };
     }
     if !data.is_file() {

@@ -55,7 +55,9 @@ impl ArrayAxis {
     /// A message with the names of all layouts, if the name is unknown.
     pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
         let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
-        layout.ok_or_else(|| format!("unknown layout `{name}`; use one of {}", Self::LAYOUTS.map(Self::layout_name).join(" ")))
+        layout.ok_or_else(|| {
+            format!("unknown layout `{name}`; use one of {}", Self::LAYOUTS.map(Self::layout_name).join(" "))
+        })
     }
 }
 
@@ -266,7 +268,7 @@ impl ReadOptions {
             return refuse(
                 "recording/option-out-of-range",
                 problem,
-                    "give a positive number of metres per unit of length",
+                "give a positive number of metres per unit of length",
             );
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
@@ -278,7 +280,8 @@ impl ReadOptions {
             );
         }
         if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
-            let problem = format!("the unit of time is given twice: --time-unit {}, and --fps or --time-scale", unit.name());
+            let problem =
+                format!("the unit of time is given twice: --time-unit {}, and --fps or --time-scale", unit.name());
             let remedy = "omit --time-unit, or --fps and --time-scale";
             return refuse("recording/two-time-units", problem, remedy);
         }
@@ -299,7 +302,7 @@ impl ReadOptions {
             return refuse(
                 "recording/option-out-of-range",
                 problem,
-                    "give three finite numbers other than 0, such as 1,1,-1",
+                "give three finite numbers other than 0, such as 1,1,-1",
             );
         }
         Ok(())
@@ -311,12 +314,7 @@ impl ReadOptions {
         let is_one_vehicle = self.one_vehicle && !self.is_joined;
         let given = [
             (self.time_unit.is_some(), Takes::TimeUnit, "--time-unit", "has a fixed unit of time"),
-            (
-                self.times_per_second.is_some(),
-                Takes::TimeUnit,
-                "--fps and --time-scale",
-                    "has a fixed unit of time",
-            ),
+            (self.times_per_second.is_some(), Takes::TimeUnit, "--fps and --time-scale", "has a fixed unit of time"),
             (self.sort, Takes::Rows, "--sort", "holds curves in order of time"),
             (self.duplicates.is_some(), Takes::Rows, "--duplicates", "holds curves, not rows"),
             (self.dimensions.is_some(), Takes::Dimensions, "--dimensions", "defines the numbers of a vehicle"),
@@ -332,7 +330,7 @@ impl ReadOptions {
         ];
         match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.takes.contains(of)) {
             Some((.., option, why)) => {
-                    refuse("recording/unused-option", format!("{} {why}", format.title), format!("omit {option}"))
+                refuse("recording/unused-option", format!("{} {why}", format.title), format!("omit {option}"))
             }
             None => Ok(()),
         }
