@@ -1,4 +1,4 @@
-//! MCAP recordings of other programs: files that follow each other, and poses brought into one frame.
+//! Reads MCAP recordings of other programs: consecutive files, and poses transformed to one frame.
 
 use nalgebra::{Point3, Vector3};
 
@@ -15,27 +15,27 @@ use super::plan::{Plan, Way};
 use super::tree::{Known, Placed};
 use crate::mcap::topic::{Message, Part, TopicReader};
 
-/// Opens a recording in some files that follow each other; `whole` is what is called so.
+/// Opens a recording in consecutive files; `whole` is the source named in errors.
 pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
     let plan = Plan::of(&mut splits, options)?;
     let none = plan.none();
     let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
     about.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
-    // Messages that are there twice are those of a bag that is.
+    // Duplicates of messages indicate overlapping files and are refused by default.
     about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
     let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, about)?))
 }
 
-/// A recording of others.
+/// Rows of a foreign recording.
 struct Foreign {
     splits: Splits,
     poses: Poses,
     /// Whether all topics hold lists of poses.
     listed: bool,
-    /// The names of the vehicles as they are shown.
+    /// Displayed names of the vehicles.
     shown: Vec<String>,
-    /// Messages before each file.
+    /// Number of messages before each file.
     starts: Vec<u64>,
 }
 
@@ -71,7 +71,7 @@ impl Rows for Foreign {
         &self.shown
     }
 
-    /// Poses of a single topic are called by their numbers alone.
+    /// Names the poses of a single topic by their numbers alone.
     fn settle_names(&mut self) {
         let names = &mut self.poses.names;
         let plain: Option<Vec<(&str, u64)>> = names
@@ -111,17 +111,17 @@ impl Rows for Foreign {
     }
 }
 
-/// The parts of some files, in their order. One that is packed is unpacked while it is read.
+/// Parts of consecutive files, in order. Compressed files are unpacked one at a time.
 pub(super) struct Splits {
     files: Vec<Source>,
-    /// Number of the next file.
+    /// Index of the next file.
     next: usize,
-    /// The current file, and what it is read from.
+    /// Reader and source of the current file.
     open: Option<(TopicReader, Source)>,
     options: ReadOptions,
     /// Lower bound of the number of messages.
     least_messages: u64,
-    /// What is to be said of files that were not closed, which the user accepts.
+    /// Notes on unclosed files that the user accepts.
     pub(super) notes: Vec<String>,
 }
 
@@ -130,17 +130,17 @@ impl Splits {
         Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
     }
 
-    /// How many files have been opened since the start.
+    /// Returns the number of files opened since the start.
     pub(super) fn opened_files(&self) -> usize {
         self.next
     }
 
-    /// Starts again with the first file.
+    /// Restarts at the first file.
     pub(super) fn rewind(&mut self) {
         (self.next, self.open) = (0, None);
     }
 
-    /// Takes the next part; `false` behind the last one.
+    /// Passes the next part to `take`; returns `false` after the last one.
     pub(super) fn visit(&mut self, take: impl FnOnce(Part<'_>) -> Result<(), ReadError>) -> Result<bool, ReadError> {
         loop {
             if let Some((topics, source)) = &mut self.open {
@@ -171,8 +171,8 @@ impl Splits {
         }
     }
 
-    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error, unless a
-    /// file was not closed and the user accepts what it holds.
+    /// Passes every part to `take`, from the first one on, and restarts. Missing messages are an error, unless the user
+    /// accepts an unclosed file.
     pub(super) fn visit_all(
         &mut self,
         mut take: impl FnMut(Part<'_>) -> Result<(), ReadError>,
@@ -187,7 +187,7 @@ impl Splits {
         self.rewind();
         if messages < self.least_messages {
             let problem =
-                format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
+                format!("its files have {messages} messages, but metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
                 return refuse("recording/bag-index", problem, "copy the whole folder again");
             }
@@ -197,29 +197,29 @@ impl Splits {
     }
 }
 
-/// Positions out of messages.
+/// Converter of messages to positions.
 pub(super) struct Poses {
     plan: Plan,
-    /// The frame of all positions so far, and the topic that it was met on.
+    /// Frame of all positions so far, and the topic of its first occurrence.
     frame: Option<(String, String)>,
-    /// Topic and place, or frame, of each vehicle.
+    /// Name of each vehicle: topic and index, or frame.
     pub(super) names: Names,
     /// Vehicle of the last row.
     vehicle: usize,
     pub(super) messages: u64,
-    /// Fixes that are none.
+    /// Number of positions without a fix.
     no_fixes: u64,
     brought: Brought,
 }
 
-/// How many positions were brought into the frame that is asked for, and how.
+/// Number of positions transformed to the requested frame, by accuracy.
 #[derive(Clone, Copy, Default)]
 struct Brought {
-    /// By transforms of their very time.
+    /// By transforms at the time of the position.
     exactly: u64,
-    /// By a transform between two of its samples.
+    /// By a transform interpolated between two samples.
     guessed: u64,
-    /// Not at all, because a transform is not known then.
+    /// Omitted, because a transform is unknown at that time.
     unknown: u64,
 }
 
@@ -229,7 +229,7 @@ impl Poses {
         Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, brought }
     }
 
-    /// Starts again with the first message.
+    /// Restarts at the first message.
     pub(super) fn rewind(&mut self) {
         (self.messages, self.no_fixes, self.brought) = (0, 0, Brought::default());
     }
@@ -262,7 +262,7 @@ impl Poses {
         self.push(&name, time_ns, position, rows)
     }
 
-    /// A pose in the frame that all is brought into; none where it cannot be brought there.
+    /// Returns a pose in the requested frame; `None` if it cannot be transformed.
     fn position(&mut self, seen: &Seen, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
         let Some(wanted) = &self.plan.wanted else {
             self.check_frame(&seen.frame, topic)?;
@@ -270,11 +270,11 @@ impl Poses {
             return local.map_or(Ok(seen.position), |local| local.place(seen.position)).map(Some);
         };
         if wanted == EARTH {
-            let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
+            let problem = format!("{EARTH} is not a metric frame: its positions are latitudes and longitudes");
             return refuse(
                 "recording/unusable-frame",
                 problem,
-                "leave --frame out, or name a frame of poses; --topic says which topics are read",
+                "omit --frame, or name a frame of poses; choose topics with --topic",
             );
         }
         if *wanted == seen.frame {
@@ -285,7 +285,7 @@ impl Poses {
         Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
     }
 
-    /// Appends the vehicles that are seen with a transform.
+    /// Appends the vehicles whose poses follow from a transform.
     fn append_bodies(
         &mut self,
         seen: &Seen,
@@ -326,7 +326,7 @@ impl Poses {
         Ok(())
     }
 
-    /// Refuses a position in another frame than those before.
+    /// Refuses a position in another frame than the earlier ones.
     fn check_frame(&mut self, frame: &str, topic: &str) -> Result<(), Fault> {
         match &self.frame {
             None => self.frame = Some((frame.to_owned(), topic.to_owned())),
@@ -334,20 +334,20 @@ impl Poses {
             Some((known, first)) => {
                 let (known, first, frame) = (quoted(known), quoted(first), quoted(frame));
                 let problem =
-                    format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
-                let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
+                    format!("positions are in the frame {known} on topic {first}, but in the frame {frame} here");
+                let remedy = "name the frame to which all are transformed, or the only one to read, with --frame";
                 return refuse("recording/several-frames", problem, remedy);
             }
         }
         Ok(())
     }
 
-    /// What was assumed to know positions, if anything was.
+    /// Returns the assumption behind interpolated transforms, if there are any.
     pub(super) fn assumed(&self) -> Option<String> {
-        (self.brought.guessed > 0).then(|| "transforms even between their samples".to_owned())
+        (self.brought.guessed > 0).then(|| "transforms are uniform between their samples".to_owned())
     }
 
-    /// What a person should know.
+    /// Returns the notes for the user.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.plan.notes();
         notes.extend(no_fixes(self.no_fixes, ""));
@@ -355,8 +355,8 @@ impl Poses {
         if exactly + guessed + unknown > 0 {
             let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
             notes.push(format!(
-                "positions brought{into} by transforms: {exactly} by those of their very time, {guessed} by some between \
-                 two samples at most 1 s apart; {unknown} left out where a transform is not known"
+                "positions transformed{into}: {exactly} by transforms at their time, {guessed} by interpolation between two \
+                 samples at most 1 s apart; {unknown} omitted because a transform is unknown"
             ));
         }
         notes
@@ -364,7 +364,7 @@ impl Poses {
 }
 
 impl Brought {
-    /// Counts a position, and gives what brings it.
+    /// Counts a position; returns its transform.
     fn count(&mut self, way: &Way) -> Option<Known> {
         match way {
             Way::None => return None,

@@ -1,5 +1,4 @@
-//! Positions of a message, and the schemas whose messages hold positions: those of ROS 2 in CDR, and those of Foxglove in
-//! protobuf and JSON.
+//! Decodes positions from messages: ROS 2 in CDR, and Foxglove in protobuf and JSON.
 
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -7,48 +6,48 @@ use serde::de::DeserializeOwned;
 
 use crate::mcap::topic::{CDR, Declared, decode};
 
-/// Reads a message in an encoding; the error says what is wrong with it.
+/// Decoder of messages in an encoding; the error describes the damage.
 pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;
 
-/// The frame of positions on the Earth: latitude and longitude \[degrees\], and height \[m\].
+/// Frame name of positions on the Earth: latitude, longitude \[degrees\] and height \[m\].
 pub(super) const EARTH: &str = "WGS 84";
 
-/// The schema of these positions.
+/// Schema of positions on the Earth.
 pub(super) const FIXES: &str = "sensor_msgs/msg/NavSatFix";
 
-/// The quaternion that turns nothing.
+/// Quaternion of no rotation.
 pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// A position as a message says it.
+/// Position in a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Seen {
     pub(super) who: Who,
-    /// The frame that the position is given in.
+    /// Frame of the position.
     pub(super) frame: String,
-    /// Since the clock's zero \[ns\]; 0 where the message does not say.
+    /// Time since the epoch of the clock \[ns\]; 0 if the message has none.
     pub(super) stamp_ns: i64,
     pub(super) position: Vector3<f64>,
     pub(super) what: What,
 }
 
-/// Which vehicle a message speaks of.
+/// Identification of the vehicle of a position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Who {
-    /// The topic itself is the vehicle.
+    /// The topic is the vehicle.
     Topic,
-    /// The place in a list of poses, from 1.
+    /// Index in a list of poses, from 1.
     Listed(usize),
-    /// A name in the message.
+    /// Name in the message.
     Named(String),
 }
 
-/// What a position is.
+/// Kind of a position.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum What {
     Pose,
-    /// The pose of a robot's own frame.
+    /// Pose of a robot's own frame, with the name of that frame.
     Odometry(String),
-    /// Where a frame lies in its parent, with the quaternion x, y, z, w that turns it into the parent.
+    /// Pose of a frame in its parent, with the quaternion x, y, z, w of its rotation.
     Transform([f64; 4]),
 }
 
@@ -56,7 +55,7 @@ pub(super) fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
     seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
 }
 
-/// What reads the messages of a schema, where they hold positions.
+/// Returns the decoder of a schema with positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
     let reader: Reader = match schema {
         "foxglove.PoseInFrame" => {
@@ -71,7 +70,7 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
             Ok(transforms?.into_iter().map(FrameTransform::seen).collect())
         },
         "geometry_msgs/msg/PoseStamped" | "geometry_msgs/msg/PoseWithCovarianceStamped" => |encoding, bytes| {
-            // The covariance is behind the pose.
+            // The covariance follows the pose.
             let (header, pose): (Header, CdrPose) = decode_ros(encoding, bytes)?;
             Ok(vec![header.seen(Who::Topic, pose)])
         },
@@ -87,7 +86,7 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
             let (header, poses): (Header, Vec<(String, CdrPose)>) = decode_ros(encoding, bytes)?;
             Ok(poses.into_iter().map(|(name, pose)| header.seen(Who::Named(name), pose)).collect())
         },
-        // The velocity behind the pose is not read: publishers differ on the frame that it is given in.
+        // The velocity after the pose is not read: publishers differ on its frame.
         "nav_msgs/msg/Odometry" => |encoding, bytes| {
             let (header, child, pose): (Header, String, CdrPose) = decode_ros(encoding, bytes)?;
             Ok(vec![Seen { what: What::Odometry(child), ..header.seen(Who::Topic, pose) }])
@@ -105,17 +104,17 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
     Some(reader)
 }
 
-/// The same of a topic, where it is in an encoding that is read.
+/// Returns the decoder of a topic with positions in a supported encoding.
 pub(super) fn reader_of_topic(topic: &Declared) -> Option<Reader> {
     reader_of(&topic.schema).filter(|_| matches!(&*topic.encoding, "protobuf" | "json" | CDR))
 }
 
-/// Whether the messages of a schema are lists of poses without names.
+/// Returns whether the messages of a schema are lists of poses without names.
 pub(super) fn is_list(schema: &str) -> bool {
     matches!(schema, "foxglove.PosesInFrame" | "geometry_msgs/msg/PoseArray")
 }
 
-/// Whether the messages of a schema are transforms between frames.
+/// Returns whether the messages of a schema are transforms between frames.
 pub(super) fn is_of_transforms(schema: &str) -> bool {
     matches!(
         schema,
@@ -127,7 +126,7 @@ pub(super) fn is_of_transforms(schema: &str) -> bool {
 }
 
 fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
-    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
+    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are supported in CDR only".to_owned()) }
 }
 
 /// Seconds and nanoseconds, and the frame.
@@ -142,11 +141,11 @@ impl Header {
     }
 }
 
-/// A position and a quaternion, of poses and transforms alike.
+/// Position and quaternion of a pose or transform.
 #[derive(Deserialize)]
 struct CdrPose([f64; 3], [f64; 4]);
 
-/// The name is that of the child frame.
+/// Header, name of the child frame, and transform.
 #[derive(Deserialize)]
 struct Transform(Header, String, CdrPose);
 
@@ -157,12 +156,12 @@ impl Transform {
     }
 }
 
-/// Whether there is a fix, by which satellites, and latitude, longitude and height.
+/// Header, status and service of the fix, and latitude, longitude and height.
 #[derive(Deserialize)]
 struct Fix(Header, (i8, u16), [f64; 3]);
 
 impl Fix {
-    /// Where there is no fix, or none with a height, nothing was seen.
+    /// Returns the position, or nothing without a fix or a height.
     fn seen(self) -> Vec<Seen> {
         let Self(header, (status, _), place) = self;
         if status < 0 || place[2].is_nan() {
@@ -176,7 +175,7 @@ fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &st
     match encoding {
         "protobuf" => T::decode(bytes).map_err(|error| error.to_string()),
         "json" => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
-        _ => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
+        _ => Err("Foxglove messages are supported in protobuf and JSON only".to_owned()),
     }
 }
 
@@ -222,7 +221,7 @@ struct Pose {
     position: Option<Vec3>,
 }
 
-/// What a Foxglove message does not say is 0.
+/// Returns the position of a Foxglove message, whose absent values are 0.
 fn foxglove_seen(who: Who, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Seen {
     let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
     let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));

@@ -1,5 +1,4 @@
-//! Outline of an MCAP recording of another program: topics with positions and their names, frames, and vehicles that several
-//! topics describe.
+//! Outline of a foreign MCAP recording: topics with positions, their frames, and vehicles described by several topics.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,54 +12,54 @@ use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of
 use super::tree::{Body, Placed, Tree};
 use crate::mcap::topic::{Declared, Message, Part};
 
-/// Most parts of a topic that may be namespaces of transforms.
+/// Largest number of topic parts searched for a namespace of transforms.
 const DEEPEST: usize = 16;
 
-/// What helps where it is not known which topics are vehicles.
-const CHOOSE: &str = "say which is read with --topic NAME, once for each topic that is";
+/// Remedy for an ambiguous choice of topics.
+const CHOOSE: &str = "choose the topics to read with --topic NAME, once per topic";
 
-/// A topic with positions.
+/// Topic with positions.
 #[derive(Debug, Default)]
 pub(super) struct Told {
     pub(super) schema: String,
-    /// Frames that its positions are given in.
+    /// Frames of its positions.
     pub(super) frames: BTreeSet<String>,
-    /// The vehicles that its messages name.
+    /// Names of vehicles in its messages.
     names: BTreeSet<String>,
-    /// The robot's own frame, in odometry.
+    /// Robot frame of odometry.
     child: Option<String>,
-    /// Whether the topic itself is a vehicle.
+    /// Whether the topic is a vehicle.
     is_vehicle: bool,
-    /// How many poses its lists have, where vehicles are known by their place in a list.
+    /// Number of poses in its lists, whose vehicles are identified by index.
     listed: usize,
 }
 
-/// What a first look at all messages that are read finds.
+/// Result of a first pass over all messages.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
-    /// The topics that the user names; all are read where he names none.
+    /// Topics named by the user; if empty, all are read.
     pub(super) named: Vec<String>,
-    /// Frames, by the namespace of the topics that tell of them.
+    /// Frames, by the namespace of their transform topics.
     pub(super) trees: BTreeMap<String, Tree>,
-    /// Topics with positions that are read, without those of transforms.
+    /// Topics with positions that are read, except transforms.
     pub(super) topics: BTreeMap<String, Told>,
     /// Topics with positions that are not read, because the user names others.
     unread: BTreeSet<String>,
-    /// Topics of transforms that move.
+    /// Topics of moving transforms.
     transforms: BTreeSet<String>,
-    /// Topics with a message that says its time.
+    /// Topics with a message that has a time.
     pub(super) stamped: BTreeSet<String>,
-    /// The first position on the Earth, in degrees and metres.
+    /// First position on the Earth \[degrees, m\].
     pub(super) first_fix: Option<Vector3<f64>>,
 }
 
-/// Where a message is.
+/// Returns the place of a message.
 pub(super) fn place(number: u64, message: &Message<'_>) -> Place {
     Place::Part(format!("message {number} on topic `{}`", message.of.topic))
 }
 
 impl Outline {
-    /// Looks at all messages of the topics that are named, or of all where none is, and at those of transforms.
+    /// Reads all messages of the topics in `named`, or of all topics if it is empty, and all transforms.
     pub(super) fn of(splits: &mut Splits, named: &[String]) -> Result<Self, ReadError> {
         let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
@@ -78,12 +77,12 @@ impl Outline {
         Ok(outline)
     }
 
-    /// Whether the messages of a topic are looked at: where the user names others, only transforms are, which frames may need.
+    /// Returns whether the messages of a topic are read: transforms are always read, because frames may require them.
     fn reads(&self, topic: &Declared) -> bool {
         self.named.is_empty() || self.named.contains(&topic.topic) || is_of_transforms(&topic.schema)
     }
 
-    /// What is read of a message; `number` counts those that could be.
+    /// Decodes the positions of a message; `number` counts the messages that can have some.
     pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
         let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
         *number += 1;
@@ -93,8 +92,8 @@ impl Outline {
         reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
     }
 
-    /// Records the number of poses of a list. A list of another length does not tell which vehicle appeared or left. In an
-    /// empty list no vehicle is seen.
+    /// Records the number of poses in a list. Lists of different lengths do not identify vehicles and are refused. An
+    /// empty list contains no vehicle.
     fn count(&mut self, message: &Message<'_>, listed: usize) -> Result<(), Fault> {
         if listed == 0 {
             return Ok(());
@@ -102,14 +101,14 @@ impl Outline {
         let told = self.topics.entry(message.of.topic.clone()).or_default();
         if told.listed != 0 && told.listed != listed {
             let problem = format!(
-                "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
+                "it lists {listed} poses, but earlier messages {}: indices then do not identify vehicles",
                 told.listed
             );
             return refuse(
                 "recording/list-length",
                 problem,
-                "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
-                 --topic if the list is of no vehicles",
+                "record a pose of every vehicle in every list, or messages with names; if the list contains no vehicles, \
+                 choose other topics with --topic",
             );
         }
         told.listed = listed;
@@ -130,8 +129,8 @@ impl Outline {
             return Ok(());
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
-            let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
-            return refuse("recording/unusable-frame", problem, "give the frame another name");
+            let problem = format!("its frame has the reserved name {}", quoted(EARTH));
+            return refuse("recording/unusable-frame", problem, "rename the frame");
         }
         let told = self.topics.entry(topic.clone()).or_default();
         told.schema.clone_from(&message.of.schema);
@@ -148,36 +147,38 @@ impl Outline {
         }
         let What::Odometry(child) = seen.what else { return Ok(()) };
         if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
-            let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
-            return refuse("recording/several-vehicles", problem, "record each robot on a topic of its own");
+            let problem =
+                format!("it is the odometry of {}, but earlier messages of {}", quoted(&child), quoted(known));
+            return refuse("recording/several-vehicles", problem, "record each robot on its own topic");
         }
         told.child = Some(child);
         Ok(())
     }
 
-    /// The frames that a topic speaks of, and their namespace: the nearest one that is around the topic.
+    /// Returns the transform tree for a topic, and its namespace: the innermost one that contains the topic.
     pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
         let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
         let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }
 
-    /// Names of all topics with positions, those of transforms last.
+    /// Returns the names of all topics with positions, transforms last.
     pub(super) fn names(&self) -> Vec<String> {
         self.topics.keys().chain(&self.unread).chain(&self.transforms).cloned().collect()
     }
 
-    /// Whether topics that the user names tell of the frames of a namespace.
+    /// Returns whether a topic named by the user has transforms of a namespace.
     pub(super) fn is_told_by_named(&self, wanted: &str) -> bool {
         self.transforms.iter().any(|topic| space(topic) == wanted && self.named.contains(topic))
     }
 
-    /// Refuses topics that tell of one vehicle twice. What their names alone say counts for nothing where the user names them.
+    /// Refuses two topics with one vehicle. Vehicles inferred from topic names are not compared if the user names the
+    /// topics.
     pub(super) fn refuse_twice(&self) -> Result<(), Fault> {
         let is_chosen = !self.named.is_empty();
         let twice = |first: &str, second: &str, who: &str| {
-            let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
-            let remedy = if is_chosen { "name one of the two alone with --topic" } else { CHOOSE };
+            let problem = format!("topics {} and {} both describe {who}", quoted(first), quoted(second));
+            let remedy = if is_chosen { "name only one of the two with --topic" } else { CHOOSE };
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
@@ -205,31 +206,29 @@ impl Outline {
         Ok(())
     }
 
-    /// Refuses topics of setpoints beside topics of measured positions, unless the user names the topics that are read. A
-    /// setpoint is never judged in place of a measured position.
+    /// Refuses setpoint topics beside topics of measured positions, unless the user names the topics. Setpoints must
+    /// not replace measured positions.
     pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
         let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
         let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
         let (wish, other) = (quoted(wish), quoted(other));
-        let problem = format!(
-            "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
-        );
+        let problem = format!("topic {wish} has the name of a setpoint, but {other} beside it does not");
         refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
-    /// Topics of setpoints by their names, unless the user names the topics that are read.
+    /// Returns the topics with names of setpoints, unless the user names the topics.
     pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
         let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
         guessed.map(String::as_str).filter(|topic| is_wish(topic))
     }
 
-    /// Topics that are vehicles, with each frame that they are given in.
+    /// Returns the topics that are vehicles, with each frame of their positions.
     pub(super) fn given_in(&self) -> impl Iterator<Item = (&str, &str)> {
         let vehicles = self.topics.iter().filter(|(_, told)| told.is_vehicle);
         vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
     }
 
-    /// What topics of poses tell of the vehicles of transforms.
+    /// Returns the vehicles that pose topics describe, for comparison with transforms.
     pub(super) fn cover(&self) -> Cover<'_> {
         let mut cover = Cover::default();
         for (topic, told) in &self.topics {
@@ -243,18 +242,18 @@ impl Outline {
     }
 }
 
-/// Vehicles that topics of poses describe.
+/// Vehicles that pose topics describe.
 #[derive(Default)]
 pub(super) struct Cover<'a> {
-    /// Names in messages and of the namespaces of topics.
+    /// Names in messages, and names of the namespaces of topics.
     names: BTreeSet<&'a str>,
-    /// Frames of odometry by their namespace, and those with all that carries them.
+    /// Odometry frames with their namespaces, and these frames with all frames above them.
     children: BTreeSet<(&'a str, &'a str)>,
     carriers: BTreeSet<(&'a str, &'a str)>,
 }
 
 impl Cover<'_> {
-    /// Whether a vehicle of the transforms in a namespace is among them.
+    /// Returns whether a vehicle of the transforms in a namespace is among these.
     pub(super) fn holds(&self, space: &str, tree: &Tree, body: &Body) -> bool {
         let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
         let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
@@ -265,49 +264,48 @@ impl Cover<'_> {
     }
 }
 
-/// Refuses positions of several robots, by whom they are told, in frames of the same name that each robot has of its own, as
-/// a rule.
+/// Refuses positions of several robots in frames that are usually local to each robot, such as `odom`. `given` holds
+/// topics or frames with the frames of their positions.
 pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
     let has_odom = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
-    // Autopilots count local positions from where each was switched on, and call the frame `map`.
+    // Autopilots count local positions from the place of their start, and name the frame `map`.
     let is_own = |teller: &str, frame: &str| has_odom(frame) || teller.contains("local_position");
     let mut known: BTreeMap<&str, &str> = BTreeMap::new();
     for (teller, frame) in given.filter(|(teller, frame)| is_own(teller, frame)) {
         let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
         let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
-        let problem = format!(
-            "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
-        );
-        let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
+        let problem =
+            format!("{first} and {teller} give positions in a frame {shown}, which is usually local to each robot");
+        let remedy = format!("confirm a common frame with --frame {frame}, or name a frame that transforms lead to");
         return refuse("recording/several-frames", problem, remedy);
     }
     Ok(())
 }
 
-/// Words in topics of setpoints, which hold commanded instead of measured positions: of MAVROS
+/// Words in names of setpoint topics, which hold commanded instead of measured positions. Sources: MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
-/// (`motion_reference/pose`), planners, and what is clicked in a viewer.
+/// (`motion_reference/pose`), planners, and clicks in viewers.
 const WISHES: Words = Words(
     "clicked cmd command commanded des desired goal initialpose plan planned planner planning predicted ref \
      reference setpoint sp target waypoint wp",
 );
 
-/// Whether a topic holds transforms that never change.
+/// Returns whether a topic holds constant transforms.
 pub(super) fn is_static(topic: &str) -> bool {
     last(topic) == "tf_static"
 }
 
-/// The namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
+/// Returns the namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
 pub(super) fn namespace(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(before, _)| before)
 }
 
-/// The last part of a name.
+/// Returns the last part of a name.
 pub(super) fn last(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or_default()
 }
 
-/// The namespace that a topic of transforms speaks of: `/r1` of `/r1/tf`, and the common one of a topic called otherwise.
+/// Returns the namespace of a transform topic: `/r1` of `/r1/tf`, and the root for other names.
 pub(super) fn space(topic: &str) -> &str {
     if matches!(last(topic), "tf" | "tf_static") { namespace(topic) } else { "" }
 }
@@ -318,7 +316,7 @@ pub(super) fn is_wish(name: &str) -> bool {
     words(name).split(' ').any(is_one)
 }
 
-/// The words of a name in small letters, with a blank between two: of `/cf1/goalPose` these are `cf1 goal pose`.
+/// Splits a name into words in lower case, separated by blanks: `cf1 goal pose` for `/cf1/goalPose`.
 fn words(name: &str) -> String {
     let (mut words, mut before) = (String::new(), ' ');
     for c in name.chars() {
@@ -336,7 +334,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
+    fn local_frames_of_several_robots_are_refused() {
         let refused = |given: &[(&'static str, &'static str)]| refuse_own_frames(given.iter().copied()).is_err();
         assert!(refused(&[("/r1/pose", "odom"), ("/r2/pose", "odom")]));
         assert!(refused(&[("/uav1/mavros/local_position/pose", "map"), ("/uav2/mavros/local_position/pose", "map")]));
@@ -350,7 +348,7 @@ mod topic_name_tests {
     use super::is_wish;
 
     #[test]
-    fn a_wish_is_no_vehicle_and_a_vehicle_no_wish() {
+    fn setpoint_topics_are_recognised_by_name() {
         let wishes = [
             "/cf1/goal_pose",
             "/cf1/cmd_full_state",

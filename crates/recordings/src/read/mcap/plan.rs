@@ -1,4 +1,4 @@
-//! What is read of a recording of others, and how it comes into one frame.
+//! Decides which data of a foreign recording are read, and how they are transformed to one frame.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,26 +14,25 @@ use super::outline::{Outline, is_static, place, refuse_own_frames, space};
 use super::tree::{Body, Chain, Known, Placed, Tree};
 use crate::mcap::topic::Part;
 
-/// What is read, and how.
+/// Data to read, and their transforms.
 pub(super) struct Plan {
     pub(super) outline: Outline,
-    /// The frame that all is brought into.
+    /// Frame to which all positions are transformed.
     pub(super) wanted: Option<String>,
-    /// The frame of places on the Earth, where there are some.
+    /// Local frame of places on the Earth, if there are any.
     pub(super) earth: Option<Local>,
-    /// The transforms from each frame that is read, by namespace and frame; none where they do not lead to the frame
-    /// that is asked for.
+    /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` if there are none.
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
     /// Vehicles of the transforms, by namespace and driver.
     bodies: BTreeMap<String, BTreeMap<String, Vec<Body>>>,
     notes: Vec<String>,
 }
 
-/// What brings a position into the frame that is asked for.
+/// Transform of a position to the requested frame.
 pub(super) enum Way {
-    /// No transforms lead there.
+    /// No transforms connect the frames.
     None,
-    /// Transforms lead there, and one of them is not known then.
+    /// A transform is unknown at that time.
     NotThen,
     By(Known),
 }
@@ -45,7 +44,7 @@ impl Way {
 }
 
 impl Plan {
-    /// Looks at all messages and decides what is read of them.
+    /// Reads all messages once and decides which are used.
     pub(super) fn of(splits: &mut Splits, options: &ReadOptions) -> Result<Self, ReadError> {
         let outline = Outline::of(splits, &options.topics)?;
         let first_fix = outline.first_fix;
@@ -62,7 +61,7 @@ impl Plan {
             axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return refuse("recording/unused-option", "it has no place on the Earth", "leave --origin away");
+            return refuse("recording/unused-option", "it has no place on the Earth", "omit --origin");
         }
         plan.check()?;
         plan.find_bodies()?;
@@ -82,14 +81,14 @@ impl Plan {
         let known = self.outline.names();
         if let Some(name) = self.outline.named.iter().find(|topic| !known.contains(topic)) {
             let problem =
-                format!("it has no topic {} with positions; those that it has are {}", quoted(name), known.join(", "));
-            return refuse("recording/unknown-topic", problem, "name one of these with --topic");
+                format!("it has no topic {} with positions; such topics are {}", quoted(name), known.join(", "));
+            return refuse("recording/unknown-topic", problem, "choose one of these with --topic");
         }
         self.outline.refuse_twice()?;
         self.outline.refuse_wishes()
     }
 
-    /// Finds the vehicles of the transforms, unless topics of poses tell of them.
+    /// Finds the vehicles of the transforms, unless pose topics describe them.
     fn find_bodies(&mut self) -> Result<(), Fault> {
         let is_chosen = !self.outline.named.is_empty();
         let beside_poses = !is_chosen && !self.outline.topics.is_empty();
@@ -115,22 +114,22 @@ impl Plan {
             }
         }
         if let Some(name) = uncovered.first() {
-            let problem = format!("transforms tell of {}, and topics of poses tell of other vehicles", quoted(name));
+            let problem = format!("transforms describe {}, but topics of poses describe other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
-            let remedy = format!("say which topics are read with --topic NAME, once for each; it has {known}");
+            let remedy = format!("choose the topics to read with --topic NAME, once per topic; it has {known}");
             return refuse("recording/ambiguous-topics", problem, remedy);
         }
         if !covered.is_empty() {
             let covered = covered.join(", ");
             self.notes.push(format!(
-                "topics of poses tell of these vehicles, and transforms too, which are not read: {covered}"
+                "transforms of these vehicles are not read, because topics of poses describe them: {covered}"
             ));
         }
         Ok(())
     }
 
-    /// Finds the transforms from all frames into the one that is asked for, and says which moving ones have to be known
-    /// at all times: by namespace.
+    /// Finds the transforms from all frames to the requested one. Returns the moving ones that must be known at all
+    /// times, by namespace.
     fn find_chains(&mut self) -> Result<BTreeMap<String, BTreeSet<String>>, Fault> {
         let mut ways: Vec<(String, String, String, Option<String>)> = Vec::new();
         for (space, drivers) in &self.bodies {
@@ -150,7 +149,7 @@ impl Plan {
         for (space, frame, into, driver) in ways {
             let tree = &self.outline.trees[&space];
             let chain = tree.chain(&frame, &into)?;
-            // A vehicle is seen with each sample of its driver, which need not be known in between.
+            // A vehicle has one pose per sample of its driver, which need not be interpolated.
             let moving = chain
                 .iter()
                 .flat_map(Chain::frames)
@@ -161,7 +160,7 @@ impl Plan {
         Ok(needed)
     }
 
-    /// Remembers the moving transforms that have to be known at all times.
+    /// Stores the moving transforms that must be known at all times.
     fn gather(&mut self, needed: &BTreeMap<String, BTreeSet<String>>, splits: &mut Splits) -> Result<(), ReadError> {
         if needed.values().all(BTreeSet::is_empty) {
             return Ok(());
@@ -189,29 +188,29 @@ impl Plan {
         Ok(())
     }
 
-    /// When a message speaks of \[ns\]. A stamp of 0 is a time like any other on a topic with other stamps.
+    /// Returns the time of a message \[ns\]. A stamp of 0 is valid on a topic with other stamps.
     pub(super) fn time_of(&self, topic: &str, stamp_ns: i64, log_ns: u64) -> i64 {
         if self.outline.stamped.contains(topic) { stamp_ns } else { i64::try_from(log_ns).unwrap_or(i64::MAX) }
     }
 
-    /// The vehicles that are seen with the transforms of a frame.
+    /// Returns the vehicles whose poses follow from the transforms of a frame.
     pub(super) fn bodies_of(&self, space: &str, driver: &str) -> Option<&Vec<Body>> {
         self.bodies.get(space)?.get(driver)
     }
 
-    /// The transforms that lead from a frame to where all is brought.
+    /// Returns the transforms from a frame to the requested one.
     fn chain(&self, space: &str, frame: &str) -> Option<&Chain> {
         self.chains.get(space)?.get(frame)?.as_ref()
     }
 
-    /// What brings poses of a topic from a frame into the one that is asked for.
+    /// Returns the transform of poses of a topic from a frame to the requested one.
     pub(super) fn bring(&self, topic: &str, frame: &str, time_ns: i64) -> Result<Way, Fault> {
         let Some((space, tree)) = self.outline.tree_of(topic) else { return Ok(Way::None) };
         self.chain(space, frame).map_or(Ok(Way::None), |chain| Ok(Way::of(tree.along(chain, time_ns, None)?)))
     }
 
-    /// The same for a vehicle of the transforms, of whose driver it is known where it is then. Of a vehicle that carries the
-    /// frame that is asked for nothing is known there.
+    /// Returns the transform of a vehicle of the transforms, given the pose of its driver. A vehicle that carries the
+    /// requested frame has none.
     pub(super) fn bring_body(
         &self,
         space: &str,
@@ -224,47 +223,42 @@ impl Plan {
         chain.map_or(Ok(Way::None), |chain| Ok(Way::of(along(chain)?)))
     }
 
-    /// The fault of a recording without a position.
+    /// Returns the fault of a recording without positions.
     pub(super) fn none(&self) -> Fault {
         let trees = || self.outline.trees.values();
         match &self.wanted {
             Some(frame) => {
-                let problem =
-                    format!("no position is given in the frame {}, nor brought there by transforms", quoted(frame));
+                let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
                 Fault::coded(
                     "recording/unusable-frame",
                     problem,
-                    "name another frame, or record /tf and /tf_static from before the first position on",
+                    "name another frame, or record /tf and /tf_static from before the first position",
                 )
             }
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
-                let problem = format!("its transforms are of no vehicle: its frames are {}", frames.join(", "));
-                Fault::coded(
-                    "recording/no-positions",
-                    problem,
-                    "record the transforms of the vehicles' own frames as well",
-                )
+                let problem = format!("its transforms describe no vehicle; its frames are {}", frames.join(", "));
+                Fault::coded("recording/no-positions", problem, "record the transforms of the vehicles' own frames too")
             }
             None => Fault::coded(
                 "recording/no-positions",
-                "no message of its topics with positions has one",
+                "its topics with positions have no messages with one",
                 "record again",
             ),
         }
     }
 
-    /// The frame of places on the Earth, where these are read.
+    /// Returns the local frame of places on the Earth, if these are read.
     pub(super) fn local(&self) -> Option<Local> {
         self.earth.filter(|_| self.wanted.is_none())
     }
 
-    /// What a person should know.
+    /// Returns the notes for the user.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
         notes.extend(self.local().map(|local| local.note()));
         if self.outline.topics.values().any(|told| told.schema == "nav_msgs/msg/Odometry") {
-            let why = "publishers differ on the frame that they are given in";
+            let why = "publishers differ on their frame";
             notes.push(format!("velocities of odometry are not used: {why}"));
         }
         let bodies: BTreeSet<_> =
@@ -273,20 +267,18 @@ impl Plan {
         let fixed: BTreeSet<_> = fixed.filter(|frame| !bodies.contains(frame)).collect();
         if !fixed.is_empty() {
             let fixed: Vec<_> = fixed.into_iter().collect();
-            notes.push(format!("frames of tf_static stand still and are no vehicles: {}", fixed.join(", ")));
+            notes.push(format!("constant frames of tf_static are not vehicles: {}", fixed.join(", ")));
         }
         let wishes: Vec<_> = self.outline.wishes().collect();
         if !wishes.is_empty() {
             let wishes = wishes.join(", ");
-            notes.push(format!(
-                "these topics tell by their names where somebody is asked to be, not where a vehicle is: {wishes}"
-            ));
+            notes.push(format!("these topics have names of setpoints, not of measured positions: {wishes}"));
         }
         notes.extend(self.left_out());
         notes
     }
 
-    /// What is not read because nothing leads into the frame that is asked for.
+    /// Returns the note on data without a transform to the requested frame.
     fn left_out(&self) -> Option<String> {
         let wanted = self.wanted.as_ref()?;
         let mut left_out = Vec::new();
@@ -304,14 +296,14 @@ impl Plan {
             }
         }
         let (wanted, list) = (quoted(wanted), left_out.join(", "));
-        (!left_out.is_empty()).then(|| format!("not read, since no transforms lead from there into {wanted}: {list}"))
+        (!left_out.is_empty()).then(|| format!("not read, because no transforms lead to {wanted}: {list}"))
     }
 }
 
-/// Which frames are vehicles, where some that move are none.
+/// Returns the note on vehicles among the moving frames, if other frames move too.
 fn note_of(bodies: &[Body], others: &[&str]) -> Option<String> {
     let vehicles: Vec<_> = bodies.iter().map(|body| body.frame.as_str()).collect();
     let (vehicles, carriers) = (vehicles.join(", "), others.join(", "));
     (!others.is_empty())
-        .then(|| format!("vehicles, going by transforms: {vehicles}; what carries them or hangs on them: {carriers}"))
+        .then(|| format!("vehicles by transforms: {vehicles}; frames that carry them or belong to them: {carriers}"))
 }

@@ -1,8 +1,8 @@
-//! The tree of frames that transforms make, and which of its frames are vehicles.
+//! Tree of frames from transforms, and the vehicles among its frames.
 //!
-//! A frame has one parent. A vehicle is the first frame on the way up from `map` and `odom`, which only carry it, that
-//! moves; where some frame of its branch is called `base_link` or `base_footprint`, it is the first of those. What hangs on
-//! a vehicle (wheels, cameras, rotors) is part of it.
+//! A frame has one parent. A vehicle is the topmost moving frame below carriers such as `map` and `odom`. If a branch
+//! contains a frame `base_link` or `base_footprint`, the topmost of these is the vehicle instead. Frames below a
+//! vehicle (wheels, cameras, rotors) belong to it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,28 +10,28 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::super::error::{Fault, UNSEEN, quoted, refuse};
 
-/// Longest way from a frame to its root \[frames\].
+/// Largest depth of a frame.
 const DEEPEST: usize = 64;
 
-/// What the body of a robot is called.
+/// Names of the body frame of a robot.
 const BODIES: [&str; 2] = ["base_link", "base_footprint"];
 
-/// Words in the names of frames that carry robots, as REP 105 calls them.
+/// Words in names of frames that carry robots (REP 105).
 const CARRIERS: [&str; 4] = ["map", "odom", "world", "earth"];
 
-/// How a frame lies in its parent.
+/// Relation of a frame to its parent.
 #[derive(Clone, Debug)]
 struct Edge {
     parent: String,
-    /// Where it stands still.
+    /// Constant pose, if there is one.
     still: Option<Placed>,
-    /// Whether it is said to move.
+    /// Whether a transform topic moves the frame.
     moves: bool,
-    /// Another frame that is said to be its parent.
+    /// A second parent, in contradictory transforms.
     stray: Option<String>,
-    /// Whether it is said to stand still in several places, or to move as well.
+    /// Whether it has several constant poses, or a constant pose and also moves.
     torn: bool,
-    /// Where it was at some times \[ns\], once these are needed.
+    /// Poses over time \[ns\], if interpolation requires them.
     samples: Vec<(i64, Isometry3<f64>)>,
 }
 
@@ -41,8 +41,8 @@ pub(super) struct Tree {
     edges: BTreeMap<String, Edge>,
 }
 
-/// The transforms between two frames: children of those that lead up from the one to what both are in, and of those that
-/// lead down from there to the other, as seen from below.
+/// Transforms between two frames. Contains the child frames from the first frame up to the common ancestor, and those
+/// from the second frame up to it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chain {
     up: Vec<String>,
@@ -50,29 +50,29 @@ pub(super) struct Chain {
 }
 
 impl Chain {
-    /// Whether one of the transforms that lead up is that of a frame.
+    /// Returns whether the upward part contains the transform of a frame.
     pub(super) fn leads_up_over(&self, child: &str) -> bool {
         self.up.iter().any(|frame| frame == child)
     }
 
-    /// Children of all transforms.
+    /// Returns the child frames of all transforms.
     pub(super) fn frames(&self) -> impl Iterator<Item = &String> {
         self.up.iter().chain(&self.down)
     }
 }
 
-/// A vehicle that transforms speak of.
+/// Vehicle described by transforms.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Body {
     pub(super) frame: String,
-    /// The nearest frame above it, or itself, that moves in its parent: with each sample of that it is seen.
+    /// Nearest moving frame at or above it, whose samples give the poses of the vehicle.
     pub(super) driver: String,
-    /// What its driver moves in.
+    /// Parent of the driver.
     pub(super) carrier: String,
 }
 
 impl Tree {
-    /// Learns what a frame lies in, and where it stands still there.
+    /// Adds the parent of a frame, with its pose there if constant.
     pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) {
         let Some(known) = self.edges.get_mut(child) else {
             let (parent, moves) = (parent.to_owned(), still.is_none());
@@ -87,50 +87,50 @@ impl Tree {
         known.torn |= known.still != still;
     }
 
-    /// Whether a frame moves in its parent, also one that is said to stand still there as well.
+    /// Returns whether a frame moves in its parent, even if it also has a constant pose there.
     pub(super) fn moves(&self, frame: &str) -> bool {
         self.edges.get(frame).is_some_and(|edge| edge.moves)
     }
 
-    /// Refuses a frame that is in several places at once.
+    /// Refuses a frame with contradictory poses.
     fn check(&self, frame: &str) -> Result<(), Fault> {
         if self.edges.get(frame).is_none_or(|edge| !edge.torn) {
             return Ok(());
         }
-        let problem = format!("frame {} stands still in more than one place, or moves as well", quoted(frame));
+        let problem = format!("frame {} has several constant poses, or moves as well", quoted(frame));
         refuse("recording/transforms", problem, "record again, with one publisher of each transform")
     }
 
-    /// Frames that stand still in their parents.
+    /// Returns the frames with constant poses.
     pub(super) fn still(&self) -> impl Iterator<Item = &str> {
         self.edges.iter().filter(|(_, edge)| !edge.moves).map(|(frame, _)| frame.as_str())
     }
 
-    /// All frames that have a parent.
+    /// Returns all frames that have a parent.
     pub(super) fn frames(&self) -> impl Iterator<Item = &str> {
         self.edges.keys().map(String::as_str)
     }
 
-    /// A frame and all that it is in, up to the root.
+    /// Returns a frame and all its ancestors, up to the root.
     pub(super) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
         let mut way = vec![frame];
         while let Some((child, edge)) = way.last().and_then(|last| self.edges.get_key_value(*last)) {
             if let Some(stray) = &edge.stray {
                 let problem =
-                    format!("frame {} is given in {} and in {}", quoted(child), quoted(&edge.parent), quoted(stray));
-                let remedy = "a frame has one parent: record robots under namespaces of their own, or name topics of poses with --topic";
+                    format!("frame {} has the parents {} and {}", quoted(child), quoted(&edge.parent), quoted(stray));
+                let remedy = "record robots in separate namespaces, or choose topics of poses with --topic";
                 return refuse("recording/transforms", problem, remedy);
             }
             if way.len() > DEEPEST {
-                let problem = format!("transforms lead from {} through more than {DEEPEST} frames", quoted(frame));
-                return refuse("recording/transforms", problem, "look whether they go round in a circle");
+                let problem = format!("frame {} has more than {DEEPEST} ancestors", quoted(frame));
+                return refuse("recording/transforms", problem, "check the transforms for a cycle");
             }
             way.push(&edge.parent);
         }
         Ok(way)
     }
 
-    /// The vehicles.
+    /// Returns the vehicles.
     pub(super) fn bodies(&self) -> Result<Vec<Body>, Fault> {
         let ways: BTreeMap<_, _> =
             self.frames().map(|frame| Ok((frame, self.way_up(frame)?))).collect::<Result<_, Fault>>()?;
@@ -140,7 +140,7 @@ impl Tree {
             .filter(|(frame, way)| is_body(frame) && moved(way) && !way[1..].iter().any(|above| is_body(above)))
             .map(|(frame, _)| *frame)
             .collect();
-        // Frames with a body somewhere below them.
+        // Frames above a body frame.
         let carrying: BTreeSet<&str> = named.iter().flat_map(|body| ways[body][1..].iter().copied()).collect();
         let unnamed = |frame: &str| self.moves(frame) && !is_carrier(frame);
         let is_vehicle = |frame: &str, way: &[&str]| {
@@ -162,7 +162,7 @@ impl Tree {
         vehicles.filter_map(body).collect()
     }
 
-    /// The transforms from a frame into another; none where they have nothing in common.
+    /// Returns the transforms from a frame to another; `None` without a common ancestor.
     pub(super) fn chain(&self, from: &str, into: &str) -> Result<Option<Chain>, Fault> {
         let (up, down) = (self.way_up(from)?, self.way_up(into)?);
         let meeting = up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|of| of == frame)?)));
@@ -171,7 +171,7 @@ impl Tree {
         Ok(Some(Chain { up: owned(&up[..top]), down: owned(&down[..bottom]) }))
     }
 
-    /// Remembers where a moving frame was.
+    /// Stores the pose of a moving frame.
     pub(super) fn remember(&mut self, frame: &str, time_ns: i64, placed: &Placed) -> Result<(), Fault> {
         let transform = placed.rigid()?;
         if let Some(edge) = self.edges.get_mut(frame) {
@@ -180,21 +180,20 @@ impl Tree {
         Ok(())
     }
 
-    /// Puts what is remembered in order of time.
+    /// Sorts the stored poses by time.
     pub(super) fn settle(&mut self) -> Result<(), Fault> {
         for (frame, edge) in &mut self.edges {
             edge.samples.sort_by_key(|(time_ns, _)| *time_ns);
             edge.samples.dedup();
             if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
-                let problem = format!("frame {} is in two places of its parent at {time_ns} ns", quoted(frame));
+                let problem = format!("frame {} has two poses at {time_ns} ns", quoted(frame));
                 return refuse("recording/transforms", problem, "record again, with one publisher of each transform");
             }
         }
         Ok(())
     }
 
-    /// What turns places at the begin of a chain into places at its end, at a time; `given` is where one of its frames is
-    /// known to be then.
+    /// Returns the transform along a chain at a time; `given` is the known pose of one of its frames.
     pub(super) fn along(
         &self,
         chain: &Chain,
@@ -231,29 +230,29 @@ impl Tree {
     }
 }
 
-/// Whether a frame is called as the body of a robot is, perhaps behind the name of the robot.
+/// Returns whether a frame has the name of a robot body, optionally prefixed by the name of the robot.
 fn is_body(frame: &str) -> bool {
     BODIES
         .iter()
         .any(|body| frame.strip_suffix(body).is_some_and(|robot| robot.is_empty() || robot.ends_with(['/', '_'])))
 }
 
-/// Whether a frame carries robots and is none.
+/// Returns whether a frame carries robots and is not one.
 fn is_carrier(frame: &str) -> bool {
     let frame = frame.to_lowercase();
     frame.split(|c: char| !c.is_alphanumeric()).any(|word| CARRIERS.contains(&word))
 }
 
-/// Samples of a moving transform further apart than this say nothing of what is between them \[ns\].
+/// Longest interval for interpolation of a moving transform \[ns\].
 const LONGEST_BRACKET_NS: i64 = 1_000_000_000;
 
-/// How far the norm of a quaternion may be from 1, as tf2 has it.
+/// Largest deviation of the norm of a quaternion from 1, as in tf2.
 const NORM: f64 = 0.01;
 
-/// Above this cosine of half the angle the chord is the arc to 1e-9 of it.
+/// Cosine of half the angle above which chord and arc differ by less than 1e-9.
 const NEARLY_SAME: f64 = 1.0 - 1e-9;
 
-/// Where a frame lies in its parent, as it is written: position and the quaternion x, y, z, w.
+/// Pose of a frame in its parent as recorded: position and the quaternion x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placed {
     pub(super) position: Vector3<f64>,
@@ -261,7 +260,7 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// What turns places in the frame into places in its parent.
+    /// Returns the transform from the frame to its parent.
     pub(super) fn rigid(&self) -> Result<Isometry3<f64>, Fault> {
         if let Some(odd) = self.position.iter().chain(&self.turn).find(|x| !x.is_finite()) {
             return Err(Fault::not_finite("transform", &odd.to_string(), UNSEEN));
@@ -269,23 +268,23 @@ impl Placed {
         let [x, y, z, w] = self.turn;
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
-            let problem = format!("the quaternion {x}, {y}, {z}, {w} is no rotation: its length is not 1");
-            return refuse("recording/transforms", problem, "record again, or leave --frame away");
+            let problem = format!("the quaternion {x}, {y}, {z}, {w} is not normalized");
+            return refuse("recording/transforms", problem, "record again, or omit --frame");
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }
 }
 
-/// A transform at a time.
+/// Transform at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Known {
     pub(super) transform: Isometry3<f64>,
-    /// Whether it is a guess between two samples.
+    /// Whether it is interpolated between two samples.
     pub(super) guessed: bool,
 }
 
-/// A moving transform at a time, out of samples in order of time; none where no two of them are around it, or where these
-/// are too far apart.
+/// Returns a moving transform at a time from its samples in order of time; `None` outside of them or in a gap above
+/// [`LONGEST_BRACKET_NS`].
 pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<Known> {
     let after = samples.partition_point(|(stamp, _)| *stamp < time_ns);
     let (to_ns, to) = samples.get(after)?;
@@ -300,7 +299,7 @@ pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<Know
     Some(Known { transform: Isometry3::from_parts(shift.into(), turn), guessed: true })
 }
 
-/// The rotation at a part of the shortest way between two, at a steady rate.
+/// Spherical linear interpolation along the shortest arc.
 fn between(from: UnitQuaternion<f64>, to: UnitQuaternion<f64>, part: f64) -> UnitQuaternion<f64> {
     let cosine = from.coords.dot(&to.coords);
     let (cosine, to) = if cosine < 0.0 { (-cosine, -to.coords) } else { (cosine, to.coords) };
@@ -336,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_is_its_body_and_neither_what_carries_it_nor_what_hangs_on_it() {
+    fn vehicle_is_the_body_frame_below_its_carriers() {
         let robot = [
             ("map", "r1/odom", None),
             ("r1/odom", "r1/base_footprint", None),
@@ -353,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn chains_lead_up_and_down_and_circles_are_refused() {
+    fn chains_lead_up_and_down_and_cycles_are_refused() {
         let tree =
             tree(&[("map", "a", STILL), ("a", "b", STILL), ("map", "c", STILL), ("x", "y", None), ("y", "x", None)]);
         let along = |from, into| {
@@ -368,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_has_one_parent_and_one_place_in_it() {
+    fn contradictory_parents_and_poses_are_refused() {
         let mut tree = tree(&[("map", "a", STILL), ("map", "b", None)]);
         tree.learn("a", "map", STILL);
         let chain = tree.chain("a", "map").expect("a tree").expect("a way");
@@ -401,7 +400,7 @@ mod rigid_tests {
     }
 
     #[test]
-    fn a_transform_is_known_at_samples_guessed_between_and_unknown_outside() {
+    fn transform_is_interpolated_only_between_samples() {
         let samples = [sample(0, 0.0, 0.0), sample(100, 1.0, 1.0), sample(1_000_000_101, 2.0, 0.0)];
         assert_eq!(at(&samples, 100), Some(Known { transform: samples[1].1, guessed: false }));
         let found = at(&samples, 25).expect("between");
@@ -413,14 +412,14 @@ mod rigid_tests {
     }
 
     #[test]
-    fn rotations_take_the_shortest_way() {
+    fn interpolation_takes_the_shortest_arc() {
         let far = UnitQuaternion::new_unchecked(-turned(1.0).into_inner());
         assert!(between(turned(0.0), far, 0.5).angle_to(&turned(0.5)) < 1e-12);
         assert!(between(turned(0.0), turned(1e-7), 0.5).angle_to(&turned(5e-8)) < 1e-15);
     }
 
     #[test]
-    fn what_is_no_rotation_is_refused() {
+    fn invalid_quaternions_are_refused() {
         let placed = |turn| Placed { position: Vector3::zeros(), turn }.rigid();
         assert!(placed([0.0, 0.0, 0.0, 0.0]).is_err() && placed([0.0, 0.0, f64::NAN, 1.0]).is_err());
         assert!(placed([0.0, 0.0, 0.0, 1.005]).is_ok());
