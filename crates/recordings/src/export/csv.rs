@@ -6,21 +6,21 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 
 use super::ExportError;
-use super::source::{About, Column, Source};
+use super::source::{Column, ExportInfo, Source};
 
 /// Smallest epoch that a reader restores from absolute times \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
 
-pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<Option<String>, ExportError> {
-    let names = about.names.iter().map(|name| quoted(name)).collect::<Result<Vec<_>, _>>()?;
-    let (epoch_s, rest_ns) = (about.clock.epoch_ns / 1_000_000_000, about.clock.epoch_ns % 1_000_000_000);
+pub(super) fn write(source: &Source<'_>, info: &ExportInfo, file: &mut File) -> Result<Option<String>, ExportError> {
+    let names = info.names.iter().map(|name| quoted(name)).collect::<Result<Vec<_>, _>>()?;
+    let (epoch_s, rest_ns) = (info.clock.epoch_ns / 1_000_000_000, info.clock.epoch_ns % 1_000_000_000);
     let absolute = epoch_s >= EPOCH_FROM_S && rest_ns == 0;
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
-    let columns: Vec<&Column> = about.position_columns().iter().chain(about.optional_columns()).collect();
+    let columns: Vec<&Column> = info.position_columns().iter().chain(info.optional_columns()).collect();
     out.write_all(b"t_s,id")?;
     columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
-    for column in about.beside.columns() {
+    for column in info.extra.columns() {
         write!(out, ",{}", quoted(&column)?)?;
     }
     let mut cells = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
                 }
             }
             cells.clear();
-            about.beside.cells(channels, row, &mut cells);
+            info.extra.cells(channels, row, &mut cells);
             for cell in &cells {
                 if cell.is_finite() { write!(out, ",{cell:?}") } else { out.write_all(b",") }?;
             }
@@ -45,8 +45,8 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
         Ok(())
     })?;
     out.flush()?;
-    let lost = about.clock.epoch_ns != 0 && !absolute;
-    Ok(lost.then(|| format!("the table does not contain its epoch: times count from {} ns", about.clock.epoch_ns)))
+    let lost = info.clock.epoch_ns != 0 && !absolute;
+    Ok(lost.then(|| format!("the table does not contain its epoch: times count from {} ns", info.clock.epoch_ns)))
 }
 
 /// Formats an absolute time in decimal digits; the whole seconds are added exactly. The epoch is after 1970, or 0 for

@@ -70,16 +70,16 @@ pub fn export_with(
     file: &mut File,
 ) -> Result<Exported, ExportError> {
     let source = Source { open, channels, sample_hz: options.sample_hz };
-    let about = source.survey()?;
-    let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
+    let info = source.survey()?;
+    let mut exported = Exported { vehicles: info.names.len(), samples: info.samples, notes: info.notes.clone() };
     if format == Format::CSV {
-        exported.notes.extend(csv::write(&source, &about, file)?);
+        exported.notes.extend(csv::write(&source, &info, file)?);
     } else if format == Format::PARQUET {
-        parquet::write(&source, &about, file)?;
+        parquet::write(&source, &info, file)?;
     } else if format == Format::NPZ {
-        npz::write(&source, &about, file)?;
+        npz::write(&source, &info, file)?;
     } else if format == Format::MCAP {
-        mcap::write(&source, &about, file)?;
+        mcap::write(&source, &info, file)?;
     } else {
         return Err(ExportError::NotWritten(format));
     }

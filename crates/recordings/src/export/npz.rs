@@ -15,7 +15,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::ExportError;
-use super::source::{About, Source, Written};
+use super::source::{ChannelColumns, ExportInfo, Source};
 use tautline_core::track::Sample;
 
 /// Array names with a meaning for readers of motion.
@@ -24,8 +24,8 @@ const RESERVED: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "s
 /// Alignment of the end of an array header \[bytes\].
 const ALIGNMENT: usize = 64;
 
-pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
-    let (times, vehicles, axes) = (about.instants, about.names.len(), about.axes);
+pub(super) fn write(source: &Source<'_>, info: &ExportInfo, file: &mut File) -> Result<(), ExportError> {
+    let (times, vehicles, axes) = (info.instants, info.names.len(), info.axes);
     let file = FailsOnce { inner: BufWriter::new(file), failed: false };
     let mut archive = Archive { zip: ZipWriter::new(file), source, vehicles };
     archive.array("t", "<f8", &[times], |instant, _, out| {
@@ -37,31 +37,31 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     })?;
     // If T = N, the shape alone does not identify the axes.
     archive.texts("axes", &["time", "vehicle", "xyz"].map(str::to_owned))?;
-    if about.velocities {
+    if info.velocities {
         archive.array("velocities", "<f8", &[times, vehicles, axes], |_, slots, out| {
             slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), axes, out))
         })?;
     }
-    if about.radii {
+    if info.radii {
         archive.array("radii", "<f8", &[times, vehicles], |_, slots, out| {
             let radius = |slot: Option<&Sample>| slot.and_then(|sample| sample.radius_m).unwrap_or(f64::NAN);
             slots.iter().try_for_each(|&slot| out.write_all(&radius(slot).to_le_bytes()))
         })?;
     }
-    if about.samples != (times * vehicles) as u64 {
+    if info.samples != (times * vehicles) as u64 {
         archive.array("seen", "|b1", &[times, vehicles], |_, slots, out| {
             slots.iter().try_for_each(|slot| out.write_all(&[u8::from(slot.is_some())]))
         })?;
     }
-    let numbered = about.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
+    let numbered = info.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
     if !numbered {
-        archive.texts("names", &about.names)?;
+        archive.texts("names", &info.names)?;
     }
-    for channel in &about.beside.channels {
+    for channel in &info.extra.channels {
         archive.channel(channel, times)?;
     }
-    if about.clock.epoch_ns != 0 {
-        archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
+    if info.clock.epoch_ns != 0 {
+        archive.begin("epoch_ns", "<i8", &[])?.write_all(&info.clock.epoch_ns.to_le_bytes())?;
     }
     archive.zip.finish().map_err(io::Error::other)?.flush()?;
     Ok(())
@@ -156,7 +156,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Writes a channel, NaN for unknown values, and the names of its columns.
-    fn channel(&mut self, channel: &Written, times: usize) -> Result<(), ExportError> {
+    fn channel(&mut self, channel: &ChannelColumns, times: usize) -> Result<(), ExportError> {
         let (source, vehicles, width) = (self.source, self.vehicles, channel.columns.len());
         let name = if RESERVED.contains(&&*channel.name) {
             format!("channel_{}", channel.name)

@@ -19,7 +19,7 @@ pub(super) struct Source<'a> {
 
 /// Properties of a recording, found in a first pass.
 #[derive(Debug, Default)]
-pub(super) struct About {
+pub(super) struct ExportInfo {
     pub(super) names: Vec<String>,
     pub(super) clock: Clock,
     pub(super) notes: Vec<String>,
@@ -32,7 +32,7 @@ pub(super) struct About {
     /// Whether a sample has a radius.
     pub(super) radii: bool,
     /// Channels.
-    pub(super) beside: Beside,
+    pub(super) extra: ExtraColumns,
 }
 
 /// Numeric column of a long table.
@@ -56,7 +56,7 @@ const VELOCITY: [Column; 3] = [
 
 const RADIUS: [Column; 1] = [Column { name: "radius", of: |sample| sample.radius_m }];
 
-impl About {
+impl ExportInfo {
     /// Returns the columns that every sample fills.
     pub(super) fn position_columns(&self) -> &'static [Column] {
         &POSITION[..self.axes]
@@ -71,27 +71,27 @@ impl About {
 }
 
 impl Source<'_> {
-    pub(super) fn survey(&self) -> Result<About, ExportError> {
-        let mut about = About::default();
+    pub(super) fn survey(&self) -> Result<ExportInfo, ExportError> {
+        let mut info = ExportInfo::default();
         let recording = self.each_instant(|instant, channels| {
-            about.beside.note(channels);
-            about.instants += 1;
-            about.samples += instant.len() as u64;
-            about.velocities |= instant.iter().any(|sample| sample.velocity_m_s.is_some());
-            about.radii |= instant.iter().any(|sample| sample.radius_m.is_some());
+            info.extra.note(channels);
+            info.instants += 1;
+            info.samples += instant.len() as u64;
+            info.velocities |= instant.iter().any(|sample| sample.velocity_m_s.is_some());
+            info.radii |= instant.iter().any(|sample| sample.radius_m.is_some());
             Ok(())
         })?;
-        about.names = recording.vehicles().to_vec();
-        about.axes = if recording.is_planar() { 2 } else { 3 };
-        about.clock = recording.clock().clone();
-        about.notes = recording.notes().to_vec();
+        info.names = recording.vehicles().to_vec();
+        info.axes = if recording.is_planar() { 2 } else { 3 };
+        info.clock = recording.clock().clone();
+        info.notes = recording.notes().to_vec();
         if let Some(assumed) = recording.assumed() {
-            about.notes.push(format!("the samples rest on an assumption that the file does not contain: {assumed}"));
+            info.notes.push(format!("the samples rest on an assumption that the file does not contain: {assumed}"));
         }
         if let Some(hz) = self.sample_hz {
-            about.notes.push(format!("curves were sampled at {hz} Hz; the motion between samples is lost"));
+            info.notes.push(format!("curves were sampled at {hz} Hz; the motion between samples is lost"));
         }
-        Ok(about)
+        Ok(info)
     }
 
     /// Calls `take` with the samples of each instant in order of time, and the channels with one row per sample.
@@ -106,8 +106,8 @@ impl Source<'_> {
         }
         let mut channels = (self.channels)()?;
         let mut take = |instant: &[Sample]| {
-            let beside = channels.as_mut().map_or_else(|| Ok(Vec::new()), |channels| channels.next(instant.len()))?;
-            take(instant, &beside)
+            let extra = channels.as_mut().map_or_else(|| Ok(Vec::new()), |channels| channels.next(instant.len()))?;
+            take(instant, &extra)
         };
         let (mut items, mut instant) = (Vec::new(), Vec::<Sample>::new());
         loop {
@@ -133,18 +133,18 @@ impl Source<'_> {
 
 /// Channels to export, in order of first appearance.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Beside {
-    pub(super) channels: Vec<Written>,
+pub(super) struct ExtraColumns {
+    pub(super) channels: Vec<ChannelColumns>,
 }
 
 /// Name and columns of an exported channel.
 #[derive(Clone, Debug)]
-pub(super) struct Written {
+pub(super) struct ChannelColumns {
     pub(super) name: Arc<str>,
     pub(super) columns: Arc<[String]>,
 }
 
-impl Written {
+impl ChannelColumns {
     /// Returns this channel at an instant, if present.
     pub(super) fn of<'a>(&self, channels: &'a [Channel]) -> Option<&'a Channel> {
         channels.iter().find(|channel| self.name == channel.name && self.columns == channel.columns)
@@ -157,13 +157,13 @@ impl Written {
     }
 }
 
-impl Beside {
+impl ExtraColumns {
     /// Registers the channels of an instant. Of two channels with one name the first is exported.
     pub(super) fn note(&mut self, channels: &[Channel]) {
         for channel in channels {
             if self.channels.iter().all(|known| known.name != channel.name) {
                 let (name, columns) = (channel.name.clone(), channel.columns.clone());
-                self.channels.push(Written { name, columns });
+                self.channels.push(ChannelColumns { name, columns });
             }
         }
     }
@@ -299,15 +299,15 @@ mod tests {
 
     #[test]
     fn channel_columns_do_not_collide_with_read_columns() {
-        let mut beside = Beside::default();
-        beside.note(&[
+        let mut extra = ExtraColumns::default();
+        extra.note(&[
             Channel::new("attitude", &["qw", "qx"]),
             Channel::new("gps", &["x", "y1", "t_s", "id", "radius", "vx", "qw"]),
             Channel::new("wind", &["wind_x_m_s"]),
         ]);
         let expected =
             ["qw", "qx", "gps_x", "gps_y1", "gps_t_s", "gps_id", "gps_radius", "gps_vx", "gps_qw", "wind_x_m_s"];
-        assert_eq!(beside.columns(), expected);
+        assert_eq!(extra.columns(), expected);
         assert!(expected.iter().all(|name| !is_read(name)), "{expected:?}");
     }
 }

@@ -11,14 +11,14 @@ use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 /// Topic that every run recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Own {
+pub(super) enum RunTopic {
     Scenario,
     Swarm,
     Summary,
     Events,
 }
 
-impl Own {
+impl RunTopic {
     /// All topics, in the order of their declaration.
     pub(super) const ALL: [Self; 4] = [Self::Scenario, Self::Swarm, Self::Summary, Self::Events];
 
@@ -108,7 +108,7 @@ impl SwarmMessage<Vec<f64>> {
             if Some(numbers.len()) != vehicles.checked_mul(3) && !without_command {
                 let reason =
                     format!("{name} has {} numbers, which is not 3 for each of {vehicles} vehicles", numbers.len());
-                return Err(Own::Swarm.fault(reason));
+                return Err(RunTopic::Swarm.fault(reason));
             }
         }
         let summary = summary.filter(|summary| summary.step == self.step);
@@ -202,7 +202,7 @@ impl SummaryMessage {
         if self.pair[0] == 0 {
             return Ok(None);
         }
-        let pair = pair_of(Own::Summary, self.pair)?;
+        let pair = pair_of(RunTopic::Summary, self.pair)?;
         Ok(Some(ClosestApproach { pair, separation_m: self.separation_m, time_s: self.separation_time_s }))
     }
 }
@@ -298,7 +298,7 @@ impl From<&Event> for EventMessage<&'static str> {
 impl EventMessage<String> {
     pub(super) fn into_event(self) -> Result<Event, ReadFault> {
         let time_s = self.time_s;
-        let pair = || pair_of(Own::Events, self.pair);
+        let pair = || pair_of(RunTopic::Events, self.pair);
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
@@ -323,7 +323,7 @@ impl EventMessage<String> {
             "assigned" => Event::Assigned { time_s, slots: self.slots()? },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
-            unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
+            unknown => return Err(RunTopic::Events.fault(format!("unknown kind {unknown:?}"))),
         })
     }
 
@@ -331,7 +331,7 @@ impl EventMessage<String> {
         let [vehicle, obstacle] =
             self.pair.map(|number| number.checked_sub(1).and_then(|index| usize::try_from(index).ok()));
         let both = vehicle.zip(obstacle).map(|(vehicle, obstacle)| [vehicle, obstacle]);
-        both.ok_or_else(|| Own::Events.fault("vehicle or obstacle number is 0; numbers count from 1".to_owned()))
+        both.ok_or_else(|| RunTopic::Events.fault("vehicle or obstacle number is 0; numbers count from 1".to_owned()))
     }
 
     /// Returns the slots in the text, from 0, if they are a permutation of the vehicles.
@@ -345,14 +345,14 @@ impl EventMessage<String> {
         };
         slots
             .filter(is_permutation)
-            .ok_or_else(|| Own::Events.fault("the slots are not a permutation of the vehicles".to_owned()))
+            .ok_or_else(|| RunTopic::Events.fault("the slots are not a permutation of the vehicles".to_owned()))
     }
 
     fn leg(&self) -> Result<usize, ReadFault> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let number = self.value as usize;
         let leg = number.checked_sub(1).filter(|_| self.value.fract() == 0.0);
-        leg.ok_or_else(|| Own::Events.fault(format!("there is no leg {}", self.value)))
+        leg.ok_or_else(|| RunTopic::Events.fault(format!("there is no leg {}", self.value)))
     }
 }
 
@@ -361,7 +361,7 @@ fn numbers_of(pair: Option<Pair>) -> [u64; 2] {
     pair.map_or([0, 0], |pair| pair.numbers().map(|number| number as u64))
 }
 
-fn pair_of(topic: Own, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
+fn pair_of(topic: RunTopic, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
     let index = |number: u64| number.checked_sub(1).and_then(|index| usize::try_from(index).ok());
     match numbers.map(index) {
         [Some(first), Some(second)] if first != second => Ok(Pair::new(first, second)),

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-use super::message::{AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, fault};
+use super::message::{
+    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, fault,
+};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
 use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
@@ -57,7 +59,7 @@ impl McapRecording {
                 break header;
             }
             if !contents.advance(&mut topics)? {
-                let missing = if contents.has_swarm { Own::Scenario } else { Own::Swarm };
+                let missing = if contents.has_swarm { RunTopic::Scenario } else { RunTopic::Swarm };
                 return Err(topics.fault(ReadFault::NoChannel { topic: missing.topic().name }));
             }
         };
@@ -144,7 +146,7 @@ struct Contents {
     audit: Option<RunAudit>,
     /// Whether a message of a run follows the audit, or an audit is unreadable or repeated.
     is_altered: bool,
-    /// Hash of the messages of [`Own::ALL`].
+    /// Hash of the messages of [`RunTopic::ALL`].
     messages: MessageHash,
 }
 
@@ -161,37 +163,37 @@ impl Contents {
     }
 
     fn declare(&mut self, declared: &Declared) -> Result<(), ReadFault> {
-        let Some(own) = Own::of(&declared.topic) else { return Ok(()) };
+        let Some(own) = RunTopic::of(&declared.topic) else { return Ok(()) };
         let Topic { name: topic, schema_name: expected, message_encoding, .. } = own.topic();
         if declared.schema != expected || declared.encoding != message_encoding {
             let schema = if declared.schema.is_empty() { "no schema" } else { &declared.schema };
             let found = format!("{schema} in {} encoding", declared.encoding);
             return Err(ReadFault::ForeignChannel { topic, found, expected });
         }
-        self.has_swarm |= own == Own::Swarm;
+        self.has_swarm |= own == RunTopic::Swarm;
         Ok(())
     }
 
     fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
         let Declared { topic, schema, encoding, .. } = message.of;
-        let own = Own::of(topic);
+        let own = RunTopic::of(topic);
         if own.is_some() {
             self.messages.take(topic, message.bytes);
             self.is_altered |= self.audit.is_some();
         }
         match own {
-            Some(Own::Scenario) => {
+            Some(RunTopic::Scenario) => {
                 let header = content(message)?;
                 self.header.get_or_insert(header);
             }
-            Some(Own::Summary) => self.summary = Some(content(message)?),
-            Some(Own::Swarm) => {
+            Some(RunTopic::Summary) => self.summary = Some(content(message)?),
+            Some(RunTopic::Swarm) => {
                 let state = content::<SwarmMessage<Vec<f64>>>(message)?;
                 let vehicles = self.header.as_ref().map_or(state.vehicles(), |header| header.vehicles);
                 let channels = std::mem::take(&mut self.channels);
                 self.ready.push_back(Entry::Sample(state.into_sample(vehicles, self.summary.as_ref(), channels)?));
             }
-            Some(Own::Events) => {
+            Some(RunTopic::Events) => {
                 self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
             }
             None if topic == AUDIT.name => {

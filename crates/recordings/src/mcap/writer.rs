@@ -10,7 +10,7 @@ use mcap::write::NoSeek;
 use serde::Serialize;
 
 use super::message::{
-    AUDIT, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
+    AUDIT, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
 use super::{Header, RunAudit};
@@ -51,7 +51,7 @@ type Out = TopicWriter<NoSeek<BufWriter<File>>>;
 /// cannot report an error. After an error the file is left as it is and every further call fails.
 pub struct McapRecorder {
     path: PathBuf,
-    /// Writer whose first topics are [`Own::ALL`], so that `Own as usize` is the index of a topic.
+    /// Writer whose first topics are [`RunTopic::ALL`], so that `RunTopic as usize` is the index of a topic.
     out: Option<Out>,
     /// Channels so far, with the indices of their topics.
     channels: Vec<(Arc<str>, usize)>,
@@ -61,7 +61,7 @@ pub struct McapRecorder {
     message: Vec<u8>,
     waiting_bytes: usize,
     flushed_at_s: f64,
-    /// Hash of the messages of [`Own::ALL`].
+    /// Hash of the messages of [`RunTopic::ALL`].
     messages: MessageHash,
 }
 
@@ -82,7 +82,7 @@ impl McapRecorder {
             flushed_at_s: f64::NEG_INFINITY,
             messages: MessageHash::default(),
         };
-        recorder.write(Own::Scenario as usize, 0.0, header)?;
+        recorder.write(RunTopic::Scenario as usize, 0.0, header)?;
         Ok(recorder)
     }
 
@@ -118,7 +118,7 @@ impl McapRecorder {
 
     fn write(&mut self, topic: usize, time_s: f64, message: &impl Serialize) -> Result<(), RecordError> {
         self.write_if_due(topic, time_s, |bytes| encode(message, bytes).map(|()| true))?;
-        if let Some(own) = Own::ALL.get(topic) {
+        if let Some(own) = RunTopic::ALL.get(topic) {
             self.messages.take(own.topic().name, &self.message);
         }
         Ok(())
@@ -181,11 +181,11 @@ impl McapRecorder {
 
 impl Sink for McapRecorder {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.write(Own::Summary as usize, sample.time_s, &SummaryMessage::from(sample))?;
+        self.write(RunTopic::Summary as usize, sample.time_s, &SummaryMessage::from(sample))?;
         for channel in sample.channels {
             self.write_channel(sample, channel)?;
         }
-        self.write(Own::Swarm as usize, sample.time_s, &SwarmMessage::from(sample))?;
+        self.write(RunTopic::Swarm as usize, sample.time_s, &SwarmMessage::from(sample))?;
         if let Some((mut extra, topic)) = self.extra.take() {
             let written = self.write_if_due(topic, sample.time_s, |bytes| extra.message(sample, bytes));
             self.extra = Some((extra, topic));
@@ -198,7 +198,7 @@ impl Sink for McapRecorder {
         if let Some((extra, _)) = &mut self.extra {
             extra.note(event);
         }
-        self.write(Own::Events as usize, event.time_s(), &EventMessage::from(event))?;
+        self.write(RunTopic::Events as usize, event.time_s(), &EventMessage::from(event))?;
         self.flush_if_due(event.time_s())
     }
 
@@ -211,7 +211,7 @@ fn open(path: &Path) -> io::Result<Out> {
     // The recorder closes the chunks, not their size alone: the messages of one sample stay in one chunk.
     let options = WriteOptions::new().chunk_size(None).disable_seeking(true);
     let mut out = TopicWriter::new(NoSeek::new(BufWriter::new(File::create(path)?)), options)?;
-    for own in Own::ALL {
+    for own in RunTopic::ALL {
         out.declare(&own.topic())?;
     }
     Ok(out)

@@ -153,7 +153,7 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
     }
     let mut metadata = recording.metadata().clone();
     metadata.notes.push(options.turn().note());
-    Ok(Box::new(Turned { recording, axes: options.turn(), metadata }))
+    Ok(Box::new(MappedRecording { recording, axes: options.turn(), metadata }))
 }
 
 /// Refuses a mapping of axes by the user if the directions are known; `what` names their source.
@@ -179,13 +179,13 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
     refuse("recording/contradicts-option", problem, remedy)
 }
 
-struct Turned {
+struct MappedRecording {
     recording: Recording,
     axes: Axes,
     metadata: Metadata,
 }
 
-impl Tracks for Turned {
+impl Tracks for MappedRecording {
     type Error = ReadError;
 
     fn vehicles(&self) -> &[String] {

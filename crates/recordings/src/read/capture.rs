@@ -28,8 +28,8 @@ use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 
 /// Source of the time of a row.
@@ -104,10 +104,10 @@ fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Reco
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
     let (said, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
-    let about = About::new(source, options, said, notes, Fault::header_only());
+    let info = RecordingInfo::new(source, options, said, notes, Fault::header_only());
     let mut lines = Lines::new(source)?;
     while lines.number() + 1 < capture.first_line && lines.advance()? {}
-    Ok(Box::new(Ordered::open(Table { capture, names, lines, ended: false }, about)?))
+    Ok(Box::new(Ordered::open(Table { capture, names, lines, ended: false }, info)?))
 }
 
 struct Table {
@@ -217,7 +217,7 @@ pub(super) const MOTIVE: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
     open: open_motive,
-    takes: &[Takes::Rows],
+    supports: &[FormatOption::Rows],
     packing: Packing::Any,
 };
 
@@ -338,7 +338,7 @@ pub(super) const VICON: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(is_export),
     open: open_vicon,
-    takes: &[Takes::Rows, Takes::Axes],
+    supports: &[FormatOption::Rows, FormatOption::Axes],
     packing: Packing::Any,
 };
 

@@ -313,7 +313,7 @@ const CLOCK_WORDS: [&str; 8] = ["", "t", "time", "timestamp", "stamp", "header",
 
 /// Column with the remainder of a time, in a smaller unit than the first column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rest {
+pub(super) struct SubunitColumn {
     pub(super) column: usize,
     /// Number of units of this column per unit of the first.
     per_unit: i64,
@@ -321,7 +321,7 @@ pub(super) struct Rest {
     pub(super) unit: TimeUnit,
 }
 
-impl Rest {
+impl SubunitColumn {
     /// Returns the exact time of a row.
     pub(super) fn join(self, whole: Stamp, rest: Stamp, header: &[String], first: usize) -> Result<Stamp, Fault> {
         let (first, own) = (quoted(&header[first]), quoted(&header[self.column]));
@@ -352,7 +352,10 @@ struct Candidate {
 }
 
 /// Returns the time column of a header, and the column of the remainder if there is one; `None` without a time.
-pub(super) fn time_columns(header: &[String], options: &ReadOptions) -> Result<Option<(usize, Option<Rest>)>, Fault> {
+pub(super) fn time_columns(
+    header: &[String],
+    options: &ReadOptions,
+) -> Result<Option<(usize, Option<SubunitColumn>)>, Fault> {
     let mut candidates: Vec<_> =
         header.iter().enumerate().filter_map(|(column, name)| candidate(column, name)).collect();
     let is_whole_time = |candidate: &Candidate| heading::is_time(&header[candidate.column]);
@@ -398,11 +401,11 @@ fn candidate(column: usize, name: &str) -> Option<Candidate> {
 }
 
 /// Returns how `rest` continues `whole`, if they can be two parts of a time.
-fn split(whole: &Candidate, rest: &Candidate) -> Option<Rest> {
+fn split(whole: &Candidate, rest: &Candidate) -> Option<SubunitColumn> {
     let unit = rest.unit?;
     let per_unit = unit.per_second() / whole.unit.unwrap_or(TimeUnit::Seconds).per_second();
     let are_of_one = whole.stem == rest.stem || whole.stem.is_empty() || rest.stem.is_empty();
-    (are_of_one && per_unit > 1).then_some(Rest { column: rest.column, per_unit, unit })
+    (are_of_one && per_unit > 1).then_some(SubunitColumn { column: rest.column, per_unit, unit })
 }
 
 fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {

@@ -10,12 +10,12 @@
 
 use nalgebra::Vector3;
 
-use super::csv::Text;
+use super::csv::TextTable;
 use super::curves::{Curves, piece};
 use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use super::table::{Cells as _, number};
 use tautline_core::track::Item;
@@ -32,7 +32,7 @@ pub(super) const READER: Reader = Reader {
         head.line.is_some_and(begins)
     },
     open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-    takes: &[Takes::Starts, Takes::Axes],
+    supports: &[FormatOption::Starts, FormatOption::Axes],
     packing: Packing::Archive,
 };
 
@@ -124,16 +124,16 @@ struct Curve {
 
 impl Curve {
     fn append(&mut self, file: &Source) -> Result<(), ReadError> {
-        let mut table = Text::open(file, Format::CRAZYFLIE)?;
-        let columns = Columns::of(table.header()).map_err(|fault| fault.at(Text::place(table.row())))?;
+        let mut table = TextTable::open(file, Format::CRAZYFLIE)?;
+        let columns = Columns::of(table.header()).map_err(|fault| fault.at(TextTable::place(table.row())))?;
         let before = self.items.len();
         while table.advance()? {
-            self.piece(&table, &columns).map_err(|fault| fault.at(Text::place(table.row())))?;
+            self.piece(&table, &columns).map_err(|fault| fault.at(TextTable::place(table.row())))?;
         }
         if self.items.len() == before { Err(Fault::header_only().into()) } else { Ok(()) }
     }
 
-    fn piece(&mut self, table: &Text, columns: &Columns) -> Result<(), Fault> {
+    fn piece(&mut self, table: &TextTable, columns: &Columns) -> Result<(), Fault> {
         let number = |column: usize| number(table, column)?.ok_or_else(|| Fault::empty_cell(&table.header()[column]));
         let duration_s = number(columns.duration)?;
         let to_s = self.time_s + duration_s;

@@ -11,10 +11,10 @@ use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
-use super::layout::{Body, Layout};
+use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 use super::table::Cells;
 use super::{clock, heading, table};
@@ -28,7 +28,7 @@ pub(super) const CSV: Reader = Reader {
     magic: &[],
     sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
     open: |source, options| open(source, Format::CSV, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
@@ -41,14 +41,14 @@ pub(super) const TEXT: Reader = Reader {
     magic: &[],
     sniff: |head| head.text.is_some(),
     open: |source, options| open(source, Format::TEXT, options),
-    takes: &[
-        Takes::TimeUnit,
-        Takes::Rows,
-        Takes::Dimensions,
-        Takes::Columns,
-        Takes::Origin,
-        Takes::Axes,
-        Takes::OneVehicle,
+    supports: &[
+        FormatOption::TimeUnit,
+        FormatOption::Rows,
+        FormatOption::Dimensions,
+        FormatOption::Columns,
+        FormatOption::Origin,
+        FormatOption::Axes,
+        FormatOption::OneVehicle,
     ],
     packing: Packing::Any,
 };
@@ -62,7 +62,7 @@ pub(super) const TRAJNET: Reader = Reader {
     magic: &[],
     sniff: |_| false,
     open: |source, options| open(source, Format::TRAJNET, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
@@ -94,7 +94,7 @@ const TUPLES: Separator = Separator::Any(b" \t(),");
 
 /// Table in text.
 #[expect(clippy::struct_excessive_bools, reason = "independent properties of the lines")]
-pub(super) struct Text {
+pub(super) struct TextTable {
     source: Source,
     lines: Lines,
     separator: Separator,
@@ -117,10 +117,10 @@ pub(super) struct Text {
 
 /// Opens a table.
 fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut text = Text::open(source, format)?;
+    let mut text = TextTable::open(source, format)?;
     if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            Likeness::Certain => text = Text::open(source, Format::TRAJNET)?,
+            Likeness::Certain => text = TextTable::open(source, Format::TRAJNET)?,
             Likeness::Possible => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
                                whole";
@@ -146,11 +146,11 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
     };
-    let layout = layout.map_err(|fault| fault.at(Text::place(header_row)))?;
+    let layout = layout.map_err(|fault| fault.at(TextTable::place(header_row)))?;
     table::open(source, text, layout, None, 0, options)
 }
 
-impl Text {
+impl TextTable {
     /// Opens a table and reads its header, or the first line of a table without one.
     pub(super) fn open(source: &Source, format: Format) -> Result<Self, ReadError> {
         let mut lines = Lines::new(source)?;
@@ -286,7 +286,7 @@ impl Text {
     }
 }
 
-impl Cells for Text {
+impl Cells for TextTable {
     fn header(&self) -> &[String] {
         &self.header
     }
@@ -507,10 +507,10 @@ impl Fields {
 const NORM: f64 = 0.01;
 
 /// Returns the columns of a vehicle whose x is in column `x`.
-fn body(x: usize, dimensions: Dimensions) -> Body {
+fn body(x: usize, dimensions: Dimensions) -> VehicleColumns {
     let (axes, count) = dimensions.counts();
     let from = |first: usize| [0, 1, 2].map(|axis| (axis < axes).then_some(first + axis));
-    Body { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
+    VehicleColumns { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
 }
 
 /// Returns the layout of a table without a header whose first row holds these numbers: time and the numbers of each
@@ -518,7 +518,7 @@ fn body(x: usize, dimensions: Dimensions) -> Body {
 pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
     let count = first.len();
     let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
-    let table = |time, names, bodies: Vec<Body>, words: &str| {
+    let table = |time, names, bodies: Vec<VehicleColumns>, words: &str| {
         let note = format!("there is no header: the numbers are read as {words}");
         Layout {
             time,
@@ -531,7 +531,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         }
     };
     let one = |time, position: [usize; 3], words| {
-        let body = Body { position: position.map(Some), velocity: None, radius: None };
+        let body = VehicleColumns { position: position.map(Some), velocity: None, radius: None };
         table(time, vec![alone.to_owned()], vec![body], words)
     };
     if let &[_, _, _, _, x, y, z, w] = first

@@ -25,14 +25,14 @@ pub(super) type Geodetic = Vector3<f64>;
 
 /// Local frame of an origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Local {
+pub(super) struct LocalFrame {
     origin: Geodetic,
     centre_m: Vector3<f64>,
     /// Rows: east, north, up.
     axes: Matrix3<f64>,
 }
 
-impl Local {
+impl LocalFrame {
     /// Returns the frame of this origin.
     pub(super) fn at(origin: Geodetic) -> Result<Self, Fault> {
         let centre_m = centred(origin)?;
@@ -147,7 +147,7 @@ pub(super) fn origin<C: Cells>(
     cells: &mut C,
     layout: &Layout,
     options: &ReadOptions,
-) -> Result<Option<Local>, ReadError> {
+) -> Result<Option<LocalFrame>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
         let needless =
@@ -164,7 +164,7 @@ pub(super) fn origin<C: Cells>(
         };
         let at_row = |fault: Fault| fault.at(C::place(cells.row()));
         if let Some(place) = place.map_err(at_row)? {
-            return Ok(Some(Local::first(place, options).map_err(at_row)?));
+            return Ok(Some(LocalFrame::first(place, options).map_err(at_row)?));
         }
     }
     if reference.is_some() {
@@ -207,12 +207,12 @@ fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option
 
 /// Converts a position with an origin in its row to the frame `local`; returns `false` if the origin is unknown or a
 /// validity column is 0. `there` caches the frame of the origin.
-pub(super) fn bring(
+pub(super) fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
     (columns, valid): ([usize; 3], &[usize]),
-    local: Option<Local>,
-    there: &mut Option<Local>,
+    local: Option<LocalFrame>,
+    there: &mut Option<LocalFrame>,
 ) -> Result<bool, Fault> {
     for &column in valid {
         if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
@@ -222,7 +222,7 @@ pub(super) fn bring(
     let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
     let there = match there.filter(|there| there.is_at(place)) {
         Some(there) => there,
-        None => *there.insert(Local::at(place)?),
+        None => *there.insert(LocalFrame::at(place)?),
     };
     row.position = local.place_from(&there, row.position);
     row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
@@ -288,7 +288,7 @@ mod tests {
     fn local_frame_is_a_rotation_and_a_shift() {
         let all: Vec<_> = places().collect();
         for origin in &all {
-            let local = Local::at(*origin).expect("a place");
+            let local = LocalFrame::at(*origin).expect("a place");
             assert_eq!(local.place(*origin).expect("a place"), Vector3::zeros());
             assert!((local.axes * local.axes.transpose() - Matrix3::identity()).norm() < 1e-15);
             assert!((local.axes.determinant() - 1.0).abs() < 1e-15);
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn positions_keep_their_place_when_the_origin_changes() {
         let (here, there) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
-        let [here, there] = [here, there].map(|place| Local::at(place).expect("a place"));
+        let [here, there] = [here, there].map(|place| LocalFrame::at(place).expect("a place"));
         let place = vector![47.011, 8.019, 470.0];
         let moved = here.place_from(&there, there.place(place).expect("a place"));
         assert!((moved - here.place(place).expect("a place")).norm() < 4.0 * ROUNDING_M, "{moved}");
@@ -311,7 +311,7 @@ mod tests {
     #[test]
     fn arc_seconds_match_the_radii_of_curvature() {
         let origin = vector![47.0, 8.0, 0.0];
-        let local = Local::at(origin).expect("a place");
+        let local = LocalFrame::at(origin).expect("a place");
         let second = 1.0 / 3600.0;
         let squared = FLATTENING * (2.0 - FLATTENING);
         let sine = 47.0_f64.to_radians().sin();
@@ -326,10 +326,10 @@ mod tests {
 
     #[test]
     fn antimeridian_and_poles_need_no_special_case() {
-        let local = Local::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
+        let local = LocalFrame::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
         let over = local.place(vector![0.0, -179.999_99, 0.0]).expect("a place");
         assert!((over.x - 2.0e-5_f64.to_radians() * EQUATOR_M).abs() < 1e-6, "{over}");
-        let pole = Local::at(vector![90.0, 0.0, 0.0]).expect("a place");
+        let pole = LocalFrame::at(vector![90.0, 0.0, 0.0]).expect("a place");
         let turned = pole.place(vector![90.0, 123.0, 0.0]).expect("a place");
         assert!(turned.norm() < ROUNDING_M, "every longitude is the pole: {turned}");
     }
@@ -337,8 +337,8 @@ mod tests {
     #[test]
     fn places_off_the_earth_are_refused() {
         for place in [vector![90.1, 0.0, 0.0], vector![473_977_420.0, 0.0, 0.0], vector![f64::NAN, 0.0, 0.0]] {
-            assert!(Local::at(place).is_err(), "{place}");
+            assert!(LocalFrame::at(place).is_err(), "{place}");
         }
-        assert!(Local::at(vector![0.0, 360.1, 0.0]).is_err());
+        assert!(LocalFrame::at(vector![0.0, 360.1, 0.0]).is_err());
     }
 }

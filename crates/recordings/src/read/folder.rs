@@ -210,7 +210,7 @@ fn natural(name: &str) -> String {
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
 
 /// File of one vehicle.
-struct Part {
+struct JoinedFile {
     path: PathBuf,
     tracks: Recording,
     /// Offset of its clock from the clock of the recording \[s\].
@@ -224,7 +224,7 @@ struct Part {
 /// Vehicles of several files, merged in order of time. One block of each file is in memory.
 struct Joined {
     vehicles: Vec<String>,
-    parts: Vec<Part>,
+    parts: Vec<JoinedFile>,
     /// Planar if a file has no heights; then the heights of the other files are ignored.
     metadata: Metadata,
 }
@@ -284,7 +284,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
-        joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
+        joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).cloned();
@@ -358,7 +358,7 @@ fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
     }
 }
 
-impl Part {
+impl JoinedFile {
     /// Reads the next items if none are waiting.
     fn fill(&mut self, vehicle: usize, is_planar: bool) -> Result<(), ReadError> {
         if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {

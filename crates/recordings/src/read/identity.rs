@@ -48,7 +48,7 @@ pub(super) fn spelling(name: &str) -> String {
 }
 
 /// Returns the fault of two names with the same key.
-fn alike(first: &str, second: &str) -> Fault {
+fn same_spelling_fault(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
     Fault::coded(
         "recording/vehicle-twice",
@@ -95,7 +95,7 @@ impl Names {
     fn add(&mut self, name: String) -> Result<usize, Fault> {
         let index = self.in_order.len();
         if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            return Err(alike(&self.in_order[first], &name));
+            return Err(same_spelling_fault(&self.in_order[first], &name));
         }
         self.spellings.insert(spelling(&name), index);
         self.indices.insert(name.as_str().into(), index);
@@ -136,7 +136,7 @@ impl Names {
 
 /// Alternative vehicle column of a table, compared with the one in use.
 #[derive(Clone, Debug)]
-pub(super) struct Rival {
+pub(super) struct AlternativeId {
     pub(super) column: usize,
     /// Its value for each vehicle, and the vehicle of each value.
     of: Vec<Option<Box<str>>>,
@@ -144,7 +144,7 @@ pub(super) struct Rival {
     contradicts: bool,
 }
 
-impl Rival {
+impl AlternativeId {
     pub(super) fn new(column: usize) -> Self {
         Self { column, of: Vec::new(), vehicles: BTreeMap::new(), contradicts: false }
     }
@@ -176,7 +176,7 @@ impl Rival {
 
 /// Unused column, examined over the rows of one vehicle: its values may distinguish several vehicles.
 #[derive(Clone, Debug)]
-pub(super) struct Suspect {
+pub(super) struct SuspectColumn {
     pub(super) column: usize,
     values: HashMap<Box<str>, Value>,
     last: Option<Box<str>>,
@@ -220,7 +220,7 @@ impl Track {
     }
 }
 
-impl Suspect {
+impl SuspectColumn {
     pub(super) fn new(column: usize) -> Self {
         Self {
             column,

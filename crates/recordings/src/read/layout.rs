@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::axes::Convention;
-use super::clock::{Rest, TimeUnit};
+use super::clock::{SubunitColumn, TimeUnit};
 use super::error::{Fault, list, quoted, refuse};
 use super::heading::{EARTH, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::identity::Slots;
@@ -23,7 +23,7 @@ pub(super) struct Layout {
     /// Column of the time; `None` if the row number is the time.
     pub(super) time: Option<usize>,
     /// Column of the remainder of the time, in a smaller unit.
-    pub(super) rest: Option<Rest>,
+    pub(super) rest: Option<SubunitColumn>,
     /// Unit in the name of the time column.
     pub(super) unit: Option<TimeUnit>,
     /// Column of the vehicle in a long table.
@@ -31,13 +31,13 @@ pub(super) struct Layout {
     /// Whether the user names the column `id`.
     pub(super) is_id_given: bool,
     /// Other columns of a long table whose names could be those of a vehicle column.
-    pub(super) rivals: Vec<usize>,
+    pub(super) alternative_ids: Vec<usize>,
     /// Unused columns whose values could identify vehicles in a table that seems to hold only one.
     pub(super) suspects: Vec<usize>,
     /// Names of the vehicles of a wide table; empty for a long one.
     pub(super) names: Vec<String>,
     /// Columns of each vehicle of a wide table, or of every row of a long one.
-    pub(super) bodies: Vec<Body>,
+    pub(super) bodies: Vec<VehicleColumns>,
     /// Columns with the vehicle names of a wide table, if any.
     pub(super) slots: Slots,
     /// Factor of each column: the size of the unit in its name \[m or m/s\], or 1.
@@ -71,7 +71,7 @@ impl Layout {
             None => clock::unit_of_time(&header[time], options)?
                 .or(convention.counts_from_boot.then_some(TimeUnit::Microseconds)),
         };
-        let (id, rivals) = naming_columns(header, time, columns.get("", ID));
+        let (id, alternative_ids) = naming_columns(header, time, columns.get("", ID));
         let is_id_given = columns.get("", ID).is_some();
 
         let is_taken = |column| column == time || id == Some(column) || rest.is_some_and(|rest| rest.column == column);
@@ -117,14 +117,14 @@ impl Layout {
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
         let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
         let is_planar = !flat.is_empty();
-        let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
+        let bodies = if is_planar { bodies.into_iter().map(VehicleColumns::flattened).collect() } else { bodies };
         let mut layout = Self {
             time: Some(time),
             rest,
             unit,
             id,
             is_id_given,
-            rivals,
+            alternative_ids,
             names,
             bodies,
             on_earth,
@@ -163,7 +163,7 @@ impl Layout {
         }
         let of_heights: BTreeSet<_> =
             heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
-        let of = |body: &Body| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
+        let of = |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
         let positions = self.bodies.iter().flat_map(of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
             .filter(|column| !of_heights.contains(column))
@@ -202,7 +202,7 @@ impl Layout {
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
             let may_name =
                 |column: &usize| heading::may_name(&header[*column]) && !clock::is_part_of_time(&header[*column]);
-            let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
+            let suspects = unused.clone().filter(|column| may_name(column) && !self.alternative_ids.contains(column));
             self.suspects = suspects.collect();
         }
         // Pandas renames a second column `x` to `x.1`.
@@ -249,7 +249,7 @@ impl Layout {
         let columns: BTreeSet<_> = self
             .columns()
             .into_iter()
-            .chain(self.rivals.iter().copied())
+            .chain(self.alternative_ids.iter().copied())
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .collect();
@@ -258,7 +258,7 @@ impl Layout {
 
     /// Returns the columns that are read, each once, in ascending order.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let of = |body: &Body| {
+        let of = |body: &VehicleColumns| {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
@@ -315,14 +315,14 @@ fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Opti
 
 /// Columns of the position, velocity and radius of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Body {
+pub(super) struct VehicleColumns {
     /// x, y and optionally z; or latitude, longitude and height.
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
 }
 
-impl Body {
+impl VehicleColumns {
     /// Removes the height.
     pub(super) fn flattened(mut self) -> Self {
         self.position[2] = None;
@@ -398,7 +398,11 @@ impl<'a> Columns<'a> {
 
     /// Returns the note on height columns recognised by name. Such heights point up, whatever the mapping of the other
     /// axes.
-    pub(super) fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
+    pub(super) fn heights_used(
+        &self,
+        bodies: &[VehicleColumns],
+        options: &ReadOptions,
+    ) -> Result<Option<String>, Fault> {
         let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
         let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
         if self.place != EARTH {
@@ -462,7 +466,7 @@ impl<'a> Columns<'a> {
 
     /// Returns the columns of a vehicle. Requires x and y of the position; a velocity must have the same axes as the
     /// position.
-    pub(super) fn body(&self, vehicle: &str) -> Result<Body, Fault> {
+    pub(super) fn body(&self, vehicle: &str) -> Result<VehicleColumns, Fault> {
         let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
         let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
         let (position, velocity) = (axes(self.place), axes(VELOCITY));
@@ -475,7 +479,7 @@ impl<'a> Columns<'a> {
             };
             return Err(missing(self.header, lacks + axis, &of));
         }
-        Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
+        Ok(VehicleColumns { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }
 
     /// Returns the factor of each column by the unit in its name. If one length unit is not metres, all names need a
@@ -561,7 +565,7 @@ mod tests {
     #[test]
     fn long_header_is_read_in_any_order() {
         let layout = layout("z,Y [m],id,x,time_ms,vx,vy,vz,battery").expect("a layout");
-        let body = Body { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
+        let body = VehicleColumns { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
         assert_eq!((layout.time, layout.unit), (Some(4), Some(TimeUnit::Milliseconds)));
         assert_eq!((layout.id, layout.bodies), (Some(2), vec![body]));
         assert_eq!(layout.notes, ["columns not used: battery"]);

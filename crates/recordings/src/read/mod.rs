@@ -161,7 +161,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
     let left_out = folder.note();
     if format.transpose()? == Some(Format::CRAZYFLIE) {
-        options.refuse_needless(Format::CRAZYFLIE)?;
+        options.refuse_unsupported_options(Format::CRAZYFLIE)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
     }
@@ -181,13 +181,13 @@ fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     if let Some(format) = options.format.filter(|format| *format != Format::MCAP) {
         return Err(Fault::WrongFormat(format).into());
     }
-    options.refuse_needless(Format::MCAP)?;
+    options.refuse_unsupported_options(Format::MCAP)?;
     bag::open(path, options)
 }
 
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
     let format = recognise(&mut source, options.format)?;
-    options.refuse_needless(format)?;
+    options.refuse_unsupported_options(format)?;
     (format.open)(&source, options)
 }

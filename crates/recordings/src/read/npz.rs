@@ -23,8 +23,8 @@ use super::error::{Fault, Place, ReadError, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Archive, Source};
 
 pub(super) const READER: Reader = Reader {
@@ -35,7 +35,14 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"PK\x03\x04", b"PK\x05\x06"],
     sniff: |head| head.begins_with_any(READER.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
     open: |source, options| open(&source.clone().seekable()?, options),
-    takes: &[Takes::TimeUnit, Takes::Rows, Takes::Columns, Takes::Layout, Takes::Axes, Takes::OneVehicle],
+    supports: &[
+        FormatOption::TimeUnit,
+        FormatOption::Rows,
+        FormatOption::Columns,
+        FormatOption::Layout,
+        FormatOption::Axes,
+        FormatOption::OneVehicle,
+    ],
     packing: Packing::Any,
 };
 
@@ -94,12 +101,12 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
-    let mut about = About::new(source, options, unit, notes, none);
-    about.metadata.is_planar = is_planar;
+    let mut info = RecordingInfo::new(source, options, unit, notes, none);
+    info.metadata.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
-        about.epoch_ns = epoch;
+        info.epoch_ns = epoch;
     }
-    Ok(Box::new(Ordered::open(rows, about)?))
+    Ok(Box::new(Ordered::open(rows, info)?))
 }
 
 /// Returns the meaning of an axis by its name in the archive.

@@ -12,7 +12,7 @@ use super::error::{Fault, Place, ReadError, quoted};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 use super::table;
 use super::table::Cells;
@@ -25,7 +25,7 @@ pub(super) const READER: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(are_in),
     open,
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted, refuse};
-use super::readers::{Format, Takes};
+use super::readers::{Format, FormatOption};
 
 /// Meaning of an axis of an array of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -309,26 +309,36 @@ impl ReadOptions {
     }
 
     /// Refuses an option without a meaning for the format.
-    pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
+    pub(super) fn refuse_unsupported_options(&self, format: Format) -> Result<(), Fault> {
         let (is_turned, has_columns) = (!self.turn().is_identity(), self.columns != ColumnNames::default());
         let is_one_vehicle = self.one_vehicle && !self.is_joined;
         let given = [
-            (self.time_unit.is_some(), Takes::TimeUnit, "--time-unit", "has a fixed unit of time"),
-            (self.times_per_second.is_some(), Takes::TimeUnit, "--fps and --time-scale", "has a fixed unit of time"),
-            (self.sort, Takes::Rows, "--sort", "holds curves in order of time"),
-            (self.duplicates.is_some(), Takes::Rows, "--duplicates", "holds curves, not rows"),
-            (self.dimensions.is_some(), Takes::Dimensions, "--dimensions", "defines the numbers of a vehicle"),
-            (!self.starts.is_empty(), Takes::Starts, "--start", "does not hold relative curves"),
-            (has_columns, Takes::Columns, "--column", "has no columns"),
-            (self.layout.is_some(), Takes::Layout, "--layout", "has no arrays"),
-            (self.origin.is_some(), Takes::Origin, "--origin", "has no latitudes and longitudes"),
-            (self.frame.is_some(), Takes::Frame, "--frame", "has no frames"),
-            (!self.topics.is_empty(), Takes::Topics, "--topic", "has no topics"),
-            (is_turned, Takes::Axes, "--axes", "gives the directions of its axes"),
-            (is_one_vehicle, Takes::OneVehicle, "--one-vehicle", "names its vehicles"),
-            (self.allow_unfinished, Takes::Unfinished, "--allow-unfinished", "cannot be read before it is closed"),
+            (self.time_unit.is_some(), FormatOption::TimeUnit, "--time-unit", "has a fixed unit of time"),
+            (
+                self.times_per_second.is_some(),
+                FormatOption::TimeUnit,
+                "--fps and --time-scale",
+                "has a fixed unit of time",
+            ),
+            (self.sort, FormatOption::Rows, "--sort", "holds curves in order of time"),
+            (self.duplicates.is_some(), FormatOption::Rows, "--duplicates", "holds curves, not rows"),
+            (self.dimensions.is_some(), FormatOption::Dimensions, "--dimensions", "defines the numbers of a vehicle"),
+            (!self.starts.is_empty(), FormatOption::Starts, "--start", "does not hold relative curves"),
+            (has_columns, FormatOption::Columns, "--column", "has no columns"),
+            (self.layout.is_some(), FormatOption::Layout, "--layout", "has no arrays"),
+            (self.origin.is_some(), FormatOption::Origin, "--origin", "has no latitudes and longitudes"),
+            (self.frame.is_some(), FormatOption::Frame, "--frame", "has no frames"),
+            (!self.topics.is_empty(), FormatOption::Topics, "--topic", "has no topics"),
+            (is_turned, FormatOption::Axes, "--axes", "gives the directions of its axes"),
+            (is_one_vehicle, FormatOption::OneVehicle, "--one-vehicle", "names its vehicles"),
+            (
+                self.allow_unfinished,
+                FormatOption::Unfinished,
+                "--allow-unfinished",
+                "cannot be read before it is closed",
+            ),
         ];
-        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.takes.contains(of)) {
+        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.supports.contains(of)) {
             Some((.., option, why)) => {
                 refuse("recording/unused-option", format!("{} {why}", format.title), format!("omit {option}"))
             }

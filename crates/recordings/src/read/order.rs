@@ -22,7 +22,7 @@ pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y
 pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 
 /// Properties of a recording besides its rows.
-pub(super) struct About {
+pub(super) struct RecordingInfo {
     pub(super) path: PathBuf,
     /// Unit of the times, if known.
     pub(super) unit: Option<TimeUnit>,
@@ -42,7 +42,7 @@ pub(super) struct About {
     pub(super) none: Fault,
 }
 
-impl About {
+impl RecordingInfo {
     /// Returns the properties for these options. The unit of the user takes precedence over `said`, the unit of the
     /// file.
     pub(super) fn new(
@@ -73,7 +73,7 @@ impl About {
 /// and time is surveyed first: it is streamed if time never decreases, else sorted in memory. The time of one vehicle
 /// must not decrease: its clock was set, or two vehicles have one name. The option `sort` sorts such rows.
 pub(super) struct Ordered<R> {
-    about: About,
+    info: RecordingInfo,
     rows: R,
     timing: Timing,
     /// Rows read but not yet returned.
@@ -94,8 +94,8 @@ pub(super) struct Ordered<R> {
 
 impl<R: Rows> Ordered<R> {
     /// Reads as much of the recording as its order and its clock require.
-    pub(super) fn open(mut rows: R, mut about: About) -> Result<Self, ReadError> {
-        let (sort, metadata) = (about.sort, &mut about.metadata);
+    pub(super) fn open(mut rows: R, mut info: RecordingInfo) -> Result<Self, ReadError> {
+        let (sort, metadata) = (info.sort, &mut info.metadata);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -113,10 +113,10 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(about.none.into()) };
-        let settled = || Timing::settle(&probe, about.unit);
-        let (mut timing, note) = about.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
-        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(about.epoch_ns);
+        let Some(probe) = probe else { return Err(info.none.into()) };
+        let settled = || Timing::settle(&probe, info.unit);
+        let (mut timing, note) = info.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
+        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
         metadata.notes.extend(note);
         // After a survey, notes and the assumption cover all rows.
         metadata.assumed = rows.assumed();
@@ -138,7 +138,7 @@ impl<R: Rows> Ordered<R> {
         metadata.clock = timing.clock.clone();
         let batch = first.into_iter();
         Ok(Self {
-            about,
+            info,
             rows,
             timing,
             batch,
@@ -185,8 +185,7 @@ impl<R: Rows> Ordered<R> {
             }
         }
         let sample = self.sample(row, time_s)?;
-        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.about.metadata.earth_origin.is_some())
-        {
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.info.metadata.earth_origin.is_some()) {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
                 return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
@@ -203,7 +202,7 @@ impl<R: Rows> Ordered<R> {
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
         let says_the_same =
             (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.about.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+        match self.info.duplicates.or(says_the_same.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
@@ -221,9 +220,9 @@ impl<R: Rows> Ordered<R> {
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,
-            position_m: row.position * self.about.scale,
-            velocity_m_s: row.velocity.map(|velocity| velocity * self.about.scale),
-            radius_m: row.radius.map(|radius| radius * self.about.scale),
+            position_m: row.position * self.info.scale,
+            velocity_m_s: row.velocity.map(|velocity| velocity * self.info.scale),
+            radius_m: row.radius.map(|radius| radius * self.info.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         if time_s.is_finite()
@@ -287,7 +286,7 @@ impl<R: Rows> Ordered<R> {
 
     fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        let waits = self.about.duplicates == Some(Duplicates::Last);
+        let waits = self.info.duplicates == Some(Duplicates::Last);
         while items.len() < before + BATCH || (waits && self.continues_instant()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
@@ -296,14 +295,14 @@ impl<R: Rows> Ordered<R> {
         if items.len() == before && self.left_out > 0 {
             let rows = std::mem::take(&mut self.left_out);
             let which = if waits { "a later" } else { "an earlier" };
-            self.about
+            self.info
                 .metadata
                 .notes
                 .push(format!("rows omitted because {which} row of the vehicle has the same time: {rows}"));
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            self.about.metadata.notes.extend(self.rows.late_notes());
+            self.info.metadata.notes.extend(self.rows.late_notes());
         }
         Ok(items.len() > before)
     }
@@ -317,11 +316,11 @@ impl<R: Rows> Tracks for Ordered<R> {
     }
 
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        self.try_read(items).map_err(|fault| fault.of(&self.about.path))
+        self.try_read(items).map_err(|fault| fault.of(&self.info.path))
     }
 
     fn metadata(&self) -> &Metadata {
-        &self.about.metadata
+        &self.info.metadata
     }
 }
 

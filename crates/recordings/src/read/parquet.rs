@@ -20,7 +20,7 @@ use super::error::{Fault, Place, ReadError, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 use super::table;
 use super::table::Cells;
@@ -33,7 +33,7 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"PAR1"],
     sniff: |head| head.begins_with_any(READER.magic),
     open: |source, options| open(&source.clone().seekable()?, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
@@ -66,7 +66,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         unreadable(&reader, column).is_none()
             && !matches!(physical, Physical::BOOLEAN | Physical::INT96 | Physical::FIXED_LEN_BYTE_ARRAY)
     };
-    layout.rivals.retain(can_name);
+    layout.alternative_ids.retain(can_name);
     layout.suspects.retain(can_name);
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {

@@ -27,8 +27,8 @@ pub struct Reader {
     /// Whether a file is of this format, by its first bytes. The first row of [`READERS`] that accepts a file reads it.
     pub(super) sniff: fn(&Head<'_>) -> bool,
     pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-    /// Options of [`Takes`] that this format supports.
-    pub(super) takes: &'static [Takes],
+    /// Options of [`FormatOption`] that this format supports.
+    pub(super) supports: &'static [FormatOption],
     pub(super) packing: Packing,
 }
 
@@ -51,7 +51,7 @@ pub static READERS: &[Reader] = &[
 
 /// Options that only some formats support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Takes {
+pub(super) enum FormatOption {
     TimeUnit,
     Rows,
     Dimensions,
@@ -66,7 +66,7 @@ pub(super) enum Takes {
     Unfinished,
 }
 
-impl Takes {
+impl FormatOption {
     /// Options of tables with named columns.
     pub(super) const TABLE: &'static [Self] =
         &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle];

@@ -15,7 +15,7 @@ use super::curves::{Curves, distinct, from_json, piece};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Archive, Source};
 use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
@@ -28,7 +28,7 @@ pub(super) const READER: Reader = Reader {
     magic: &[],
     sniff: |head| head.begins_with_any(npz::READER.magic) || head.is_text(|text| text.starts_with(b"{")),
     open,
-    takes: &[Takes::Axes],
+    supports: &[FormatOption::Axes],
     packing: Packing::None,
 };
 

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::clock::{Date, Probe, Stamp, TimeUnit};
-use super::earth::{Local, bring, is_no_fix, no_fixes, origin};
+use super::earth::{LocalFrame, convert_to_local, is_no_fix, no_fixes, origin};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
-use super::identity::{Names, Rival, Suspect, SwapMonitor};
-use super::layout::{Body, Layout};
+use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
+use super::layout::{Layout, VehicleColumns};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::Source;
 
 /// Number of vehicles, from the first on, whose rows are examined for several vehicles under one name.
@@ -23,17 +23,17 @@ struct Table<C> {
     layout: Layout,
     names: Names,
     /// Frame that converts latitude, longitude and height to metres.
-    local: Option<Local>,
+    local: Option<LocalFrame>,
     /// Frame of the last origin, if rows have their own origin.
-    there: Option<Local>,
+    there: Option<LocalFrame>,
     /// Whether the clock starts with the vehicle and other files are read too.
     has_own_clock: bool,
     /// First time, if times are dates.
     dates: Option<Date>,
     /// Alternative vehicle columns.
-    rivals: Vec<Rival>,
+    alternative_ids: Vec<AlternativeId>,
     /// For each vehicle, unused columns that may distinguish several vehicles among its rows.
-    suspects: Vec<Vec<Suspect>>,
+    suspects: Vec<Vec<SuspectColumn>>,
     /// Quantities of a wide table whose values may be vehicle names.
     watches: Vec<SwapMonitor>,
     /// Number of positions whose vehicle is named by a column of a wide table.
@@ -62,21 +62,21 @@ pub(super) fn open<C: Cells + 'static>(
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
-    let mut about = About::new(source, options, unit, layout.notes.clone(), Fault::header_only());
+    let mut info = RecordingInfo::new(source, options, unit, layout.notes.clone(), Fault::header_only());
     if dates.is_some_and(|first| !first.has_zone) {
-        about.metadata.notes.push("times are dates without a zone and are read as UTC".to_owned());
+        info.metadata.notes.push("times are dates without a zone and are read as UTC".to_owned());
     }
-    about.metadata.has_directions = layout.convention.has_directions();
-    about.metadata.is_planar = layout.is_planar;
+    info.metadata.has_directions = layout.convention.has_directions();
+    info.metadata.is_planar = layout.is_planar;
     let names = Names::from_list(layout.names.clone())?;
     let local = origin(&mut cells, &layout, options)?;
-    about.metadata.notes.extend(local.map(|local| local.note()));
-    about.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
+    info.metadata.notes.extend(local.map(|local| local.note()));
+    info.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
     // For places on the Earth the scale applies to heights only, and is part of the column factors.
-    about.scale = if layout.on_earth { 1.0 } else { about.scale };
+    info.scale = if layout.on_earth { 1.0 } else { info.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
-    let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
+    let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
     let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let table = Table {
         cells,
@@ -86,7 +86,7 @@ pub(super) fn open<C: Cells + 'static>(
         there: None,
         has_own_clock,
         dates,
-        rivals,
+        alternative_ids,
         suspects: Vec::new(),
         watches,
         named: 0,
@@ -94,7 +94,7 @@ pub(super) fn open<C: Cells + 'static>(
         vehicle: 0,
         count: 0,
     };
-    Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
+    Ok(Box::new(Ordered::open(table, RecordingInfo { epoch_ns, ..info })?))
 }
 
 /// Returns the first time of a table if it is a date.
@@ -195,7 +195,7 @@ impl<C: Cells> Table<C> {
             }
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
-                if !bring(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
+                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
                     continue;
                 }
             } else if let Some(local) = &self.local {
@@ -223,7 +223,7 @@ impl<C: Cells> Table<C> {
     fn suspect(&mut self, row: Option<Row>) -> Result<(), Fault> {
         let Some(row) = row.filter(|row| row.vehicle < MOST_SUSPECTED) else { return Ok(()) };
         while self.suspects.len() <= row.vehicle {
-            self.suspects.push(self.layout.suspects.iter().copied().map(Suspect::new).collect());
+            self.suspects.push(self.layout.suspects.iter().copied().map(SuspectColumn::new).collect());
         }
         let suspects = &mut self.suspects[row.vehicle];
         for suspect in suspects.iter_mut() {
@@ -261,7 +261,8 @@ impl<C: Cells> Table<C> {
         let called = |column: usize| quoted(&header[column]);
         // Two rows at two times may belong to two vehicles.
         if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
-            let others: Vec<_> = self.layout.rivals.iter().chain(&self.layout.suspects).copied().map(called).collect();
+            let others: Vec<_> =
+                self.layout.alternative_ids.iter().chain(&self.layout.suspects).copied().map(called).collect();
             let others = if others.is_empty() {
                 String::new()
             } else {
@@ -272,11 +273,11 @@ impl<C: Cells> Table<C> {
             let remedy = "name the column of the vehicle with --column id=NAME, or remove this one";
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
-        if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
-            let (first, other) = (called(id), called(rival.column));
+        if let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) {
+            let (first, other) = (called(id), called(alternative.column));
             let problem =
                 format!("the columns {first} and {other} could both name the vehicle, but contradict each other");
-            let [first, other] = [&header[id], &header[rival.column]];
+            let [first, other] = [&header[id], &header[alternative.column]];
             let remedy = format!("choose one with --column id={first} or --column id={other}");
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
@@ -286,7 +287,13 @@ impl<C: Cells> Table<C> {
 
 /// Returns the row of a vehicle; `None` if it was not seen.
 #[inline]
-fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[f64]) -> Result<Option<Row>, Fault> {
+fn row(
+    cells: &impl Cells,
+    stamp: Stamp,
+    vehicle: usize,
+    body: &VehicleColumns,
+    metres: &[f64],
+) -> Result<Option<Row>, Fault> {
     let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
     let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
     let radius = match body.radius {
@@ -352,7 +359,7 @@ impl<C: Cells> Rows for Table<C> {
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
         let mut columns: Vec<usize> = self.layout.of_time().chain([id]).collect();
-        columns.extend(&self.layout.rivals);
+        columns.extend(&self.layout.alternative_ids);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe: Option<Probe> = None;
@@ -363,9 +370,10 @@ impl<C: Cells> Rows for Table<C> {
             probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
-            for rival in &mut self.rivals {
-                let value = self.cells.text(rival.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
-                rival.see(self.vehicle, value.trim());
+            for alternative in &mut self.alternative_ids {
+                let value =
+                    self.cells.text(alternative.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
+                alternative.see(self.vehicle, value.trim());
             }
         }
         self.check_names(id, rows, is_one_instant)?;

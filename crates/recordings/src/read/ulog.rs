@@ -18,11 +18,11 @@ use nalgebra::Vector3;
 
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
-use super::earth::{Local, is_no_fix, no_fixes};
+use super::earth::{LocalFrame, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 
 pub(super) const READER: Reader = Reader {
@@ -33,7 +33,13 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"ULog\x01\x12\x35"],
     sniff: |head| head.begins_with_any(READER.magic),
     open,
-    takes: &[Takes::Rows, Takes::Origin, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    supports: &[
+        FormatOption::Rows,
+        FormatOption::Origin,
+        FormatOption::Topics,
+        FormatOption::Axes,
+        FormatOption::Unfinished,
+    ],
     packing: Packing::Any,
 };
 
@@ -71,7 +77,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
         return refuse("recording/no-fix", problem, remedy);
     };
-    let local = Local::first(first.origin, options)?;
+    let local = LocalFrame::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
     notes.push(local.note());
     notes.push(format!("positions are read from {topic}"));
@@ -82,11 +88,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     notes.push(clock.to_owned());
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
     let none = Fault::coded("recording/empty", "it holds no position", "record again");
-    let mut about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
-    about.metadata.earth_origin = Some(local.measured_from(options.origin));
+    let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Microseconds), notes, none);
+    info.metadata.earth_origin = Some(local.measured_from(options.origin));
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
-    Ok(Box::new(Ordered::open(rows, about)?))
+    Ok(Box::new(Ordered::open(rows, info)?))
 }
 
 /// Position of the vehicle.
@@ -285,16 +291,16 @@ impl Log {
         Ok(())
     }
 
-    fn rows(&self, fixes: &[Fix], local: &Local) -> Result<Vec<Row>, ReadError> {
+    fn rows(&self, fixes: &[Fix], local: &LocalFrame) -> Result<Vec<Row>, ReadError> {
         let mut there = *local;
         let row = |fix: &Fix| self.row(fix, local, &mut there).map_err(|fault| fault.at(Place::Byte(fix.at)));
         fixes.iter().map(row).collect()
     }
 
     /// Converts a position to the frame `local`; `there` caches the frame of the last origin.
-    fn row(&self, fix: &Fix, local: &Local, there: &mut Local) -> Result<Row, Fault> {
+    fn row(&self, fix: &Fix, local: &LocalFrame, there: &mut LocalFrame) -> Result<Row, Fault> {
         if !there.is_at(fix.origin) {
-            *there = Local::at(fix.origin)?;
+            *there = LocalFrame::at(fix.origin)?;
         }
         let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
         let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);

@@ -15,7 +15,7 @@ use super::curves::{Curves, from_json};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 use tautline_core::track::{Item, Sample};
 
@@ -33,7 +33,7 @@ pub(super) const READER: Reader = Reader {
         head.is_text(|text| text.starts_with(b"{") && holds(text))
     },
     open,
-    takes: &[Takes::Rows],
+    supports: &[FormatOption::Rows],
     packing: Packing::Any,
 };
 

@@ -13,7 +13,7 @@ use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::readers::BAG;
 use super::super::source::{Source, ZSTD_MAGIC};
-use super::foreign::{self, Splits};
+use super::foreign::{self, SplitFiles};
 
 /// File name of the index of a bag.
 const METADATA: &str = "metadata.yaml";
@@ -72,7 +72,7 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
         Ok(source)
     };
     let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
-    foreign::open(&Source::file(folder), Splits::new(files, bag.message_count, options), options)
+    foreign::open(&Source::file(folder), SplitFiles::new(files, bag.message_count, options), options)
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {

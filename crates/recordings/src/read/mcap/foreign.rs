@@ -7,29 +7,29 @@ use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
-use super::messages::{EARTH, Seen, What, Who, is_list, reader_of_topic};
+use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
 use super::outline::{is_static, place, space};
-use super::plan::{Plan, Way};
-use super::tree::{Known, Placed};
+use super::plan::{Conversion, ReadPlan};
+use super::tree::{FramePose, TransformAt};
 use crate::mcap::topic::{Message, Part, TopicReader};
 
 /// Opens a recording in consecutive files; `whole` is the source named in errors.
-pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let plan = Plan::of(&mut splits, options)?;
+pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let plan = ReadPlan::of(&mut splits, options)?;
     let none = plan.none();
-    let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    about.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
+    let mut info = RecordingInfo::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
+    info.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Duplicates of messages indicate overlapping files and are refused by default.
-    about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
-    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
-    Ok(Box::new(Ordered::open(foreign, about)?))
+    info.duplicates = info.duplicates.or(Some(Duplicates::Refuse));
+    let foreign = ForeignRows { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
+    Ok(Box::new(Ordered::open(foreign, info)?))
 }
 
 /// Rows of a foreign recording.
-struct Foreign {
-    splits: Splits,
+struct ForeignRows {
+    splits: SplitFiles,
     poses: Poses,
     /// Whether all topics hold lists of poses.
     listed: bool,
@@ -39,7 +39,7 @@ struct Foreign {
     starts: Vec<u64>,
 }
 
-impl Rows for Foreign {
+impl Rows for ForeignRows {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
         let mut more = true;
@@ -112,7 +112,7 @@ impl Rows for Foreign {
 }
 
 /// Parts of consecutive files, in order. Compressed files are unpacked one at a time.
-pub(super) struct Splits {
+pub(super) struct SplitFiles {
     files: Vec<Source>,
     /// Index of the next file.
     next: usize,
@@ -125,7 +125,7 @@ pub(super) struct Splits {
     pub(super) notes: Vec<String>,
 }
 
-impl Splits {
+impl SplitFiles {
     pub(super) fn new(files: Vec<Source>, least_messages: u64, options: &ReadOptions) -> Self {
         Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
     }
@@ -199,7 +199,7 @@ impl Splits {
 
 /// Converter of messages to positions.
 pub(super) struct Poses {
-    plan: Plan,
+    plan: ReadPlan,
     /// Frame of all positions so far, and the topic of its first occurrence.
     frame: Option<(String, String)>,
     /// Name of each vehicle: topic and index, or frame.
@@ -209,29 +209,29 @@ pub(super) struct Poses {
     pub(super) messages: u64,
     /// Number of positions without a fix.
     no_fixes: u64,
-    brought: Brought,
+    conversions: ConversionCounts,
 }
 
 /// Number of positions transformed to the requested frame, by accuracy.
 #[derive(Clone, Copy, Default)]
-struct Brought {
+struct ConversionCounts {
     /// By transforms at the time of the position.
-    exactly: u64,
+    exact: u64,
     /// By a transform interpolated between two samples.
-    guessed: u64,
+    interpolated: u64,
     /// Omitted, because a transform is unknown at that time.
     unknown: u64,
 }
 
 impl Poses {
-    pub(super) fn new(plan: Plan) -> Self {
-        let brought = Brought::default();
-        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, brought }
+    pub(super) fn new(plan: ReadPlan) -> Self {
+        let conversions = ConversionCounts::default();
+        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, conversions }
     }
 
     /// Restarts at the first message.
     pub(super) fn rewind(&mut self) {
-        (self.messages, self.no_fixes, self.brought) = (0, 0, Brought::default());
+        (self.messages, self.no_fixes, self.conversions) = (0, 0, ConversionCounts::default());
     }
 
     /// Appends the rows of a message.
@@ -242,10 +242,10 @@ impl Poses {
         Ok(())
     }
 
-    fn append(&mut self, seen: Seen, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+    fn append(&mut self, seen: Observation, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let topic = &message.of.topic;
         let time_ns = self.plan.time_of(topic, seen.stamp_ns, message.log_ns);
-        if let What::Transform(turn) = seen.what {
+        if let PoseKind::Transform(turn) = seen.what {
             return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
         }
         check_finite(&seen.position)?;
@@ -255,15 +255,15 @@ impl Poses {
         }
         let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };
         let name = match seen.who {
-            Who::Topic => topic.clone(),
-            Who::Listed(number) => format!("{topic}/{number}"),
-            Who::Named(name) => name,
+            VehicleKey::Topic => topic.clone(),
+            VehicleKey::Listed(number) => format!("{topic}/{number}"),
+            VehicleKey::Named(name) => name,
         };
         self.push(&name, time_ns, position, rows)
     }
 
     /// Returns a pose in the requested frame; `None` if it cannot be transformed.
-    fn position(&mut self, seen: &Seen, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
+    fn position(&mut self, seen: &Observation, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
         let Some(wanted) = &self.plan.wanted else {
             self.check_frame(&seen.frame, topic)?;
             let local = self.plan.earth.filter(|_| seen.frame == EARTH);
@@ -280,22 +280,22 @@ impl Poses {
         if *wanted == seen.frame {
             return Ok(Some(seen.position));
         }
-        let way = self.plan.bring(topic, &seen.frame, time_ns)?;
-        let known = self.brought.count(&way);
+        let way = self.plan.conversion_of(topic, &seen.frame, time_ns)?;
+        let known = self.conversions.count(&way);
         Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
     }
 
     /// Appends the vehicles whose poses follow from a transform.
     fn append_bodies(
         &mut self,
-        seen: &Seen,
+        seen: &Observation,
         turn: [f64; 4],
         topic: &str,
         time_ns: i64,
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let space = space(topic);
-        let Who::Named(driver) = &seen.who else { return Ok(()) };
+        let VehicleKey::Named(driver) = &seen.who else { return Ok(()) };
         let Some(bodies) = self.plan.bodies_of(space, driver).cloned() else { return Ok(()) };
         check_finite(&seen.position)?;
         if self.plan.wanted.is_none() {
@@ -307,9 +307,9 @@ impl Poses {
             let position = if is_there {
                 Some(seen.position)
             } else {
-                let placed = Placed { position: seen.position, turn }.rigid()?;
-                let way = self.plan.bring_body(space, &body, placed, time_ns)?;
-                self.brought.count(&way).map(|known| known.transform.translation.vector)
+                let placed = FramePose { position: seen.position, turn }.rigid()?;
+                let way = self.plan.conversion_of_vehicle(space, &body, placed, time_ns)?;
+                self.conversions.count(&way).map(|known| known.transform.translation.vector)
             };
             let Some(position) = position else { continue };
             let several = self.plan.outline.trees.len() > 1;
@@ -344,18 +344,18 @@ impl Poses {
 
     /// Returns the assumption behind interpolated transforms, if there are any.
     pub(super) fn assumed(&self) -> Option<String> {
-        (self.brought.guessed > 0).then(|| "transforms are uniform between their samples".to_owned())
+        (self.conversions.interpolated > 0).then(|| "transforms are uniform between their samples".to_owned())
     }
 
     /// Returns the notes for the user.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.plan.notes();
         notes.extend(no_fixes(self.no_fixes, ""));
-        let Brought { exactly, guessed, unknown } = self.brought;
-        if exactly + guessed + unknown > 0 {
+        let ConversionCounts { exact, interpolated, unknown } = self.conversions;
+        if exact + interpolated + unknown > 0 {
             let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
             notes.push(format!(
-                "positions transformed{into}: {exactly} by transforms at their time, {guessed} by interpolation between two \
+                "positions transformed{into}: {exact} by transforms at their time, {interpolated} by interpolation between two \
                  samples at most 1 s apart; {unknown} omitted because a transform is unknown"
             ));
         }
@@ -363,16 +363,16 @@ impl Poses {
     }
 }
 
-impl Brought {
+impl ConversionCounts {
     /// Counts a position; returns its transform.
-    fn count(&mut self, way: &Way) -> Option<Known> {
+    fn count(&mut self, way: &Conversion) -> Option<TransformAt> {
         match way {
-            Way::None => return None,
-            Way::NotThen => self.unknown += 1,
-            Way::By(Known { guessed: true, .. }) => self.guessed += 1,
-            Way::By(_) => self.exactly += 1,
+            Conversion::None => return None,
+            Conversion::Unknown => self.unknown += 1,
+            Conversion::By(TransformAt { interpolated: true, .. }) => self.interpolated += 1,
+            Conversion::By(_) => self.exact += 1,
         }
-        if let Way::By(known) = way { Some(*known) } else { None }
+        if let Conversion::By(known) = way { Some(*known) } else { None }
     }
 }
 

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use crate::mcap::topic::{CDR, Declared, decode};
 
 /// Decoder of messages in an encoding; the error describes the damage.
-pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;
+pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Observation>, String>;
 
 /// Frame name of positions on the Earth: latitude, longitude \[degrees\] and height \[m\].
 pub(super) const EARTH: &str = "WGS 84";
@@ -20,19 +20,19 @@ pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 /// Position in a message.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
-    pub(super) who: Who,
+pub(super) struct Observation {
+    pub(super) who: VehicleKey,
     /// Frame of the position.
     pub(super) frame: String,
     /// Time since the epoch of the clock \[ns\]; 0 if the message has none.
     pub(super) stamp_ns: i64,
     pub(super) position: Vector3<f64>,
-    pub(super) what: What,
+    pub(super) what: PoseKind,
 }
 
 /// Identification of the vehicle of a position.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Who {
+pub(super) enum VehicleKey {
     /// The topic is the vehicle.
     Topic,
     /// Index in a list of poses, from 1.
@@ -43,7 +43,7 @@ pub(super) enum Who {
 
 /// Kind of a position.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum PoseKind {
     Pose,
     /// Pose of a robot's own frame, with the name of that frame.
     Odometry(String),
@@ -72,24 +72,24 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
         "geometry_msgs/msg/PoseStamped" | "geometry_msgs/msg/PoseWithCovarianceStamped" => |encoding, bytes| {
             // The covariance follows the pose.
             let (header, pose): (Header, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(Who::Topic, pose)])
+            Ok(vec![header.seen(VehicleKey::Topic, pose)])
         },
         "geometry_msgs/msg/PointStamped" => |encoding, bytes| {
             let (header, point): (Header, [f64; 3]) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(Who::Topic, CdrPose(point, [0.0; 4]))])
+            Ok(vec![header.seen(VehicleKey::Topic, CdrPose(point, [0.0; 4]))])
         },
         "geometry_msgs/msg/PoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<CdrPose>) = decode_ros(encoding, bytes)?;
-            Ok((1..).zip(poses).map(|(number, pose)| header.seen(Who::Listed(number), pose)).collect())
+            Ok((1..).zip(poses).map(|(number, pose)| header.seen(VehicleKey::Listed(number), pose)).collect())
         },
         "motion_capture_tracking_interfaces/msg/NamedPoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<(String, CdrPose)>) = decode_ros(encoding, bytes)?;
-            Ok(poses.into_iter().map(|(name, pose)| header.seen(Who::Named(name), pose)).collect())
+            Ok(poses.into_iter().map(|(name, pose)| header.seen(VehicleKey::Named(name), pose)).collect())
         },
         // The velocity after the pose is not read: publishers differ on its frame.
         "nav_msgs/msg/Odometry" => |encoding, bytes| {
             let (header, child, pose): (Header, String, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![Seen { what: What::Odometry(child), ..header.seen(Who::Topic, pose) }])
+            Ok(vec![Observation { what: PoseKind::Odometry(child), ..header.seen(VehicleKey::Topic, pose) }])
         },
         FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::seen),
         "geometry_msgs/msg/TransformStamped" => {
@@ -134,10 +134,10 @@ fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, St
 struct Header((i32, u32), String);
 
 impl Header {
-    fn seen(&self, who: Who, CdrPose(position, _): CdrPose) -> Seen {
+    fn seen(&self, who: VehicleKey, CdrPose(position, _): CdrPose) -> Observation {
         let Self((sec, nanosec), frame) = self;
         let stamp_ns = nanoseconds((*sec).into(), (*nanosec).into());
-        Seen { who, frame: frame.clone(), stamp_ns, position: position.into(), what: What::Pose }
+        Observation { who, frame: frame.clone(), stamp_ns, position: position.into(), what: PoseKind::Pose }
     }
 }
 
@@ -150,9 +150,9 @@ struct CdrPose([f64; 3], [f64; 4]);
 struct Transform(Header, String, CdrPose);
 
 impl Transform {
-    fn seen(self) -> Seen {
+    fn seen(self) -> Observation {
         let Self(header, child, pose) = self;
-        Seen { what: What::Transform(pose.1), ..header.seen(Who::Named(child), pose) }
+        Observation { what: PoseKind::Transform(pose.1), ..header.seen(VehicleKey::Named(child), pose) }
     }
 }
 
@@ -162,12 +162,12 @@ struct Fix(Header, (i8, u16), [f64; 3]);
 
 impl Fix {
     /// Returns the position, or nothing without a fix or a height.
-    fn seen(self) -> Vec<Seen> {
+    fn seen(self) -> Vec<Observation> {
         let Self(header, (status, _), place) = self;
         if status < 0 || place[2].is_nan() {
             return Vec::new();
         }
-        vec![Seen { frame: EARTH.to_owned(), ..header.seen(Who::Topic, CdrPose(place, [0.0; 4])) }]
+        vec![Observation { frame: EARTH.to_owned(), ..header.seen(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
     }
 }
 
@@ -222,10 +222,10 @@ struct Pose {
 }
 
 /// Returns the position of a Foxglove message, whose absent values are 0.
-fn foxglove_seen(who: Who, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Seen {
+fn foxglove_seen(who: VehicleKey, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Observation {
     let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
     let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));
-    Seen { who, frame, stamp_ns, position, what: What::Pose }
+    Observation { who, frame, stamp_ns, position, what: PoseKind::Pose }
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]
@@ -240,8 +240,8 @@ struct PoseInFrame {
 }
 
 impl PoseInFrame {
-    fn seen(self) -> Seen {
-        foxglove_seen(Who::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
+    fn seen(self) -> Observation {
+        foxglove_seen(VehicleKey::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
     }
 }
 
@@ -257,9 +257,9 @@ struct PosesInFrame {
 }
 
 impl PosesInFrame {
-    fn seen(self) -> Vec<Seen> {
+    fn seen(self) -> Vec<Observation> {
         let one = |(number, pose): (usize, &Pose)| {
-            foxglove_seen(Who::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
+            foxglove_seen(VehicleKey::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
         };
         (1..).zip(&self.poses).map(one).collect()
     }
@@ -281,11 +281,15 @@ struct FrameTransform {
 }
 
 impl FrameTransform {
-    fn seen(self) -> Seen {
+    fn seen(self) -> Observation {
         let turn = self.rotation.map_or(NO_TURN, |q| [q.x, q.y, q.z, q.w]);
-        let seen =
-            foxglove_seen(Who::Named(self.child_frame_id), self.parent_frame_id, self.timestamp, self.translation);
-        Seen { what: What::Transform(turn), ..seen }
+        let seen = foxglove_seen(
+            VehicleKey::Named(self.child_frame_id),
+            self.parent_frame_id,
+            self.timestamp,
+            self.translation,
+        );
+        Observation { what: PoseKind::Transform(turn), ..seen }
     }
 }
 

@@ -27,11 +27,11 @@ use std::path::Path;
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
-use foreign::Splits;
+use foreign::SplitFiles;
 use tautline_core::record::{ReadFault, RecordError};
 
 pub(in crate::read) const READER: Reader = Reader {
@@ -42,7 +42,14 @@ pub(in crate::read) const READER: Reader = Reader {
     magic: &[b"\x89MCAP0\r\n"],
     sniff: |head| head.begins_with_any(READER.magic),
     open,
-    takes: &[Takes::Rows, Takes::Origin, Takes::Frame, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    supports: &[
+        FormatOption::Rows,
+        FormatOption::Origin,
+        FormatOption::Frame,
+        FormatOption::Topics,
+        FormatOption::Axes,
+        FormatOption::Unfinished,
+    ],
     packing: Packing::None,
 };
 
@@ -84,7 +91,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         Some(Origin::Run) => return own::open_samples(source, options),
         Some(Origin::Export) => return own::open_export(source, options),
         Some(Origin::Foreign) => {
-            return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
+            return foreign::open(source, SplitFiles::new(vec![source.clone()], 0, options), options);
         }
         None => {}
     }

@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
-use super::foreign::Splits;
-use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
-use super::tree::{Body, Placed, Tree};
+use super::foreign::SplitFiles;
+use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
+use super::tree::{FramePose, Tree, VehicleFrame};
 use crate::mcap::topic::{Declared, Message, Part};
 
 /// Largest number of topic parts searched for a namespace of transforms.
@@ -20,7 +20,7 @@ const CHOOSE: &str = "choose the topics to read with --topic NAME, once per topi
 
 /// Topic with positions.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct PoseTopic {
     pub(super) schema: String,
     /// Frames of its positions.
     pub(super) frames: BTreeSet<String>,
@@ -42,7 +42,7 @@ pub(super) struct Outline {
     /// Frames, by the namespace of their transform topics.
     pub(super) trees: BTreeMap<String, Tree>,
     /// Topics with positions that are read, except transforms.
-    pub(super) topics: BTreeMap<String, Told>,
+    pub(super) topics: BTreeMap<String, PoseTopic>,
     /// Topics with positions that are not read, because the user names others.
     unread: BTreeSet<String>,
     /// Topics of moving transforms.
@@ -60,7 +60,7 @@ pub(super) fn place(number: u64, message: &Message<'_>) -> Place {
 
 impl Outline {
     /// Reads all messages of the topics in `named`, or of all topics if it is empty, and all transforms.
-    pub(super) fn of(splits: &mut Splits, named: &[String]) -> Result<Self, ReadError> {
+    pub(super) fn of(splits: &mut SplitFiles, named: &[String]) -> Result<Self, ReadError> {
         let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
@@ -68,7 +68,7 @@ impl Outline {
                 outline.unread.insert(message.of.topic.clone());
             }
             let all = outline.seen_in(&message, &mut number)?;
-            let listed = all.iter().filter(|seen| matches!(seen.who, Who::Listed(_))).count();
+            let listed = all.iter().filter(|seen| matches!(seen.who, VehicleKey::Listed(_))).count();
             let learnt = outline
                 .count(&message, listed)
                 .and_then(|()| all.into_iter().try_for_each(|seen| outline.learn(&message, seen)));
@@ -83,7 +83,7 @@ impl Outline {
     }
 
     /// Decodes the positions of a message; `number` counts the messages that can have some.
-    pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
+    pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Observation>, ReadError> {
         let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
         *number += 1;
         if !self.reads(message.of) {
@@ -98,11 +98,11 @@ impl Outline {
         if listed == 0 {
             return Ok(());
         }
-        let told = self.topics.entry(message.of.topic.clone()).or_default();
-        if told.listed != 0 && told.listed != listed {
+        let described = self.topics.entry(message.of.topic.clone()).or_default();
+        if described.listed != 0 && described.listed != listed {
             let problem = format!(
                 "it lists {listed} poses, but earlier messages {}: indices then do not identify vehicles",
-                told.listed
+                described.listed
             );
             return refuse(
                 "recording/list-length",
@@ -111,47 +111,47 @@ impl Outline {
                  choose other topics with --topic",
             );
         }
-        told.listed = listed;
+        described.listed = listed;
         Ok(())
     }
 
-    fn learn(&mut self, message: &Message<'_>, seen: Seen) -> Result<(), Fault> {
+    fn learn(&mut self, message: &Message<'_>, seen: Observation) -> Result<(), Fault> {
         let topic = &message.of.topic;
         if seen.stamp_ns != 0 && !self.stamped.contains(topic) {
             self.stamped.insert(topic.clone());
         }
-        if let (What::Transform(turn), Who::Named(child)) = (&seen.what, &seen.who) {
-            let still = is_static(topic).then_some(Placed { position: seen.position, turn: *turn });
-            if still.is_none() && !self.transforms.contains(topic) {
+        if let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (&seen.what, &seen.who) {
+            let fixed_pose = is_static(topic).then_some(FramePose { position: seen.position, turn: *turn });
+            if fixed_pose.is_none() && !self.transforms.contains(topic) {
                 self.transforms.insert(topic.clone());
             }
-            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, fixed_pose);
             return Ok(());
         }
         if seen.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame has the reserved name {}", quoted(EARTH));
             return refuse("recording/unusable-frame", problem, "rename the frame");
         }
-        let told = self.topics.entry(topic.clone()).or_default();
-        told.schema.clone_from(&message.of.schema);
+        let described = self.topics.entry(topic.clone()).or_default();
+        described.schema.clone_from(&message.of.schema);
         if seen.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&seen.position) {
             self.first_fix = Some(seen.position);
         }
-        if !told.frames.contains(&seen.frame) {
-            told.frames.insert(seen.frame);
+        if !described.frames.contains(&seen.frame) {
+            described.frames.insert(seen.frame);
         }
         match seen.who {
-            Who::Topic => told.is_vehicle = true,
-            Who::Named(name) => drop(told.names.insert(name)),
-            Who::Listed(_) => {}
+            VehicleKey::Topic => described.is_vehicle = true,
+            VehicleKey::Named(name) => drop(described.names.insert(name)),
+            VehicleKey::Listed(_) => {}
         }
-        let What::Odometry(child) = seen.what else { return Ok(()) };
-        if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
+        let PoseKind::Odometry(child) = seen.what else { return Ok(()) };
+        if let Some(known) = described.child.as_ref().filter(|known| **known != child) {
             let problem =
                 format!("it is the odometry of {}, but earlier messages of {}", quoted(&child), quoted(known));
             return refuse("recording/several-vehicles", problem, "record each robot on its own topic");
         }
-        told.child = Some(child);
+        described.child = Some(child);
         Ok(())
     }
 
@@ -182,14 +182,14 @@ impl Outline {
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
-        for (topic, told) in &self.topics {
-            for name in &told.names {
+        for (topic, described) in &self.topics {
+            for name in &described.names {
                 if let Some(first) = named.insert(name.as_str(), topic) {
                     return Err(twice(first, topic, &quoted(name)));
                 }
             }
         }
-        for (topic, told) in self.topics.iter().filter(|(_, told)| told.is_vehicle) {
+        for (topic, described) in self.topics.iter().filter(|(_, described)| described.is_vehicle) {
             if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
                 return Err(twice(first, topic, &quoted(name)));
             }
@@ -197,8 +197,10 @@ impl Outline {
                 continue;
             }
             let robot = namespace(topic);
-            let (first, schema) = *robots.entry(robot).or_insert((topic, &told.schema));
-            if *schema != told.schema || (first != topic && [first, topic].iter().any(|topic| is_wish(last(topic)))) {
+            let (first, schema) = *robots.entry(robot).or_insert((topic, &described.schema));
+            if *schema != described.schema
+                || (first != topic && [first, topic].iter().any(|topic| is_setpoint(last(topic))))
+            {
                 let who = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
                 return Err(twice(first, topic, &who));
             }
@@ -208,33 +210,34 @@ impl Outline {
 
     /// Refuses setpoint topics beside topics of measured positions, unless the user names the topics. Setpoints must
     /// not replace measured positions.
-    pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
-        let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
-        let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
-        let (wish, other) = (quoted(wish), quoted(other));
-        let problem = format!("topic {wish} has the name of a setpoint, but {other} beside it does not");
+    pub(super) fn refuse_setpoints(&self) -> Result<(), Fault> {
+        let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_setpoint(topic));
+        let Some((setpoint, other)) = self.setpoints().next().zip(others.next()) else { return Ok(()) };
+        let (setpoint, other) = (quoted(setpoint), quoted(other));
+        let problem = format!("topic {setpoint} has the name of a setpoint, but {other} beside it does not");
         refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
     /// Returns the topics with names of setpoints, unless the user names the topics.
-    pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
-        let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
-        guessed.map(String::as_str).filter(|topic| is_wish(topic))
+    pub(super) fn setpoints(&self) -> impl Iterator<Item = &str> {
+        let interpolated = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
+        interpolated.map(String::as_str).filter(|topic| is_setpoint(topic))
     }
 
     /// Returns the topics that are vehicles, with each frame of their positions.
     pub(super) fn given_in(&self) -> impl Iterator<Item = (&str, &str)> {
-        let vehicles = self.topics.iter().filter(|(_, told)| told.is_vehicle);
-        vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
+        let vehicles = self.topics.iter().filter(|(_, described)| described.is_vehicle);
+        vehicles
+            .flat_map(|(topic, described)| described.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
     }
 
     /// Returns the vehicles that pose topics describe, for comparison with transforms.
-    pub(super) fn cover(&self) -> Cover<'_> {
-        let mut cover = Cover::default();
-        for (topic, told) in &self.topics {
-            cover.names.extend(told.names.iter().map(String::as_str));
-            cover.names.extend(Some(last(namespace(topic))).filter(|name| told.is_vehicle && !name.is_empty()));
-            let Some((child, (space, tree))) = told.child.as_deref().zip(self.tree_of(topic)) else { continue };
+    pub(super) fn cover(&self) -> Coverage<'_> {
+        let mut cover = Coverage::default();
+        for (topic, described) in &self.topics {
+            cover.names.extend(described.names.iter().map(String::as_str));
+            cover.names.extend(Some(last(namespace(topic))).filter(|name| described.is_vehicle && !name.is_empty()));
+            let Some((child, (space, tree))) = described.child.as_deref().zip(self.tree_of(topic)) else { continue };
             cover.children.insert((space, child));
             cover.carriers.extend(tree.way_up(child).into_iter().flatten().map(|frame| (space, frame)));
         }
@@ -244,7 +247,7 @@ impl Outline {
 
 /// Vehicles that pose topics describe.
 #[derive(Default)]
-pub(super) struct Cover<'a> {
+pub(super) struct Coverage<'a> {
     /// Names in messages, and names of the namespaces of topics.
     names: BTreeSet<&'a str>,
     /// Odometry frames with their namespaces, and these frames with all frames above them.
@@ -252,9 +255,9 @@ pub(super) struct Cover<'a> {
     carriers: BTreeSet<(&'a str, &'a str)>,
 }
 
-impl Cover<'_> {
+impl Coverage<'_> {
     /// Returns whether a vehicle of the transforms in a namespace is among these.
-    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &Body) -> bool {
+    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &VehicleFrame) -> bool {
         let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
         let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
         let way = tree.way_up(&body.frame);
@@ -285,7 +288,7 @@ pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a st
 /// Words in names of setpoint topics, which hold commanded instead of measured positions. Sources: MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
 /// (`motion_reference/pose`), planners, and clicks in viewers.
-const WISHES: Words = Words(
+const SETPOINT_WORDS: Words = Words(
     "clicked cmd command commanded des desired goal initialpose plan planned planner planning predicted ref \
      reference setpoint sp target waypoint wp",
 );
@@ -311,8 +314,10 @@ pub(super) fn space(topic: &str) -> &str {
 }
 
 /// Returns whether a name contains a word for setpoints, in the singular or the plural.
-pub(super) fn is_wish(name: &str) -> bool {
-    let is_one = |word: &str| WISHES.contains(word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(one));
+pub(super) fn is_setpoint(name: &str) -> bool {
+    let is_one = |word: &str| {
+        SETPOINT_WORDS.contains(word) || word.strip_suffix('s').is_some_and(|one| SETPOINT_WORDS.contains(one))
+    };
     words(name).split(' ').any(is_one)
 }
 
@@ -345,11 +350,11 @@ mod tests {
 
 #[cfg(test)]
 mod topic_name_tests {
-    use super::is_wish;
+    use super::is_setpoint;
 
     #[test]
     fn setpoint_topics_are_recognised_by_name() {
-        let wishes = [
+        let setpoints = [
             "/cf1/goal_pose",
             "/cf1/cmd_full_state",
             "/uav/Setpoint",
@@ -364,8 +369,8 @@ mod topic_name_tests {
             "/move_base_simple/goal",
             "/target/pose",
         ];
-        for name in wishes {
-            assert!(is_wish(name), "{name}");
+        for name in setpoints {
+            assert!(is_setpoint(name), "{name}");
         }
         let vehicles = [
             "/cf1/pose",
@@ -379,7 +384,7 @@ mod topic_name_tests {
             "/spot/odometry",
         ];
         for name in vehicles {
-            assert!(!is_wish(name), "{name}");
+            assert!(!is_setpoint(name), "{name}");
         }
     }
 }

@@ -18,7 +18,7 @@ use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
@@ -56,10 +56,10 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     exported.next(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
     let none = Fault::coded("recording/empty", "it holds no instant", "export again");
-    let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    (about.epoch_ns, about.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
+    let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    (info.epoch_ns, info.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
-    Ok(Box::new(Ordered::open(exported, about)?))
+    Ok(Box::new(Ordered::open(exported, info)?))
 }
 
 /// Exported recording.
@@ -226,8 +226,8 @@ pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Rec
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::coded("recording/empty", "it holds no sample", "record again");
-    let about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    Ok(Box::new(Ordered::open(run, about)?))
+    let info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    Ok(Box::new(Ordered::open(run, info)?))
 }
 
 /// Samples of a run.

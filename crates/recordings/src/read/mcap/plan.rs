@@ -5,53 +5,53 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Vector3};
 
 use super::super::axes;
-use super::super::earth::Local;
+use super::super::earth::LocalFrame;
 use super::super::error::{Fault, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
-use super::foreign::Splits;
-use super::messages::{EARTH, What, Who};
+use super::foreign::SplitFiles;
+use super::messages::{EARTH, PoseKind, VehicleKey};
 use super::outline::{Outline, is_static, place, refuse_own_frames, space};
-use super::tree::{Body, Chain, Known, Placed, Tree};
+use super::tree::{Chain, FramePose, TransformAt, Tree, VehicleFrame};
 use crate::mcap::topic::Part;
 
 /// Data to read, and their transforms.
-pub(super) struct Plan {
+pub(super) struct ReadPlan {
     pub(super) outline: Outline,
     /// Frame to which all positions are transformed.
     pub(super) wanted: Option<String>,
     /// Local frame of places on the Earth, if there are any.
-    pub(super) earth: Option<Local>,
+    pub(super) earth: Option<LocalFrame>,
     /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` if there are none.
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
     /// Vehicles of the transforms, by namespace and driver.
-    bodies: BTreeMap<String, BTreeMap<String, Vec<Body>>>,
+    bodies: BTreeMap<String, BTreeMap<String, Vec<VehicleFrame>>>,
     notes: Vec<String>,
 }
 
 /// Transform of a position to the requested frame.
-pub(super) enum Way {
+pub(super) enum Conversion {
     /// No transforms connect the frames.
     None,
     /// A transform is unknown at that time.
-    NotThen,
-    By(Known),
+    Unknown,
+    By(TransformAt),
 }
 
-impl Way {
-    fn of(known: Option<Known>) -> Self {
-        known.map_or(Self::NotThen, Self::By)
+impl Conversion {
+    fn of(known: Option<TransformAt>) -> Self {
+        known.map_or(Self::Unknown, Self::By)
     }
 }
 
-impl Plan {
+impl ReadPlan {
     /// Reads all messages once and decides which are used.
-    pub(super) fn of(splits: &mut Splits, options: &ReadOptions) -> Result<Self, ReadError> {
+    pub(super) fn of(splits: &mut SplitFiles, options: &ReadOptions) -> Result<Self, ReadError> {
         let outline = Outline::of(splits, &options.topics)?;
         let first_fix = outline.first_fix;
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
             wanted: options.frame.clone(),
-            earth: origin.map(Local::at).transpose()?,
+            earth: origin.map(LocalFrame::at).transpose()?,
             chains: BTreeMap::new(),
             bodies: BTreeMap::new(),
             notes: Vec::new(),
@@ -85,7 +85,7 @@ impl Plan {
             return refuse("recording/unknown-topic", problem, "choose one of these with --topic");
         }
         self.outline.refuse_twice()?;
-        self.outline.refuse_wishes()
+        self.outline.refuse_setpoints()
     }
 
     /// Finds the vehicles of the transforms, unless pose topics describe them.
@@ -139,9 +139,9 @@ impl Plan {
             }
         }
         if let Some(wanted) = &self.wanted {
-            for (topic, told) in &self.outline.topics {
+            for (topic, described) in &self.outline.topics {
                 let Some((space, _)) = self.outline.tree_of(topic) else { continue };
-                let others = told.frames.iter().filter(|frame| *frame != wanted && *frame != EARTH);
+                let others = described.frames.iter().filter(|frame| *frame != wanted && *frame != EARTH);
                 ways.extend(others.map(|frame| (space.to_owned(), frame.clone(), wanted.clone(), None)));
             }
         }
@@ -161,7 +161,11 @@ impl Plan {
     }
 
     /// Stores the moving transforms that must be known at all times.
-    fn gather(&mut self, needed: &BTreeMap<String, BTreeSet<String>>, splits: &mut Splits) -> Result<(), ReadError> {
+    fn gather(
+        &mut self,
+        needed: &BTreeMap<String, BTreeSet<String>>,
+        splits: &mut SplitFiles,
+    ) -> Result<(), ReadError> {
         if needed.values().all(BTreeSet::is_empty) {
             return Ok(());
         }
@@ -171,14 +175,14 @@ impl Plan {
             let topic = &message.of.topic;
             let space = space(topic);
             for seen in self.outline.seen_in(&message, &mut number)? {
-                let (What::Transform(turn), Who::Named(child)) = (seen.what, seen.who) else { continue };
+                let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (seen.what, seen.who) else { continue };
                 if is_static(topic) || !needed.get(space).is_some_and(|frames| frames.contains(&child)) {
                     continue;
                 }
                 let time_ns = self.time_of(topic, seen.stamp_ns, message.log_ns);
-                let placed = Placed { position: seen.position, turn };
+                let placed = FramePose { position: seen.position, turn };
                 let tree = self.outline.trees.entry(space.to_owned()).or_default();
-                tree.remember(&child, time_ns, &placed).map_err(|fault| fault.at(place(number, &message)))?;
+                tree.store(&child, time_ns, &placed).map_err(|fault| fault.at(place(number, &message)))?;
             }
             Ok(())
         })?;
@@ -194,7 +198,7 @@ impl Plan {
     }
 
     /// Returns the vehicles whose poses follow from the transforms of a frame.
-    pub(super) fn bodies_of(&self, space: &str, driver: &str) -> Option<&Vec<Body>> {
+    pub(super) fn bodies_of(&self, space: &str, driver: &str) -> Option<&Vec<VehicleFrame>> {
         self.bodies.get(space)?.get(driver)
     }
 
@@ -204,23 +208,25 @@ impl Plan {
     }
 
     /// Returns the transform of poses of a topic from a frame to the requested one.
-    pub(super) fn bring(&self, topic: &str, frame: &str, time_ns: i64) -> Result<Way, Fault> {
-        let Some((space, tree)) = self.outline.tree_of(topic) else { return Ok(Way::None) };
-        self.chain(space, frame).map_or(Ok(Way::None), |chain| Ok(Way::of(tree.along(chain, time_ns, None)?)))
+    pub(super) fn conversion_of(&self, topic: &str, frame: &str, time_ns: i64) -> Result<Conversion, Fault> {
+        let Some((space, tree)) = self.outline.tree_of(topic) else { return Ok(Conversion::None) };
+        self.chain(space, frame)
+            .map_or(Ok(Conversion::None), |chain| Ok(Conversion::of(tree.transform_along(chain, time_ns, None)?)))
     }
 
     /// Returns the transform of a vehicle of the transforms, given the pose of its driver. A vehicle that carries the
     /// requested frame has none.
-    pub(super) fn bring_body(
+    pub(super) fn conversion_of_vehicle(
         &self,
         space: &str,
-        body: &Body,
+        body: &VehicleFrame,
         driver: Isometry3<f64>,
         time_ns: i64,
-    ) -> Result<Way, Fault> {
+    ) -> Result<Conversion, Fault> {
         let chain = self.chain(space, &body.frame).filter(|chain| chain.leads_up_over(&body.driver));
-        let along = |chain| self.outline.trees[space].along(chain, time_ns, Some((&body.driver, driver)));
-        chain.map_or(Ok(Way::None), |chain| Ok(Way::of(along(chain)?)))
+        let transform_along =
+            |chain| self.outline.trees[space].transform_along(chain, time_ns, Some((&body.driver, driver)));
+        chain.map_or(Ok(Conversion::None), |chain| Ok(Conversion::of(transform_along(chain)?)))
     }
 
     /// Returns the fault of a recording without positions.
@@ -249,7 +255,7 @@ impl Plan {
     }
 
     /// Returns the local frame of places on the Earth, if these are read.
-    pub(super) fn local(&self) -> Option<Local> {
+    pub(super) fn local(&self) -> Option<LocalFrame> {
         self.earth.filter(|_| self.wanted.is_none())
     }
 
@@ -257,22 +263,22 @@ impl Plan {
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.notes.clone();
         notes.extend(self.local().map(|local| local.note()));
-        if self.outline.topics.values().any(|told| told.schema == "nav_msgs/msg/Odometry") {
+        if self.outline.topics.values().any(|described| described.schema == "nav_msgs/msg/Odometry") {
             let why = "publishers differ on their frame";
             notes.push(format!("velocities of odometry are not used: {why}"));
         }
         let bodies: BTreeSet<_> =
             self.bodies.values().flat_map(|of| of.values().flatten()).map(|body| &*body.frame).collect();
-        let fixed = self.outline.trees.values().flat_map(Tree::still);
+        let fixed = self.outline.trees.values().flat_map(Tree::fixed_frames);
         let fixed: BTreeSet<_> = fixed.filter(|frame| !bodies.contains(frame)).collect();
         if !fixed.is_empty() {
             let fixed: Vec<_> = fixed.into_iter().collect();
             notes.push(format!("constant frames of tf_static are not vehicles: {}", fixed.join(", ")));
         }
-        let wishes: Vec<_> = self.outline.wishes().collect();
-        if !wishes.is_empty() {
-            let wishes = wishes.join(", ");
-            notes.push(format!("these topics have names of setpoints, not of measured positions: {wishes}"));
+        let setpoints: Vec<_> = self.outline.setpoints().collect();
+        if !setpoints.is_empty() {
+            let setpoints = setpoints.join(", ");
+            notes.push(format!("these topics have names of setpoints, not of measured positions: {setpoints}"));
         }
         notes.extend(self.left_out());
         notes
@@ -282,10 +288,10 @@ impl Plan {
     fn left_out(&self) -> Option<String> {
         let wanted = self.wanted.as_ref()?;
         let mut left_out = Vec::new();
-        for (topic, told) in &self.outline.topics {
+        for (topic, described) in &self.outline.topics {
             let leads =
                 |frame: &str| self.outline.tree_of(topic).is_some_and(|(space, _)| self.chain(space, frame).is_some());
-            let strays = told.frames.iter().filter(|frame| *frame != wanted && !leads(frame));
+            let strays = described.frames.iter().filter(|frame| *frame != wanted && !leads(frame));
             left_out.extend(strays.map(|frame| format!("{topic} in {frame}")));
         }
         for (space, body) in
@@ -301,7 +307,7 @@ impl Plan {
 }
 
 /// Returns the note on vehicles among the moving frames, if other frames move too.
-fn note_of(bodies: &[Body], others: &[&str]) -> Option<String> {
+fn note_of(bodies: &[VehicleFrame], others: &[&str]) -> Option<String> {
     let vehicles: Vec<_> = bodies.iter().map(|body| body.frame.as_str()).collect();
     let (vehicles, carriers) = (vehicles.join(", "), others.join(", "));
     (!others.is_empty())

@@ -24,13 +24,13 @@ const CARRIERS: [&str; 4] = ["map", "odom", "world", "earth"];
 struct Edge {
     parent: String,
     /// Constant pose, if there is one.
-    still: Option<Placed>,
+    fixed_pose: Option<FramePose>,
     /// Whether a transform topic moves the frame.
     moves: bool,
     /// A second parent, in contradictory transforms.
-    stray: Option<String>,
+    second_parent: Option<String>,
     /// Whether it has several constant poses, or a constant pose and also moves.
-    torn: bool,
+    is_contradictory: bool,
     /// Poses over time \[ns\], if interpolation requires them.
     samples: Vec<(i64, Isometry3<f64>)>,
 }
@@ -63,7 +63,7 @@ impl Chain {
 
 /// Vehicle described by transforms.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Body {
+pub(super) struct VehicleFrame {
     pub(super) frame: String,
     /// Nearest moving frame at or above it, whose samples give the poses of the vehicle.
     pub(super) driver: String,
@@ -73,18 +73,19 @@ pub(super) struct Body {
 
 impl Tree {
     /// Adds the parent of a frame, with its pose there if constant.
-    pub(super) fn learn(&mut self, child: &str, parent: &str, still: Option<Placed>) {
+    pub(super) fn learn(&mut self, child: &str, parent: &str, fixed_pose: Option<FramePose>) {
         let Some(known) = self.edges.get_mut(child) else {
-            let (parent, moves) = (parent.to_owned(), still.is_none());
-            let edge = Edge { parent, still, moves, stray: None, torn: false, samples: Vec::new() };
+            let (parent, moves) = (parent.to_owned(), fixed_pose.is_none());
+            let edge =
+                Edge { parent, fixed_pose, moves, second_parent: None, is_contradictory: false, samples: Vec::new() };
             self.edges.insert(child.to_owned(), edge);
             return;
         };
-        if known.parent != parent && known.stray.is_none() {
-            known.stray = Some(parent.to_owned());
+        if known.parent != parent && known.second_parent.is_none() {
+            known.second_parent = Some(parent.to_owned());
         }
-        known.moves |= still.is_none();
-        known.torn |= known.still != still;
+        known.moves |= fixed_pose.is_none();
+        known.is_contradictory |= known.fixed_pose != fixed_pose;
     }
 
     /// Returns whether a frame moves in its parent, even if it also has a constant pose there.
@@ -94,7 +95,7 @@ impl Tree {
 
     /// Refuses a frame with contradictory poses.
     fn check(&self, frame: &str) -> Result<(), Fault> {
-        if self.edges.get(frame).is_none_or(|edge| !edge.torn) {
+        if self.edges.get(frame).is_none_or(|edge| !edge.is_contradictory) {
             return Ok(());
         }
         let problem = format!("frame {} has several constant poses, or moves as well", quoted(frame));
@@ -102,7 +103,7 @@ impl Tree {
     }
 
     /// Returns the frames with constant poses.
-    pub(super) fn still(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn fixed_frames(&self) -> impl Iterator<Item = &str> {
         self.edges.iter().filter(|(_, edge)| !edge.moves).map(|(frame, _)| frame.as_str())
     }
 
@@ -115,9 +116,13 @@ impl Tree {
     pub(super) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
         let mut way = vec![frame];
         while let Some((child, edge)) = way.last().and_then(|last| self.edges.get_key_value(*last)) {
-            if let Some(stray) = &edge.stray {
-                let problem =
-                    format!("frame {} has the parents {} and {}", quoted(child), quoted(&edge.parent), quoted(stray));
+            if let Some(second_parent) = &edge.second_parent {
+                let problem = format!(
+                    "frame {} has the parents {} and {}",
+                    quoted(child),
+                    quoted(&edge.parent),
+                    quoted(second_parent)
+                );
                 let remedy = "record robots in separate namespaces, or choose topics of poses with --topic";
                 return refuse("recording/transforms", problem, remedy);
             }
@@ -131,7 +136,7 @@ impl Tree {
     }
 
     /// Returns the vehicles.
-    pub(super) fn bodies(&self) -> Result<Vec<Body>, Fault> {
+    pub(super) fn bodies(&self) -> Result<Vec<VehicleFrame>, Fault> {
         let ways: BTreeMap<_, _> =
             self.frames().map(|frame| Ok((frame, self.way_up(frame)?))).collect::<Result<_, Fault>>()?;
         let moved = |way: &[&str]| way.iter().any(|frame| self.moves(frame));
@@ -156,7 +161,7 @@ impl Tree {
         let body = |(frame, way): (&&str, &Vec<&str>)| {
             let at = way.iter().position(|frame| self.moves(frame))?;
             let [driver, carrier] = [way[at], way[at + 1]].map(str::to_owned);
-            let body = Body { frame: (*frame).to_owned(), driver, carrier };
+            let body = VehicleFrame { frame: (*frame).to_owned(), driver, carrier };
             Some(way[..=at].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
         };
         vehicles.filter_map(body).collect()
@@ -172,7 +177,7 @@ impl Tree {
     }
 
     /// Stores the pose of a moving frame.
-    pub(super) fn remember(&mut self, frame: &str, time_ns: i64, placed: &Placed) -> Result<(), Fault> {
+    pub(super) fn store(&mut self, frame: &str, time_ns: i64, placed: &FramePose) -> Result<(), Fault> {
         let transform = placed.rigid()?;
         if let Some(edge) = self.edges.get_mut(frame) {
             edge.samples.push((time_ns, transform));
@@ -194,37 +199,37 @@ impl Tree {
     }
 
     /// Returns the transform along a chain at a time; `given` is the known pose of one of its frames.
-    pub(super) fn along(
+    pub(super) fn transform_along(
         &self,
         chain: &Chain,
         time_ns: i64,
         given: Option<(&str, Isometry3<f64>)>,
-    ) -> Result<Option<Known>, Fault> {
-        let mut guessed = false;
+    ) -> Result<Option<TransformAt>, Fault> {
+        let mut interpolated = false;
         let mut product = |frames: &[String]| -> Result<Option<Isometry3<f64>>, Fault> {
             let mut whole = Isometry3::identity();
             for frame in frames {
                 let part = match given.filter(|(known, _)| known == frame) {
-                    Some((_, transform)) => Known { transform, guessed: false },
+                    Some((_, transform)) => TransformAt { transform, interpolated: false },
                     None => match self.place(frame, time_ns)? {
                         Some(known) => known,
                         None => return Ok(None),
                     },
                 };
-                guessed |= part.guessed;
+                interpolated |= part.interpolated;
                 whole = part.transform * whole;
             }
             Ok(Some(whole))
         };
         let (up, down) = (product(&chain.up)?, product(&chain.down)?);
-        Ok(up.zip(down).map(|(up, down)| Known { transform: down.inverse() * up, guessed }))
+        Ok(up.zip(down).map(|(up, down)| TransformAt { transform: down.inverse() * up, interpolated }))
     }
 
-    fn place(&self, frame: &str, time_ns: i64) -> Result<Option<Known>, Fault> {
+    fn place(&self, frame: &str, time_ns: i64) -> Result<Option<TransformAt>, Fault> {
         let Some(edge) = self.edges.get(frame) else { return Ok(None) };
         self.check(frame)?;
-        match &edge.still {
-            Some(placed) => Ok(Some(Known { transform: placed.rigid()?, guessed: false })),
+        match &edge.fixed_pose {
+            Some(placed) => Ok(Some(TransformAt { transform: placed.rigid()?, interpolated: false })),
             None => Ok(at(&edge.samples, time_ns)),
         }
     }
@@ -254,12 +259,12 @@ const NEARLY_SAME: f64 = 1.0 - 1e-9;
 
 /// Pose of a frame in its parent as recorded: position and the quaternion x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct FramePose {
     pub(super) position: Vector3<f64>,
     pub(super) turn: [f64; 4],
 }
 
-impl Placed {
+impl FramePose {
     /// Returns the transform from the frame to its parent.
     pub(super) fn rigid(&self) -> Result<Isometry3<f64>, Fault> {
         if let Some(odd) = self.position.iter().chain(&self.turn).find(|x| !x.is_finite()) {
@@ -277,26 +282,26 @@ impl Placed {
 
 /// Transform at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Known {
+pub(super) struct TransformAt {
     pub(super) transform: Isometry3<f64>,
     /// Whether it is interpolated between two samples.
-    pub(super) guessed: bool,
+    pub(super) interpolated: bool,
 }
 
 /// Returns a moving transform at a time from its samples in order of time; `None` outside of them or in a gap above
 /// [`LONGEST_BRACKET_NS`].
-pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<Known> {
+pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<TransformAt> {
     let after = samples.partition_point(|(stamp, _)| *stamp < time_ns);
     let (to_ns, to) = samples.get(after)?;
     if *to_ns == time_ns {
-        return Some(Known { transform: *to, guessed: false });
+        return Some(TransformAt { transform: *to, interpolated: false });
     }
     let (from_ns, from) = samples.get(after.checked_sub(1)?)?;
     let span_ns = to_ns.checked_sub(*from_ns).filter(|span| *span <= LONGEST_BRACKET_NS)?;
     let part = (time_ns - from_ns) as f64 / span_ns as f64;
     let shift = from.translation.vector.lerp(&to.translation.vector, part);
     let turn = between(from.rotation, to.rotation, part);
-    Some(Known { transform: Isometry3::from_parts(shift.into(), turn), guessed: true })
+    Some(TransformAt { transform: Isometry3::from_parts(shift.into(), turn), interpolated: true })
 }
 
 /// Spherical linear interpolation along the shortest arc.
@@ -319,17 +324,17 @@ mod tests {
     use super::super::messages::NO_TURN;
     use super::*;
 
-    const STILL: Option<Placed> = Some(Placed { position: Vector3::new(0.0, 0.0, 0.5), turn: NO_TURN });
+    const STILL: Option<FramePose> = Some(FramePose { position: Vector3::new(0.0, 0.0, 0.5), turn: NO_TURN });
 
-    fn tree(edges: &[(&str, &str, Option<Placed>)]) -> Tree {
+    fn tree(edges: &[(&str, &str, Option<FramePose>)]) -> Tree {
         let mut tree = Tree::default();
-        for (parent, child, still) in edges {
-            tree.learn(child, parent, *still);
+        for (parent, child, fixed_pose) in edges {
+            tree.learn(child, parent, *fixed_pose);
         }
         tree
     }
 
-    fn bodies(edges: &[(&str, &str, Option<Placed>)]) -> Vec<[String; 2]> {
+    fn bodies(edges: &[(&str, &str, Option<FramePose>)]) -> Vec<[String; 2]> {
         let bodies = tree(edges).bodies().expect("a tree");
         bodies.into_iter().map(|body| [body.frame, body.driver]).collect()
     }
@@ -355,14 +360,14 @@ mod tests {
     fn chains_lead_up_and_down_and_cycles_are_refused() {
         let tree =
             tree(&[("map", "a", STILL), ("a", "b", STILL), ("map", "c", STILL), ("x", "y", None), ("y", "x", None)]);
-        let along = |from, into| {
+        let transform_along = |from, into| {
             let chain = tree.chain(from, into).expect("a tree")?;
-            let known = tree.along(&chain, 0, None).expect("rotations").expect("all stand still");
-            Some((known.transform.translation.z, known.guessed))
+            let known = tree.transform_along(&chain, 0, None).expect("rotations").expect("all are constant");
+            Some((known.transform.translation.z, known.interpolated))
         };
-        assert_eq!(along("b", "map"), Some((1.0, false)));
-        assert_eq!(along("c", "b"), Some((-0.5, false)));
-        assert_eq!(along("b", "elsewhere"), None);
+        assert_eq!(transform_along("b", "map"), Some((1.0, false)));
+        assert_eq!(transform_along("c", "b"), Some((-0.5, false)));
+        assert_eq!(transform_along("b", "elsewhere"), None);
         assert!(tree.chain("x", "map").is_err() && tree.bodies().is_err());
     }
 
@@ -371,16 +376,16 @@ mod tests {
         let mut tree = tree(&[("map", "a", STILL), ("map", "b", None)]);
         tree.learn("a", "map", STILL);
         let chain = tree.chain("a", "map").expect("a tree").expect("a way");
-        assert!(tree.along(&chain, 0, None).is_ok());
+        assert!(tree.transform_along(&chain, 0, None).is_ok());
         tree.learn("a", "map", None);
-        assert!(tree.along(&chain, 0, None).is_err());
+        assert!(tree.transform_along(&chain, 0, None).is_err());
         tree.learn("a", "odom", STILL);
         assert!(tree.chain("a", "map").is_err() && tree.chain("b", "map").is_ok());
-        let at = |x| Placed { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
-        tree.remember("b", 5, &at(1.0)).expect("a rotation");
-        tree.remember("b", 5, &at(1.0)).expect("a rotation");
+        let at = |x| FramePose { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
+        tree.store("b", 5, &at(1.0)).expect("a rotation");
+        tree.store("b", 5, &at(1.0)).expect("a rotation");
         assert!(tree.settle().is_ok());
-        tree.remember("b", 5, &at(2.0)).expect("a rotation");
+        tree.store("b", 5, &at(2.0)).expect("a rotation");
         assert!(tree.settle().is_err());
     }
 }
@@ -402,9 +407,9 @@ mod rigid_tests {
     #[test]
     fn transform_is_interpolated_only_between_samples() {
         let samples = [sample(0, 0.0, 0.0), sample(100, 1.0, 1.0), sample(1_000_000_101, 2.0, 0.0)];
-        assert_eq!(at(&samples, 100), Some(Known { transform: samples[1].1, guessed: false }));
+        assert_eq!(at(&samples, 100), Some(TransformAt { transform: samples[1].1, interpolated: false }));
         let found = at(&samples, 25).expect("between");
-        assert!(found.guessed && found.transform.translation.x == 0.25);
+        assert!(found.interpolated && found.transform.translation.x == 0.25);
         assert!(found.transform.rotation.angle_to(&turned(0.25)) < 1e-12);
         for outside in [-1, 101, 1_000_000_102, i64::MIN, i64::MAX] {
             assert_eq!(at(&samples, outside), None, "{outside}");
@@ -420,7 +425,7 @@ mod rigid_tests {
 
     #[test]
     fn invalid_quaternions_are_refused() {
-        let placed = |turn| Placed { position: Vector3::zeros(), turn }.rigid();
+        let placed = |turn| FramePose { position: Vector3::zeros(), turn }.rigid();
         assert!(placed([0.0, 0.0, 0.0, 0.0]).is_err() && placed([0.0, 0.0, f64::NAN, 1.0]).is_err());
         assert!(placed([0.0, 0.0, 0.0, 1.005]).is_ok());
     }
