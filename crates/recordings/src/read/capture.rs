@@ -17,7 +17,7 @@
 //!
 //! The first line of a Motive take gives the unit of length. About five lines name the columns: type, name, ID,
 //! optionally the parent, the quantity (`Position`) and its axis. The y axis is up. Rigid bodies are read, or markers
-//! if there are none.
+//! otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str;

@@ -122,8 +122,8 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
         match trajnet(source, text.separator)? {
             Likeness::Certain => text = TextTable::open(source, Format::TRAJNET)?,
             Likeness::Possible => {
-                let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
-                               whole";
+                let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
+                               numbers are whole";
                 let remedy = "use --format trajnet, or --dimensions 3 for a time and a position";
                 return refuse("recording/ambiguous-layout", problem, remedy);
             }
@@ -223,8 +223,8 @@ impl TextTable {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
             self.named = false;
         } else {
-            let remedy = "add a header: t,id,x,y,z for one row per vehicle and time, or t,x1,y1,z1,x2,... for one row per \
-                          time";
+            let remedy = "add a header: t,id,x,y,z for one row per vehicle and time, or t,x1,y1,z1,x2,... for one \
+                          row per time";
             return refuse("recording/no-header", "the first line holds numbers, not column names", remedy);
         }
         Ok(())
@@ -513,8 +513,8 @@ fn body(x: usize, dimensions: Dimensions) -> VehicleColumns {
     VehicleColumns { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
 }
 
-/// Returns the layout of a table without a header whose first row holds these numbers: time and the numbers of each
-/// vehicle, or a TUM or KITTI table of the vehicle `alone`.
+/// Returns the layout of a table without a header by its first row. The columns are time and the numbers of each
+/// vehicle, or those of a TUM or KITTI table of the vehicle `alone`.
 pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
     let count = first.len();
     let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
@@ -547,7 +547,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             let problem = format!("the number of columns per vehicle is ambiguous for {count} columns");
             let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
             let remedy = format!(
-                "set --dimensions to {}: x and y, x, y and z, and +2 or +3 for their velocities",
+                "use --dimensions {}: x and y, x, y and z, and +2 or +3 for their velocities",
                 ways.join(" or ")
             );
             return refuse("recording/ambiguous-layout", problem, remedy);

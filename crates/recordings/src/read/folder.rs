@@ -277,7 +277,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     let is_planar = !without.is_empty();
     if is_planar && without.len() < vehicles.len() {
         let without = without.join(", ");
-        notes.push(format!("heights are not used: {without} have none"));
+        notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
     }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {

@@ -593,8 +593,8 @@ mod tests {
     #[test]
     fn missing_and_repeated_columns_are_named() {
         let fault = |header: &str| layout(header).expect_err("refused").to_string();
-        assert!(fault("id,x,y,z").contains("for time"));
-        assert!(fault("t,who,x,y,z").contains("for the vehicle"));
+        assert!(fault("id,x,y,z").contains("gives time"));
+        assert!(fault("t,who,x,y,z").contains("gives the vehicle"));
         assert!(fault("t,id,x,z").contains("along y"));
         assert!(fault("t,x1,y1,z1,x2,z2").contains("along y of vehicle `2`"));
         assert!(fault("t,id,x,y,z,vx,vy").contains("velocity along z"));

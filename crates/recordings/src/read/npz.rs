@@ -136,8 +136,8 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
         // If the last axis is not x, y, z, an axis of two or three vehicles could be it.
         [only] if only[2] == ArrayAxis::Axis || !said.is_empty() => Ok(only),
         [] => {
-            let remedy = "save T x N x 3 positions, with T the number of times, or name the axes with --layout, such as \
-                          --layout time,vehicle,axis";
+            let remedy = "save T x N x 3 positions, with T the number of times, or name the axes with --layout, such \
+                          as --layout time,vehicle,axis";
             refuse("recording/array-shape", problem(""), remedy)
         }
         _ => {

@@ -42,7 +42,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut uneven = objects.uneven.iter().filter(|_| !is_named);
     if let Some((list, line)) = uneven.find(|(list, _)| used.iter().any(|column| is_of(list, column))) {
         let problem = format!(
-            "the length of the list {} differs from the first line, so that its elements cannot be assigned to vehicles",
+            "the length of the list {} differs from the first line; its elements cannot be assigned to vehicles",
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";

@@ -93,7 +93,7 @@ pub(super) struct Ordered<R> {
 }
 
 impl<R: Rows> Ordered<R> {
-    /// Reads as much of the recording as its order and its clock require.
+    /// Reads the part of the recording that its order and its clock require.
     pub(super) fn open(mut rows: R, mut info: RecordingInfo) -> Result<Self, ReadError> {
         let (sort, metadata) = (info.sort, &mut info.metadata);
         let mut first = Vec::new();
@@ -254,8 +254,8 @@ impl<R: Rows> Ordered<R> {
         let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
         let problem =
             format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its previous position is at {first}");
-        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times \
-                      with --time-unit";
+        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the \
+                      times with --time-unit";
         Fault::coded("recording/position-jump", problem, remedy)
     }
 

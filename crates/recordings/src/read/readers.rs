@@ -22,7 +22,7 @@ pub struct Reader {
     pub extensions: &'static [&'static str],
     /// Description for `--help` and docs/recordings.md.
     pub docs: &'static str,
-    /// First bytes of every file of the format; empty if there are none.
+    /// First bytes of every file of the format; empty without such bytes.
     pub(super) magic: &'static [&'static [u8]],
     /// Whether a file is of this format, by its first bytes. The first row of [`READERS`] that accepts a file reads it.
     pub(super) sniff: fn(&Head<'_>) -> bool,
@@ -265,10 +265,10 @@ const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip install \
-                              rosbags`), and give the folder `flight`";
-const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table t,id,lat,lon,alt \
-                         in degrees and metres";
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip \
+                              install rosbags`), and give the folder `flight`";
+const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table \
+                         t,id,lat,lon,alt in degrees and metres";
 const UNPACK: &str = "unpack it, and give the folder";
 pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z, or one JSON object per line";
 const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
@@ -285,8 +285,8 @@ fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     }
     // Each message of telemetry begins with the microseconds since 1970.
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
-        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
-                      t,id,lat,lon,alt in degrees and metres";
+        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from \
+                      that a table t,id,lat,lon,alt in degrees and metres";
         return Some(Fault::coded(
             "recording/unsupported-format",
             "it is a MAVLink telemetry log, which is not supported",

@@ -82,7 +82,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     notes.push(local.note());
     notes.push(format!("positions are read from {topic}"));
     let (clock, assumed) = match log.boot_us {
-        Some(_) => ("times are set to UTC by GPS", "the GPS of each vehicle sets its clock correctly"),
+        Some(_) => ("times are set to UTC by GPS", "clocks set by the GPS of each vehicle"),
         None => ("times count from the start of the vehicle's computer", "the clocks of all vehicles started together"),
     };
     notes.push(clock.to_owned());

@@ -45,7 +45,7 @@ fn axes_are_those_that_the_user_says() {
             (position, Some(velocity)),
             "{name}"
         );
-        assert_eq!(found.notes.iter().any(|note| note.starts_with("axes are turned")), name != "enu");
+        assert_eq!(found.notes.iter().any(|note| note.starts_with("axes are mapped")), name != "enu");
     }
     let curve = read_bytes("cf1.csv", b"duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,1,4,2,5,3,6\n", &turned("ned", [1.0; 3]));
     let curve = curve.expect("read");

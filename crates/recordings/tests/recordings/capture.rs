@@ -133,7 +133,7 @@ fn without_rigid_bodies_the_labelled_markers_of_a_name_are_a_vehicle() {
         Frame,Time (Seconds),X,Y,Z,X,Y,Z,X,Y,Z\n0,0,1,1,1,3,1,1,9,9,9\n1,0.01,1,1,1,,,,9,9,9\n";
     let found = whole(two);
     assert_eq!(found.samples(), [(0.0, "a", [2.0, -1.0, 1.0])]);
-    assert!(found.notes.iter().any(|note| note.ends_with("is the place of a (2)")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("if all of them are seen, for a (2)")), "{:?}", found.notes);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn takes_of_motive_are_refused_where_they_are_wrong() {
     assert_refused(&read(&none).expect_err("none"), "recording/no-positions", "line 7");
     let scaled = ReadOptions { scale: Some(0.1.into()), ..ReadOptions::default() };
     let error = read_bytes("take.csv", MOTIVE.as_bytes(), &scaled).expect_err("scaled");
-    assert_eq!(error.help(), "leave --scale away");
+    assert_eq!(error.help(), "omit --scale");
 }
 
 const NEXUS: &str = "\
@@ -183,7 +183,7 @@ fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
         (0.03, "ball", [-0.5, 0.25, 0.0]),
     ];
     assert_eq!(found.samples(), expected);
-    assert!(found.notes.iter().any(|note| note.ends_with("is the place of cf1 (2)")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("if all of them are seen, for cf1 (2)")), "{:?}", found.notes);
     let found = whole(TRACKER);
     let expected =
         [(0.005, "cf1", [1.0, 2.0, 0.5]), (0.005, "cf2", [-0.001, -0.002, -0.004]), (0.01, "cf1", [1.0, 2.0, 0.5])];
@@ -191,7 +191,7 @@ fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
     // Where both are there, objects go before markers.
     let both = whole(&format!("{NEXUS}\n{TRACKER}"));
     assert_eq!(both.samples(), expected);
-    let note = "not read, beside those of the section Objects: Force, ball";
+    let note = "not read, as they are outside the section Objects: Force, ball";
     assert!(both.notes.iter().any(|said| said == note), "{:?}", both.notes);
 }
 

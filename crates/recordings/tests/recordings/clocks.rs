@@ -60,14 +60,14 @@ fn of_two_rows_at_one_time_the_user_says_which_is_read() {
             let found = read_with(text, &which(Some(duplicates))).expect("read");
             assert_eq!(found.samples()[0].2[0], x, "{duplicates:?}");
             assert_eq!(found.items.len(), if text == long { 4 } else { 2 });
-            assert!(found.notes.iter().any(|note| note.contains("rows left out")), "{:?}", found.notes);
+            assert!(found.notes.iter().any(|note| note.contains("rows omitted")), "{:?}", found.notes);
         }
     }
     // Rows that say the same say nothing else.
     let same = "t,id,x,y,z\n0,a,1,0,0\n0,a,1,0,0\n1,a,3,0,0\n";
     let found = read(same).expect("read");
     assert_eq!(found.items.len(), 2);
-    assert!(found.notes.iter().any(|note| note.ends_with("is of the same time: 1")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("has the same time: 1")), "{:?}", found.notes);
     refused(same, &which(Some(Duplicates::Refuse)), "recording/duplicate-row", "line 3");
 }
 
@@ -89,7 +89,7 @@ fn files_of_a_folder_say_how_many_rows_they_repeat() {
         fs::write(folder.path().join(name), "t_s,x,y\n0,1,2\n0,1,2\n1,1,2\n").expect("written");
     }
     let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
-    assert!(found.notes.iter().any(|note| note.contains("rows left out")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("rows omitted")), "{:?}", found.notes);
     assert_eq!(found.items.len(), 4);
 }
 
@@ -111,7 +111,7 @@ fn seconds_and_the_rest_below_a_second_are_one_time() {
         let times: Vec<_> = found.samples().iter().map(|sample| sample.0).collect();
         assert_eq!(times, [1.0 / per_second as f64, 0.5, 1.0], "{header}");
         assert_eq!(found.clock.epoch_ns, 1_700_000_000_000_000_000);
-        assert!(found.notes.iter().any(|note| note.starts_with("a time is")), "{:?}", found.notes);
+        assert!(found.notes.iter().any(|note| note.starts_with("times are the sum of")), "{:?}", found.notes);
     }
     // Whole numbers that are written with decimals, in a table with a row for each time.
     assert_eq!(times("x1,y1,sec,nanosec\n1,2,5.0,250000000.0\n1,2,6.0,0.0\n"), [5.25, 6.0]);
@@ -152,8 +152,8 @@ fn dates_are_read_to_the_last_digit() {
     );
     let local = read("datetime;x1;y1\n2023-11-14 22:13:20;1;2\n2023-11-14 22:13:20,25;1;2\n").expect("read");
     assert_eq!(local.samples()[1].0, 0.25);
-    assert!(local.notes.iter().any(|note| note.contains("taken as UTC")), "{:?}", local.notes);
-    assert!(!found.notes.iter().any(|note| note.contains("taken as UTC")));
+    assert!(local.notes.iter().any(|note| note.contains("read as UTC")), "{:?}", local.notes);
+    assert!(!found.notes.iter().any(|note| note.contains("read as UTC")));
     assert_eq!(times("time (utc),x,y\n2023-11-14T22:13:20Z,1,2\n"), [0.0]);
 }
 

@@ -136,7 +136,7 @@ fn quantities_are_no_vehicles() {
 fn what_was_taken_as_a_vehicle_is_listed_where_it_was_guessed() {
     let listed = |header: &str| {
         let notes = read(&ones(header)).expect("read").notes;
-        notes.iter().find_map(|note| note.strip_prefix("vehicles, going by the names of columns: ").map(str::to_owned))
+        notes.iter().find_map(|note| note.strip_prefix("vehicles by column names: ").map(str::to_owned))
     };
     assert_eq!(listed("t,cf1.x,cf1.y,home.x,home.y").as_deref(), Some("`cf1`, `home`"));
     assert_eq!(listed("t,x1,y1,x2,y2").as_deref(), Some("`1`, `2`"));

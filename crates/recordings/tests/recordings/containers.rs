@@ -46,12 +46,12 @@ fn frames_that_stand_still_are_no_vehicles() {
     let fixed = ("/tf_static", kind, "cdr", 1, transform("cf1", "camera", 0.1));
     let found = whole("tf.mcap", &mcap_of(&[fixed.clone(), ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]));
     assert_eq!(found.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0])]);
-    assert!(found.notes.iter().any(|note| note.ends_with("no vehicles: camera")), "{:?}", found.notes);
-    // On a topic of another name the same message moves, and hangs on the vehicle all the same.
+    assert!(found.notes.iter().any(|note| note.ends_with("not vehicles: camera")), "{:?}", found.notes);
+    // On a topic with another name the same transform counts as moving; its frame still belongs to the vehicle.
     let moving = ("/other", kind, "cdr", 1, fixed.4);
     let both = whole("tf.mcap", &mcap_of(&[moving, ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]));
     assert_eq!(both.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0])]);
-    assert!(both.notes.iter().any(|note| note.ends_with("hangs on them: camera")), "{:?}", both.notes);
+    assert!(both.notes.iter().any(|note| note.ends_with("belong to them: camera")), "{:?}", both.notes);
 }
 
 /// The parts of Foxglove's messages that the reader does not need are written too.
@@ -412,7 +412,11 @@ fn a_curve_that_jumps_is_read_and_said() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), "cf1.csv", &polynomial(&[(1.0, [0.0, 0.0, 1.0]), (1.0, [1.5, 0.0, 1.0])]));
     let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
-    assert!(found.notes.iter().any(|note| note.contains("jumps by 0.5000 m at 1 s")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|note| note.contains("jump of a curve is 0.5000 m, of `cf1` at 1 s")),
+        "{:?}",
+        found.notes
+    );
 }
 
 #[test]

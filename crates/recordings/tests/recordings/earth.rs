@@ -99,7 +99,7 @@ fn the_origin_can_be_given_and_metres_go_before_degrees() {
     assert_eq!(both.samples(), [(0.0, "a", [1.0, 2.0, 3.0])]);
     assert!(both.notes.iter().any(|note| note == "columns not used: lat, lon"), "{:?}", both.notes);
     let needless = read("t,id,x,y,z\n0,a,1,2,3\n", &origin).expect_err("refused");
-    assert_eq!(needless.help(), "leave --origin away");
+    assert_eq!(needless.help(), "omit --origin");
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn who_is_not_seen_has_no_place_and_heights_may_be_missing_altogether() {
     assert_eq!(found.samples(), [(1.0, "a", [0.0; 3])]);
     let flat = whole("t,id,lat,lon\n0,a,47,8\n");
     assert_eq!(flat.samples(), [(0.0, "a", [0.0; 3])]);
-    assert!(flat.notes.iter().any(|note| note.contains("no column for the height")), "{:?}", flat.notes);
+    assert!(flat.notes.iter().any(|note| note.contains("no column gives the height")), "{:?}", flat.notes);
 }
 
 #[test]
@@ -136,10 +136,10 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
         read(&format!("t,id,lat,lon,{height}\n{rows}"), &options)
     };
     let metres = read("alt", 1.0).expect("read");
-    let note = "heights are those of column `alt`, in metres: the name says no unit (--scale gives another)";
+    let note = "heights are read from column `alt`, in metres: the name has no unit (--scale sets another)";
     assert!(metres.notes.iter().any(|said| said == note), "{:?}", metres.notes);
     let feet = read("alt", 0.3048).expect("read");
-    let note = "heights are those of column `alt`, in units of 0.3048 m as --scale says";
+    let note = "heights are read from column `alt`, in units of 0.3048 m (--scale)";
     assert!(feet.notes.iter().any(|said| said == note), "{:?}", feet.notes);
     let heights = |found: &Whole| found.samples().iter().map(|(_, _, position)| position[2]).collect::<Vec<_>>();
     assert!((heights(&metres)[0] - 695.2).abs() < 1e-8 && heights(&feet)[0].abs() < 1e-8);
@@ -147,7 +147,7 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
     // What is across the ground is not scaled, and a unit in the name says the same.
     let named = read("alt [ft]", 1.0).expect("read");
     assert_eq!(named.samples(), feet.samples());
-    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale gives")));
+    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale sets")));
     assert_refused(&read("alt [ft]", 0.5).expect_err("refused"), "recording/contradicts-option", "line 1");
 }
 
@@ -155,12 +155,12 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
 fn a_fix_at_zero_and_zero_is_none() {
     let found = whole("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,47,8,400\n2,a,0.0,-0.0,400\n3,a,47,8,400\n3,b,0,0,0\n");
     assert_eq!(found.samples(), [(1.0, "a", [0.0; 3]), (3.0, "a", [0.0; 3])]);
-    let note = "3 places are no fixes and were left out of `a`, `b`: latitude and longitude are both exactly 0";
+    let note = "3 positions of `a`, `b` omitted for lack of a fix: latitude and longitude are exactly 0";
     assert!(found.notes.iter().any(|said| said == note), "{:?}", found.notes);
     // Where one of them is 0 it is the equator, or the meridian of Greenwich.
     let near = whole("t,id,lat,lon,alt\n0,a,0,8,0\n0,b,51,0,0\n0,c,0,1e-7,0\n");
     assert_eq!(near.items.len(), 3);
-    assert!(!near.notes.iter().any(|said| said.contains("no fix")), "{:?}", near.notes);
+    assert!(!near.notes.iter().any(|said| said.contains("lack of a fix")), "{:?}", near.notes);
     // So are metres.
     assert_eq!(whole("t,id,x,y,z\n0,a,0,0,0\n").items.len(), 1);
     let none = read("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,0,0,9\n", &ReadOptions::default()).expect_err("refused");
@@ -176,14 +176,14 @@ fn a_fix_at_zero_and_zero_is_none() {
     let found = Whole::read(folder.path(), &origin).expect("read");
     assert_eq!(found.items.len(), 4);
     for name in ["a", "b"] {
-        let note = format!("1 place is no fix and was left out of `{name}`");
+        let note = format!("1 position of `{name}` omitted for lack of a fix");
         assert!(found.notes.iter().any(|said| said.contains(&note)), "{:?}", found.notes);
     }
     let kind = "sensor_msgs/msg/NavSatFix";
     let messages = [[0.0; 3], [47.0, 8.0, 400.0]].map(|place| ("/r1/fix", kind, "cdr", 1, fix(0, 0, place)));
     let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
     assert_eq!(found.samples().len(), 1);
-    assert!(found.notes.iter().any(|said| said.contains("1 place is no fix")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|said| said.contains("1 position omitted for lack of a fix")), "{:?}", found.notes);
 }
 
 #[test]
@@ -266,5 +266,5 @@ fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
     let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default());
     assert_refused(&error, "recording/several-frames", "message 2 on topic `/r2/pose`");
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
-    assert_eq!(refused(&[pose], &origin).help(), "leave --origin away");
+    assert_eq!(refused(&[pose], &origin).help(), "omit --origin");
 }

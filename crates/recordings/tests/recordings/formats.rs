@@ -124,7 +124,10 @@ fn without_z_everything_is_in_a_plane_and_it_is_said() {
     let whole = read("flat.csv", "t,id,x,y\n0,1,1,2\n");
     assert_eq!(whole.samples(), [(0.0, "1", [1.0, 2.0, 0.0])]);
     assert!(
-        whole.notes.iter().any(|note| note.contains("no column for the height: the recording is judged in the plane")),
+        whole
+            .notes
+            .iter()
+            .any(|note| note.contains("no column gives the height: the recording is judged in the plane")),
         "{:?}",
         whole.notes
     );

@@ -49,7 +49,7 @@ fn columns_that_name_a_height_are_read_and_said() {
     ] {
         let found = read(&row(&format!("t,id,x,y,{name}")), &ReadOptions::default()).expect(name);
         assert_eq!(found.samples()[0].2, [3.0, 4.0, 5.0], "{name}");
-        has_note(&found, &format!("heights are those of column `{name}`"));
+        has_note(&found, &format!("heights are read from column `{name}`"));
     }
     for (name, z) in [("depth", -5.0), ("down", -5.0), ("pos_down", -5.0), ("depth_cm", -0.05), ("alt [ft]", 1.524)] {
         let unit =
@@ -116,7 +116,7 @@ fn where_a_height_is_missing_none_is_known_in_any_format() {
         assert!(found.samples().iter().all(|(_, _, position)| position[2] == 0.0), "{name}: {:?}", found.samples());
     }
     let half = Whole::read(&path("half.csv"), &ReadOptions::default()).expect("read");
-    has_note(&half, "no column for the height of `b`: the recording is judged in the plane");
+    has_note(&half, "no column gives the height of `b`: the recording is judged in the plane");
     // What is exported has no height either, and is the same.
     let truth = Whole::read(&path("flat.csv"), &ReadOptions::default()).expect("read");
     for &format in export::WRITTEN {

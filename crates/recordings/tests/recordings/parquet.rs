@@ -106,7 +106,7 @@ fn a_codec_that_is_not_read_is_named() {
     fs::write(&path, packed).expect("written");
     let refused = Whole::read(&path, &ReadOptions::default()).expect_err("refused");
     assert_refused(&refused, "recording/unsupported-compression", "");
-    assert!(refused.to_string().ends_with("column `t_s` is packed by brotli, which is not read"), "{refused}");
+    assert!(refused.to_string().ends_with("column `t_s` is packed by brotli, which is not supported"), "{refused}");
 }
 
 /// Where a text stands in another.

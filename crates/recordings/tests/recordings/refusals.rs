@@ -87,7 +87,7 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
 fn a_message_names_the_file_the_place_the_value_and_the_remedy() {
     let text = "t,id,x,y,z,radius\n0,a,1,2,3,1\n1,a,1,2,3,\n";
     let error = refused("flight.csv", text.as_bytes());
-    assert!(error.to_string().ends_with("flight.csv, line 3: vehicle `a` has no radius here and one at line 2"));
+    assert!(error.to_string().ends_with("flight.csv, line 3: vehicle `a` has no radius here, but one at line 2"));
     let error = refused("flight.csv", LONG.replacen("0.5,2,1,2,3", "0.5,2,one,2,3", 1).as_bytes());
     assert!(error.to_string().ends_with("line 5: column `x` holds `one`, which is not a number"), "{error}");
     assert_eq!(error.help(), "write a number with a decimal point");
@@ -301,7 +301,7 @@ fn a_format_that_is_forced_on_other_content_is_refused() {
         (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
     ] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &options);
-        assert_eq!(error.help(), format!("leave {option} away"), "{error}");
+        assert_eq!(error.help(), format!("omit {option}"), "{error}");
     }
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ReadOptions { scale: Some(scale.into()), ..ReadOptions::default() };

@@ -109,12 +109,16 @@ fn passing() -> Vec<(f64, &'static str, [f64; 3])> {
 fn a_bag_of_crazyswarm_names_each_vehicle_once() {
     let found = Whole::read(&bag("crazyswarm"), &ReadOptions::default()).expect("read");
     assert_eq!(found.samples(), passing());
-    assert!(found.notes.iter().any(|note| note.contains("which are not read: cf1, cf2")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|note| note.contains("topics of poses describe them: cf1, cf2")),
+        "{:?}",
+        found.notes
+    );
     let by_transforms = Whole::read(&bag("crazyswarm"), &options(None, &["/tf"])).expect("read");
     assert_eq!(by_transforms.items, found.items);
     let error = Whole::read(&bag("crazyswarm"), &options(None, &["/pose"])).expect_err("refused");
     assert_refused(&error, "recording/unknown-topic", "");
-    assert!(error.to_string().ends_with("those that it has are /poses, /tf"), "{error}");
+    assert!(error.to_string().ends_with("such topics are /poses, /tf"), "{error}");
 }
 
 #[test]
@@ -214,7 +218,7 @@ fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
         "{:?}",
         found.samples()
     );
-    let counted = format!("its files have {} messages, and metadata.yaml counts 21", found.samples().len() / 2);
+    let counted = format!("its files have {} messages, but metadata.yaml counts 21", found.samples().len() / 2);
     for note in ["the recording was not closed", &counted] {
         assert!(found.notes.iter().any(|said| said.starts_with(note)), "{:?}", found.notes);
     }
@@ -253,8 +257,9 @@ fn a_robot_known_through_a_chain_of_transforms_is_brought_into_the_map() {
         for (time_s, _, [x, y, z]) in found.samples() {
             assert!(x.abs() < ROUNDING_M && (y - 2.0 * time_s).abs() < ROUNDING_M && z == 0.0, "{time_s}: {x} {y} {z}");
         }
-        assert_eq!(found.assumed.as_deref(), Some("transforms even between their samples"));
-        let counted = "5 by those of their very time, 16 by some between two samples at most 1 s apart; 0 left out";
+        assert_eq!(found.assumed.as_deref(), Some("transforms uniform between their samples"));
+        let counted =
+            "5 by transforms at their time, 16 by interpolation between two samples at most 1 s apart; 0 omitted";
         assert!(found.notes.iter().any(|note| note.contains(counted)), "{:?}", found.notes);
     }
     let direct = Whole::read(&bag("robot"), &options(None, &["/tf"])).expect("read");
@@ -276,7 +281,11 @@ fn transforms_that_stand_still_are_exact_and_nothing_is_assumed() {
     assert_eq!((found.vehicles.len(), samples[1], &found.assumed), (2, (1e-9, "/hall/pose", [5.0; 3]), &None));
     let error = [8.0, 1.0, 3.0].iter().zip(samples[0].2).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(error < ROUNDING_M, "{samples:?}");
-    assert!(found.notes.iter().any(|note| note.ends_with("into `map`: /far/pose in elsewhere")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|note| note.ends_with("lead to `map`: /far/pose in elsewhere")),
+        "{:?}",
+        found.notes
+    );
     // The way back is as good.
     let back = read(&mcap_of(&messages), &in_frame("room")).samples()[1].2;
     assert!([5.0, 5.0, 5.0].iter().zip(back).all(|(a, b)| (a - b).abs() < ROUNDING_M), "{back:?}");
@@ -290,7 +299,7 @@ fn where_a_moving_transform_is_not_known_there_is_no_position() {
     let found = read(&mcap_of(&messages), &in_frame("map"));
     let samples: Vec<_> = found.samples().iter().map(|(t, _, [x, ..])| (*t, *x)).collect();
     assert_eq!(samples, [(100e-9, 1.0), (150e-9, 1.5)]);
-    assert!(found.notes.iter().any(|note| note.contains("1 by some between") && note.contains("2 left out")));
+    assert!(found.notes.iter().any(|note| note.contains("1 by interpolation") && note.contains("2 omitted")));
     // Samples too far apart say nothing of what is between them.
     let late = ("/tf", TF, "cdr", 9, cdr(&(vec![(((SEC + 2, 0), "map"), "odom", ([0.0; 3], NO_TURN))],), true));
     assert_refused(&refused(&[moving(0, 1.0), late, at(150)], &in_frame("map")), "recording/unusable-frame", "");

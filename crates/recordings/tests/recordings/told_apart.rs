@@ -88,7 +88,7 @@ fn where_somebody_is_asked_to_be_is_no_vehicle_whatever_part_of_the_topic_says_i
     let targets = ["/target_1/pose", "/target_2/pose"];
     let found = whole("ros.mcap", &mcap_of(&targets.map(|topic| pose(topic, "world", 1, 0.0))));
     assert_eq!(found.vehicles, targets);
-    assert!(found.notes.iter().any(|note| note.ends_with("not where a vehicle is: /target_1/pose, /target_2/pose")));
+    assert!(found.notes.iter().any(|note| note.ends_with("not of measured positions: /target_1/pose, /target_2/pose")));
 }
 
 #[test]

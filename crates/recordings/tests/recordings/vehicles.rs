@@ -52,8 +52,8 @@ fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
     let folder = folder(&files);
     let found = whole(folder.path()).expect("read");
     assert_eq!((found.vehicles.clone(), found.samples()), (vec!["cf2".to_owned(), "cf10".to_owned()], BOTH.to_vec()));
-    assert!(found.notes.iter().any(|note| note == "a file is a vehicle: cf2, cf10"), "{:?}", found.notes);
-    let not_read = "not read, being no tables: readme.md";
+    assert!(found.notes.iter().any(|note| note == "each file is one vehicle: cf2, cf10"), "{:?}", found.notes);
+    let not_read = "not read, as they are not tables: readme.md";
     assert!(found.notes.iter().any(|note| note == not_read), "{:?}", found.notes);
 
     for name in ["flight", "flight.zip"] {
@@ -204,8 +204,8 @@ fn strangers_are_told_the_way_in() {
         (b"<?xml version=\"1.0\"?>\n<gpx creator=\"x\">", "GPX", "lat,lon,alt"),
         (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "lat,lon,alt"),
         (b"  <?xml version=\"1.0\"?><flight/>", "XML", "t,id,x,y,z"),
-        (b"{\"type\": \"FeatureCollection\", \"features\": []}", "no Skybrush show", "t,id,x,y,z"),
-        (b"[{\"t\": 0, \"x\": 1}]", "no Skybrush show", "t,id,x,y,z"),
+        (b"{\"type\": \"FeatureCollection\", \"features\": []}", "not a Skybrush show", "t,id,x,y,z"),
+        (b"[{\"t\": 0, \"x\": 1}]", "not a Skybrush show", "t,id,x,y,z"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5", "numpy.savez"),
         (b"7z\xbc\xaf\x27\x1c\0\x04", "7z archive", "give the folder"),
         (&[&[b'a'; 257][..], b"ustar\x0000"].concat(), "tar archive", "give the folder"),

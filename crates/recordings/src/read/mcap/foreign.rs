@@ -344,7 +344,7 @@ impl Poses {
 
     /// Returns the assumption behind interpolated transforms, if there are any.
     pub(super) fn assumed(&self) -> Option<String> {
-        (self.conversions.interpolated > 0).then(|| "transforms are uniform between their samples".to_owned())
+        (self.conversions.interpolated > 0).then(|| "transforms uniform between their samples".to_owned())
     }
 
     /// Returns the notes for the user.
@@ -355,8 +355,8 @@ impl Poses {
         if exact + interpolated + unknown > 0 {
             let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
             notes.push(format!(
-                "positions transformed{into}: {exact} by transforms at their time, {interpolated} by interpolation between two \
-                 samples at most 1 s apart; {unknown} omitted because a transform is unknown"
+                "positions transformed{into}: {exact} by transforms at their time, {interpolated} by interpolation \
+                 between two samples at most 1 s apart; {unknown} omitted because a transform is unknown"
             ));
         }
         notes

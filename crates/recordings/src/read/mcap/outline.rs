@@ -107,8 +107,8 @@ impl Outline {
             return refuse(
                 "recording/list-length",
                 problem,
-                "record a pose of every vehicle in every list, or messages with names; if the list contains no vehicles, \
-                 choose other topics with --topic",
+                "record a pose of every vehicle in every list, or messages with names; if the list contains no \
+                 vehicles, choose other topics with --topic",
             );
         }
         described.listed = listed;
@@ -176,8 +176,8 @@ impl Outline {
     /// topics.
     pub(super) fn refuse_twice(&self) -> Result<(), Fault> {
         let is_chosen = !self.named.is_empty();
-        let twice = |first: &str, second: &str, who: &str| {
-            let problem = format!("topics {} and {} both describe {who}", quoted(first), quoted(second));
+        let twice = |first: &str, second: &str, vehicle: &str| {
+            let problem = format!("topics {} and {} both describe {vehicle}", quoted(first), quoted(second));
             let remedy = if is_chosen { "name only one of the two with --topic" } else { CHOOSE };
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };

@@ -21,7 +21,8 @@ pub(super) struct ReadPlan {
     pub(super) wanted: Option<String>,
     /// Local frame of places on the Earth, if there are any.
     pub(super) earth: Option<LocalFrame>,
-    /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` if there are none.
+    /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` without a
+    /// connection.
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
     /// Vehicles of the transforms, by namespace and driver.
     bodies: BTreeMap<String, BTreeMap<String, Vec<VehicleFrame>>>,
