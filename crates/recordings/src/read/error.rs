@@ -199,8 +199,8 @@ impl Fault {
     /// Returns the fault of decreasing time.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
-        let remedy = "check for joined recordings or a clock that was set; if the rows belong to several vehicles, name \
-                      their column with --column id=NAME; if they are only out of order, use --sort";
+        let remedy = "check whether the clock was set; if rows belong to several vehicles, name their column with \
+                      --column id=NAME; if rows are only out of order, use --sort";
         Self::coded("recording/time-backwards", problem, remedy)
     }
 

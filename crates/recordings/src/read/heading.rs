@@ -62,12 +62,12 @@ const HEIGHT_ENDS: Words =
     Words("agl msl amsl asl hae rel relative above_ground above_ground_level above_sea_level above_takeoff");
 
 /// Names of other quantities with axes, which are not vehicles.
-const QUANTITIES: Words = Words(
-    "vel velocity speed acc accel acceleration gyro gyr gyroscope imu mag magnetometer magnetic omega angular \
-     linear rate rates angvel angle angles attitude orientation quat quaternion rot rotation euler rpy twist \
-     wrench force torque moment thrust wind gravity bias noise std sigma var cov covariance err error sp \
-     setpoint ref reference des desired cmd command jerk",
-);
+const QUANTITIES: Words = Words(concat!(
+    "vel velocity speed acc accel acceleration gyro gyr gyroscope imu mag magnetometer magnetic ",
+    "omega angular linear rate rates angvel angle angles attitude orientation quat quaternion rot ",
+    "rotation euler rpy twist wrench force torque moment thrust wind gravity bias noise std sigma ",
+    "var cov covariance err error sp setpoint ref reference des desired cmd command jerk",
+));
 
 /// Letters of quantities with axes, which may also be vehicles.
 pub(super) const LETTERS: [&str; 8] = ["a", "f", "g", "j", "q", "u", "v", "w"];
@@ -250,11 +250,12 @@ pub(super) fn said_unit(name: &str) -> Option<String> {
 }
 
 /// Words for vehicles in the names of vehicle columns, with or without a suffix of [`VEHICLE_ENDS`].
-const VEHICLES: Words = Words(
-    "vehicle drone uav uas quad quadrotor copter agent robot rover aircraft plane airplane ship vessel boat \
-     usv auv car truck object obj track target body rigidbody model entity actor person pedestrian ped player \
-     unit node tag device callsign flight tail registration icao icao24 hex hexident mmsi imo childframe sys",
-);
+const VEHICLES: Words = Words(concat!(
+    "vehicle drone uav uas quad quadrotor copter agent robot rover aircraft plane airplane ship ",
+    "vessel boat usv auv car truck object obj track target body rigidbody model entity actor person ",
+    "pedestrian ped player unit node tag device callsign flight tail registration icao icao24 hex ",
+    "hexident mmsi imo childframe sys",
+));
 
 /// Suffixes of these words.
 const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num", "index", "code"];
