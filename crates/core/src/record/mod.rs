@@ -281,7 +281,8 @@ pub enum Event {
         closing_m_s: f64,
     },
     /// A step is divided into substeps. Reasons: the step is too long for the law's fastest rate, used more than half
-    /// of a clearance, or deviated too far from the straight line of the audit. Sent when the length of substeps changes.
+    /// of a clearance, or deviated too far from the straight line of the audit. Sent when the length of substeps
+    /// changes.
     StepRefined {
         /// Start of the step \[s\].
         time_s: f64,

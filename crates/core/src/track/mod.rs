@@ -93,8 +93,8 @@ pub struct Metadata {
     pub clock: Clock,
     /// Notes for the user on how the recording was read, one sentence each, such as: rows were sorted.
     pub notes: Vec<String>,
-    /// Assumption behind the positions, as a phrase after "if"; `None` if the recording holds all positions of its items.
-    /// A recording with an assumption proves nothing.
+    /// Assumption behind the positions, as a phrase after "if"; `None` if the recording holds all positions of its
+    /// items. A recording with an assumption proves nothing.
     pub assumed: Option<String>,
     /// Whether the height of a vehicle is unknown. Then z is 0 in every item, and only distances in the plane of x and
     /// y can be judged.
