@@ -103,8 +103,8 @@ fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Reco
         return refuse("recording/contradicts-option", problem, "omit --scale");
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
-    let (said, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
-    let info = RecordingInfo::new(source, options, said, notes, Fault::header_only());
+    let (unit, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
+    let info = RecordingInfo::new(source, options, unit, notes, Fault::header_only());
     let mut lines = Lines::new(source)?;
     while lines.number() + 1 < capture.first_line && lines.advance()? {}
     Ok(Box::new(Ordered::open(Table { capture, names, lines, ended: false }, info)?))
@@ -230,7 +230,7 @@ const EXPORT: &str = "export the take again as CSV, with header information and 
 #[derive(Default)]
 struct MotiveHead {
     /// First line: alternating names and values.
-    said: Vec<String>,
+    header: Vec<String>,
     types: Vec<String>,
     names: Vec<String>,
     measures: Vec<String>,
@@ -254,7 +254,7 @@ impl MotiveHead {
             let text = std::str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(Place::Line(lines.number())))?;
             let cells: Vec<String> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
             match (lines.number(), cells.first().map(String::as_str), cells.get(1).map(String::as_str)) {
-                (1, ..) => head.said = cells,
+                (1, ..) => head.header = cells,
                 (_, Some("Frame"), _) => {
                     (head.axes, head.measures, head.first_line) = (cells, before, lines.number() + 1);
                     return Ok(head);
@@ -268,12 +268,12 @@ impl MotiveHead {
     }
 
     /// Returns the value of a name in the first line.
-    fn said(&self, what: &str) -> Option<&str> {
-        self.said.iter().position(|said| said == what).and_then(|at| self.said.get(at + 1)).map(String::as_str)
+    fn header_value(&self, what: &str) -> Option<&str> {
+        self.header.iter().position(|name| name == what).and_then(|at| self.header.get(at + 1)).map(String::as_str)
     }
 
     fn capture(&self) -> Result<Capture, Fault> {
-        let unit = self.said("Length Units").unwrap_or_default();
+        let unit = self.header_value("Length Units").unwrap_or_default();
         let metres = heading::size_of(unit, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
@@ -281,7 +281,7 @@ impl MotiveHead {
                 "export it in metres",
             )
         })?;
-        if let Some(space) = self.said("Coordinate Space").filter(|space| *space != "Global") {
+        if let Some(space) = self.header_value("Coordinate Space").filter(|space| *space != "Global") {
             let problem = format!("its coordinate space is {}", quoted(space));
             return refuse("recording/unusable-frame", problem, "export it in global coordinates");
         }

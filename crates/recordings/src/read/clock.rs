@@ -424,7 +424,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     }
     // `time (utc)` gives a zone, not a unit.
     let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
-    let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
+    let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
         let remedy = "set its length in seconds with --time-scale, such as 60 for minutes, or name it with --time-unit";

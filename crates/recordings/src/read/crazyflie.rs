@@ -47,7 +47,7 @@ pub(super) fn open(
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
     let mut notes: Vec<String> = left_out.into_iter().collect();
-    let (several, mut said_to_follow) = (vehicles.len() > 1, false);
+    let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
     let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("--start names the unknown vehicle {}", quoted(name));
@@ -56,12 +56,12 @@ pub(super) fn open(
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
         for file in &files {
-            let appended = curve.append(file).map_err(|fault| fault.of(&file.shown()));
+            let appended = curve.append(file).map_err(|fault| fault.of(&file.display_path()));
             appended.map_err(|fault| if several { fault.among_others() } else { fault })?;
         }
-        if files.len() > 1 && !said_to_follow {
+        if files.len() > 1 && !has_sequence_note {
             notes.push(format!("`{name}` and others fly the files of their folders in sequence"));
-            said_to_follow = true;
+            has_sequence_note = true;
         }
         let start = options.starts.get(&name).copied().unwrap_or_default();
         for item in &mut curve.items {
@@ -76,8 +76,8 @@ pub(super) fn open(
         _ => None,
     };
     if curves.windows(2).any(|pair| first(&pair[0].1) == first(&pair[1].1)) {
-        let said = "curves start at one position: if they are relative, set each origin with --start NAME=X,Y,Z";
-        notes.push(said.to_owned());
+        let note = "curves start at one position: if they are relative, set each origin with --start NAME=X,Y,Z";
+        notes.push(note.to_owned());
     }
     Ok(Curves::recording(curves, notes))
 }

@@ -67,7 +67,7 @@ impl LocalFrame {
     }
 
     /// Converts a position relative to another origin \[m\] to this frame.
-    pub(super) fn place_from(&self, other: &Self, place: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn position_from(&self, other: &Self, place: Vector3<f64>) -> Vector3<f64> {
         if self == other {
             return place;
         }
@@ -75,7 +75,7 @@ impl LocalFrame {
     }
 
     /// Converts a direction from the frame of another origin to this frame.
-    pub(super) fn turn_from(&self, other: &Self, direction: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn direction_from(&self, other: &Self, direction: Vector3<f64>) -> Vector3<f64> {
         if self == other { direction } else { self.axes * (other.axes.transpose() * direction) }
     }
 
@@ -207,13 +207,13 @@ fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option
 }
 
 /// Converts a position with an origin in its row to the frame `local`; returns `false` if the origin is unknown or a
-/// validity column is 0. `there` caches the frame of the origin.
+/// validity column is 0. `row_frame` caches the frame of the origin.
 pub(super) fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
     (columns, valid): ([usize; 3], &[usize]),
     local: Option<LocalFrame>,
-    there: &mut Option<LocalFrame>,
+    row_frame: &mut Option<LocalFrame>,
 ) -> Result<bool, Fault> {
     for &column in valid {
         if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
@@ -221,12 +221,12 @@ pub(super) fn convert_to_local(
         }
     }
     let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
-    let there = match there.filter(|there| there.is_at(place)) {
-        Some(there) => there,
-        None => *there.insert(LocalFrame::at(place)?),
+    let row_frame = match row_frame.filter(|row_frame| row_frame.is_at(place)) {
+        Some(row_frame) => row_frame,
+        None => *row_frame.insert(LocalFrame::at(place)?),
     };
-    row.position = local.place_from(&there, row.position);
-    row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
+    row.position = local.position_from(&row_frame, row.position);
+    row.velocity = row.velocity.map(|velocity| local.direction_from(&row_frame, velocity));
     Ok(true)
 }
 
@@ -300,13 +300,13 @@ mod tests {
 
     #[test]
     fn positions_keep_their_place_when_the_origin_changes() {
-        let (here, there) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
-        let [here, there] = [here, there].map(|place| LocalFrame::at(place).expect("a place"));
+        let (here, other) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
+        let [here, other] = [here, other].map(|place| LocalFrame::at(place).expect("a place"));
         let place = vector![47.011, 8.019, 470.0];
-        let moved = here.place_from(&there, there.place(place).expect("a place"));
+        let moved = here.position_from(&other, other.place(place).expect("a place"));
         assert!((moved - here.place(place).expect("a place")).norm() < 4.0 * ROUNDING_M, "{moved}");
-        let step = here.place_from(&there, vector![1.0, 2.0, 3.0]) - here.place_from(&there, Vector3::zeros());
-        assert!((here.turn_from(&there, vector![1.0, 2.0, 3.0]) - step).norm() < ROUNDING_M);
+        let step = here.position_from(&other, vector![1.0, 2.0, 3.0]) - here.position_from(&other, Vector3::zeros());
+        assert!((here.direction_from(&other, vector![1.0, 2.0, 3.0]) - step).norm() < ROUNDING_M);
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Folder {
         };
         let folders: Vec<_> = self.folders.iter().map(counted).collect();
         let file = self.folders.first().and_then(|(_, files)| files.first());
-        let folder = file.and_then(|file| Some(file.shown().parent()?.to_owned())).unwrap_or_default();
+        let folder = file.and_then(|file| Some(file.display_path().parent()?.to_owned())).unwrap_or_default();
         let remedy = match (file, self.folders.first()) {
             (Some(Source { entry: Some(_), .. }), Some((name, _))) => {
                 format!("unpack it, and give one of its folders: {name}")
@@ -130,7 +130,7 @@ impl Folder {
         self.folders.retain(|(_, files)| !files.is_empty());
         self.folders.sort_by_cached_key(|(name, _)| (natural(name), name.clone()));
         for files in self.folders.iter_mut().map(|(_, files)| files).chain([&mut self.files]) {
-            files.sort_by_cached_key(|file| (natural(&file.stem()), file.shown()));
+            files.sort_by_cached_key(|file| (natural(&file.stem()), file.display_path()));
         }
         self
     }
@@ -161,7 +161,7 @@ fn is_table(path: &Path) -> bool {
 /// Returns whether a file with the extension of a table is prose.
 fn is_note(source: &Source) -> bool {
     let is_named = NOTES.contains(&&*source.stem().to_lowercase());
-    TEXTS.contains(&&*extension(&source.shown())) && (is_named || is_prose(source))
+    TEXTS.contains(&&*extension(&source.display_path())) && (is_named || is_prose(source))
 }
 
 fn extension(path: &Path) -> String {

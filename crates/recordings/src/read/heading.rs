@@ -128,7 +128,7 @@ impl<'a> Heading<'a> {
             Some((separator, Self::new(&name[..at], quantity(&name[at + 1..].to_lowercase())?)))
         })?;
         let ambiguous = LETTERS.contains(&heading.vehicle) && separator == '_';
-        (ambiguous || !says_a_quantity(heading.vehicle)).then_some(Self { ambiguous, ..heading })
+        (ambiguous || !is_quantity_name(heading.vehicle)).then_some(Self { ambiguous, ..heading })
     }
 
     /// Returns whether the vehicle is a number.
@@ -174,7 +174,7 @@ fn height(name: &str) -> Option<Role> {
 }
 
 /// Returns whether the last word of a name is a quantity with axes, as in `cf1_gyro` and `../orientation`.
-pub(super) fn says_a_quantity(name: &str) -> bool {
+pub(super) fn is_quantity_name(name: &str) -> bool {
     let name = name.to_lowercase();
     let words = name.split(|c: char| !c.is_alphanumeric());
     let mut words = words.map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
@@ -182,7 +182,7 @@ pub(super) fn says_a_quantity(name: &str) -> bool {
 }
 
 /// Returns whether an unused column cannot identify vehicles: attitudes, rates, sensors.
-pub(super) fn tells_no_vehicle(name: &str) -> bool {
+pub(super) fn is_not_vehicle_column(name: &str) -> bool {
     let stem = bracketed(name).0.to_lowercase();
     let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
     let known = ["", "roll", "pitch", "yaw", "heading", "speed", "battery", "voltage", "thrust", "frame"];
@@ -191,12 +191,12 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
         || ["a", "w", "yaw^"].iter().any(|start| is(start, &["x", "y", "z"]))
         || stem
             .rsplit_once(['.', '/', '_'])
-            .is_some_and(|(start, _)| LETTERS.contains(&start) || says_a_quantity(start))
+            .is_some_and(|(start, _)| LETTERS.contains(&start) || is_quantity_name(start))
 }
 
 /// Returns whether the values of a column with this name could identify vehicles.
-pub(super) fn may_name(name: &str) -> bool {
-    !is_clock(name) && !tells_no_vehicle(name) && Heading::of(name).is_none()
+pub(super) fn may_identify_vehicles(name: &str) -> bool {
+    !is_clock(name) && !is_not_vehicle_column(name) && Heading::of(name).is_none()
 }
 
 /// Returns whether a table reader would use a column with this name in a long table. Other columns must avoid such
@@ -245,7 +245,7 @@ pub(super) fn is_frame(name: &str) -> bool {
 }
 
 /// Returns the unit in the name of a time column.
-pub(super) fn said_unit(name: &str) -> Option<String> {
+pub(super) fn unit_of_time_name(name: &str) -> Option<String> {
     time_and_unit(name).1
 }
 
@@ -296,22 +296,29 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         if is_part || matches!(*unit, "" | "-" | "1") {
             return Ok(name.clone());
         }
-        let said = if is_time {
-            said_unit(name)
+        let own_unit = if is_time {
+            unit_of_time_name(name)
         } else {
             let ending = || endings(name).next().map(|(_, unit, _)| unit);
             bracketed(name).1.or_else(ending).map(str::to_owned)
         };
-        let Some(said) = said else { return Ok(format!("{name} [{unit}]")) };
+        let Some(own_unit) = own_unit else { return Ok(format!("{name} [{unit}]")) };
         let is_same =
-            |velocity: bool| size_of(&said, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
+            |velocity: bool| size_of(&own_unit, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
         let time = |unit: &str| TimeUnit::from_name(&unit.to_lowercase());
-        if said.eq_ignore_ascii_case(unit) || is_same(false) || is_same(true) || (is_time && time(&said) == time(unit))
+        if own_unit.eq_ignore_ascii_case(unit)
+            || is_same(false)
+            || is_same(true)
+            || (is_time && time(&own_unit) == time(unit))
         {
             return Ok(name.clone());
         }
-        let problem =
-            format!("column {} has the unit {}, but the row of units {}", quoted(name), quoted(&said), quoted(unit));
+        let problem = format!(
+            "column {} has the unit {}, but the row of units {}",
+            quoted(name),
+            quoted(&own_unit),
+            quoted(unit)
+        );
         refuse("recording/unit-conflict", problem, "remove one of the two units")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;

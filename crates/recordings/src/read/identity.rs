@@ -470,7 +470,7 @@ fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     let is_position = |rest: &str, [first, _]: [&str; 2]| {
         let letters: String = rest.chars().filter(char::is_ascii_alphabetic).collect();
         let is_bare = letters.is_empty();
-        is_bare || (first != "e" && !heading::LETTERS.contains(&&*letters) && !heading::says_a_quantity(rest))
+        is_bare || (first != "e" && !heading::LETTERS.contains(&&*letters) && !heading::is_quantity_name(rest))
     };
     let array = known.iter().find_map(|(name, original)| {
         let stem = name.strip_suffix("[0]")?;

@@ -82,7 +82,7 @@ impl Layout {
         let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         columns.place = if on_earth { EARTH } else { POSITION };
-        let elsewhere = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
+        let in_other_frame = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
         headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
         columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
         let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
@@ -110,7 +110,7 @@ impl Layout {
             };
             let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
             let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
-            let lost = elsewhere.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
+            let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
             lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
         }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
@@ -200,9 +200,11 @@ impl Layout {
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
         // Skipped if the user names the vehicle column or declares a single vehicle.
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
-            let may_name =
-                |column: &usize| heading::may_name(&header[*column]) && !clock::is_part_of_time(&header[*column]);
-            let suspects = unused.clone().filter(|column| may_name(column) && !self.alternative_ids.contains(column));
+            let may_identify_vehicles = |column: &usize| {
+                heading::may_identify_vehicles(&header[*column]) && !clock::is_part_of_time(&header[*column])
+            };
+            let suspects =
+                unused.clone().filter(|column| may_identify_vehicles(column) && !self.alternative_ids.contains(column));
             self.suspects = suspects.collect();
         }
         // Pandas renames a second column `x` to `x.1`.
@@ -222,7 +224,7 @@ impl Layout {
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_decided = is_one_vehicle || convention.is_one_vehicle;
-        if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+        if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::is_not_vehicle_column(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { code, problem, remedy } => {
                     let remedy = format!("{remedy}; if all rows are of one vehicle, use --one-vehicle");
@@ -262,21 +264,21 @@ impl Layout {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let beside = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
+        let others = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
         let columns: BTreeSet<_> = self
             .bodies
             .iter()
             .flat_map(of)
-            .chain(self.of_time())
+            .chain(self.time_columns())
             .chain(self.id)
-            .chain(beside)
+            .chain(others)
             .chain(self.slots.ids.iter().copied())
             .collect();
         columns.into_iter().collect()
     }
 
     /// Returns the columns of the time.
-    pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn time_columns(&self) -> impl Iterator<Item = usize> {
         self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
 }

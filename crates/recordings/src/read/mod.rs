@@ -63,7 +63,7 @@ use source::Source;
 /// # Errors
 /// [`ReadError`] if the file cannot be read, has an unknown format, or its beginning is invalid.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let opened = match look(path) {
+    let opened = match folder_of(path) {
         _ if bag::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
@@ -80,7 +80,7 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
 pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut all = Folder::default();
     for &path in paths {
-        match look(path).map_err(|error| error.of(path))? {
+        match folder_of(path).map_err(|error| error.of(path))? {
             Some(folder) => {
                 all.files.extend(folder.files);
                 all.folders.extend(folder.folders);
@@ -127,7 +127,7 @@ pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
 }
 
 /// Returns the files of a folder or archive; `None` if the path is itself a recording.
-fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
+fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
         if bag::is_bag(path) {
@@ -154,11 +154,12 @@ fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
 /// Opens files with one vehicle each.
 fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, ReadError> {
     let several = folder.files.len() > 1;
-    let blamed = |error: ReadError, shown: &Path| {
+    let with_file = |error: ReadError, shown: &Path| {
         let error = error.of(shown);
         if several { error.among_others() } else { error }
     };
-    let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
+    let format =
+        folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
     if format.transpose()? == Some(Format::CRAZYFLIE) {
         options.refuse_unsupported_options(Format::CRAZYFLIE)?;
@@ -170,8 +171,8 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     }
     let options = ReadOptions { is_joined: true, ..options.clone() };
     let open = |file: Source| {
-        let shown = file.shown();
-        Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
+        let shown = file.display_path();
+        Ok((shown.clone(), open_one(file, &options).map_err(|error| with_file(error, &shown))?))
     };
     folder::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }

@@ -82,11 +82,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
     }
     let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?.unwrap_or_default();
-    let mut said = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
-    if said.is_empty() {
-        said.extend(options.usual_layout.iter().flatten());
+    let mut known_axes = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
+    if known_axes.is_empty() {
+        known_axes.extend(options.usual_layout.iter().flatten());
     }
-    let table = arrays.table(&positions, times.len(), &said)?;
+    let table = arrays.table(&positions, times.len(), &known_axes)?;
     let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", true))?;
     let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", false))?;
     let radii = arrays.optional("radii", |arrays| arrays.radii(&table))?;
@@ -119,11 +119,11 @@ fn axis(name: &str) -> Option<ArrayAxis> {
     }
 }
 
-/// Returns the layout of an array of positions with this shape and number of times; `said` holds the known leading
+/// Returns the layout of an array of positions with this shape and number of times; `known_axes` holds the known leading
 /// axes. Only lengths distinguish the axes, so that several layouts may fit: then the array is refused.
-fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
+fn layout(shape: [usize; 3], times: usize, known_axes: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
     let fits = |layout: &ArrayLayout| {
-        layout.starts_with(said)
+        layout.starts_with(known_axes)
             && layout.iter().zip(shape).all(|(axis, length)| match axis {
                 ArrayAxis::Time => length == times,
                 ArrayAxis::Axis => matches!(length, 2 | 3),
@@ -134,7 +134,7 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
     let problem = |what: &str| format!("its shape is {shape:?}, and there are {times} times{what}");
     match fitting[..] {
         // If the last axis is not x, y, z, an axis of two or three vehicles could be it.
-        [only] if only[2] == ArrayAxis::Axis || !said.is_empty() => Ok(only),
+        [only] if only[2] == ArrayAxis::Axis || !known_axes.is_empty() => Ok(only),
         [] => {
             let remedy = "save T x N x 3 positions, with T the number of times, or name the axes with --layout, such \
                           as --layout time,vehicle,axis";
@@ -253,7 +253,7 @@ impl Arrays {
     }
 
     /// Returns an array of vectors with `times` instants.
-    fn table(&mut self, name: &str, times: usize, said: &[ArrayAxis]) -> Result<Table, ReadError> {
+    fn table(&mut self, name: &str, times: usize, known_axes: &[ArrayAxis]) -> Result<Table, ReadError> {
         let array = self.array(name)?;
         let at = in_array(name);
         let &[first, second, third] = array.shape.as_slice() else {
@@ -265,7 +265,7 @@ impl Arrays {
             return Err(at(Fault::coded("recording/empty", problem, "save at least one instant of one vehicle")));
         }
         let shape = [first, second, third];
-        let layout = layout(shape, times, said).map_err(&at)?;
+        let layout = layout(shape, times, known_axes).map_err(&at)?;
         Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(at)? })
     }
 }

@@ -43,18 +43,18 @@ pub(super) struct RecordingInfo {
 }
 
 impl RecordingInfo {
-    /// Returns the properties for these options. The unit of the user takes precedence over `said`, the unit of the
+    /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of the
     /// file.
     pub(super) fn new(
         source: &Source,
         options: &ReadOptions,
-        said: Option<TimeUnit>,
+        file_unit: Option<TimeUnit>,
         notes: Vec<String>,
         none: Fault,
     ) -> Self {
-        let unit = options.time_unit.or(said);
+        let unit = options.time_unit.or(file_unit);
         Self {
-            path: source.shown(),
+            path: source.display_path(),
             unit,
             times_per_second: options.times_per_second,
             epoch_ns: 0,
@@ -87,7 +87,7 @@ pub(super) struct Ordered<R> {
     /// Last row of each vehicle, and its time.
     last: Vec<Option<(f64, Row)>>,
     /// Index of each vehicle's last sample in the current batch, where a later row may replace it.
-    given: Vec<usize>,
+    emitted: Vec<usize>,
     /// Number of rows omitted as duplicates in vehicle and time.
     left_out: u64,
 }
@@ -146,7 +146,7 @@ impl<R: Rows> Ordered<R> {
             finished: false,
             now: None,
             last: Vec::new(),
-            given: Vec::new(),
+            emitted: Vec::new(),
             left_out: 0,
         })
     }
@@ -170,29 +170,29 @@ impl<R: Rows> Ordered<R> {
     }
 
     /// Appends a row as a sample, unless it duplicates another one.
-    fn give(&mut self, row: &Row, items: &mut Vec<Item>) -> Result<(), ReadError> {
+    fn emit(&mut self, row: &Row, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
-            self.given.resize(row.vehicle + 1, 0);
+            self.emitted.resize(row.vehicle + 1, 0);
         }
         if let Some((before_s, before)) = self.last[row.vehicle] {
             if before_s == time_s {
                 return self.repeat(row, &before, time_s, items);
             }
             if before.radius.is_some() != row.radius.is_some() {
-                return Err(self.error(row, self.radius_missing(&before, row)));
+                return Err(self.error(row, self.radius_fault(&before, row)));
             }
         }
         let sample = self.sample(row, time_s)?;
         if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.info.metadata.earth_origin.is_some()) {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
-                return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
+                return Err(self.error(row, self.jump_fault(before_s, &before, jump_m, time_s)));
             }
         }
         self.last[row.vehicle] = Some((time_s, *row));
-        self.given[row.vehicle] = items.len();
+        self.emitted[row.vehicle] = items.len();
         items.push(Item::Sample(sample));
         Ok(())
     }
@@ -200,17 +200,16 @@ impl<R: Rows> Ordered<R> {
     /// Omits one of two rows of a vehicle at one time, or refuses the recording.
     #[cold]
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
-        let says_the_same =
-            (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.info.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+        let is_equal = (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
+        match self.info.duplicates.or(is_equal.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
                 // The first row is in the same batch: see `continues_instant`.
-                items[self.given[row.vehicle]] = Item::Sample(sample);
+                items[self.emitted[row.vehicle]] = Item::Sample(sample);
                 self.last[row.vehicle] = Some((time_s, *row));
             }
-            None | Some(Duplicates::Refuse) => return Err(self.error(row, self.twice(time_s, before, row))),
+            None | Some(Duplicates::Refuse) => return Err(self.error(row, self.duplicate_fault(time_s, before, row))),
         }
         self.left_out += 1;
         Ok(())
@@ -240,7 +239,7 @@ impl<R: Rows> Ordered<R> {
     }
 
     #[cold]
-    fn twice(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
+    fn duplicate_fault(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let problem = format!("vehicle {vehicle} has a second row at {time_s} s; the first is at {first}");
         let remedy = "remove one of the two, or choose one with --duplicates first or --duplicates last; if the rows \
@@ -249,7 +248,7 @@ impl<R: Rows> Ordered<R> {
     }
 
     #[cold]
-    fn jumps(&self, before_s: f64, before: &Row, jump_m: f64, time_s: f64) -> Fault {
+    fn jump_fault(&self, before_s: f64, before: &Row, jump_m: f64, time_s: f64) -> Fault {
         let (vehicle, first) = (self.name(before), self.rows.place(before.place));
         let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
         let problem =
@@ -260,7 +259,7 @@ impl<R: Rows> Ordered<R> {
     }
 
     #[cold]
-    fn radius_missing(&self, before: &Row, row: &Row) -> Fault {
+    fn radius_fault(&self, before: &Row, row: &Row) -> Fault {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let which = if row.radius.is_some() { "a radius here, but none" } else { "no radius here, but one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
@@ -290,7 +289,7 @@ impl<R: Rows> Ordered<R> {
         while items.len() < before + BATCH || (waits && self.continues_instant()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
-            self.give(&row, items)?;
+            self.emit(&row, items)?;
         }
         if items.len() == before && self.left_out > 0 {
             let rows = std::mem::take(&mut self.left_out);

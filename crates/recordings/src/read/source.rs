@@ -59,14 +59,14 @@ impl Source {
         let mut file = tempfile::NamedTempFile::new()?;
         std::io::copy(&mut self.bytes()?, &mut file)?;
         let unpacked = Arc::new(file.into_temp_path());
-        let called = self.shown();
-        Ok(Self { unpacked: Some((unpacked.clone(), called)), ..Self::file(&unpacked) })
+        let display_name = self.display_path();
+        Ok(Self { unpacked: Some((unpacked.clone(), display_name)), ..Self::file(&unpacked) })
     }
 
     /// Returns the name for errors.
-    pub(super) fn shown(&self) -> PathBuf {
+    pub(super) fn display_path(&self) -> PathBuf {
         match (&self.unpacked, &self.entry) {
-            (Some((_, called)), _) => called.clone(),
+            (Some((_, display_name)), _) => display_name.clone(),
             (None, Some(entry)) => self.path.join(entry),
             (None, None) => self.path.clone(),
         }
@@ -74,7 +74,7 @@ impl Source {
 
     /// Returns the name of its only vehicle: the file name without extensions.
     pub(super) fn stem(&self) -> String {
-        let path = self.shown();
+        let path = self.display_path();
         let packed = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
         let path = if packed { path.with_extension("") } else { path };
         path.file_stem().unwrap_or_default().to_string_lossy().into_owned()

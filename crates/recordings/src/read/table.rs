@@ -25,7 +25,7 @@ struct Table<C> {
     /// Frame that converts latitude, longitude and height to metres.
     local: Option<LocalFrame>,
     /// Frame of the last origin, if rows have their own origin.
-    there: Option<LocalFrame>,
+    row_frame: Option<LocalFrame>,
     /// Whether the clock starts with the vehicle and other files are read too.
     has_own_clock: bool,
     /// First time, if times are dates.
@@ -83,7 +83,7 @@ pub(super) fn open<C: Cells + 'static>(
         layout,
         names,
         local,
-        there: None,
+        row_frame: None,
         has_own_clock,
         dates,
         alternative_ids,
@@ -195,7 +195,7 @@ impl<C: Cells> Table<C> {
             }
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
-                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
+                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.row_frame)? {
                     continue;
                 }
             } else if let Some(local) = &self.local {
@@ -235,7 +235,7 @@ impl<C: Cells> Table<C> {
     }
 
     /// Returns the fault of a vehicle whose rows look like those of several vehicles.
-    fn suspicion(&self) -> Option<Fault> {
+    fn several_vehicles_fault(&self) -> Option<Fault> {
         let header = self.cells.header();
         if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)
             && self.names.all().len() == self.named
@@ -312,7 +312,7 @@ impl<C: Cells> Rows for Table<C> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             if !self.cells.advance()? {
-                return self.suspicion().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
+                return self.several_vehicles_fault().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
             }
             self.append(rows).map_err(|fault| self.at_row(fault))?;
         }
@@ -358,7 +358,7 @@ impl<C: Cells> Rows for Table<C> {
     /// Reads only times and names, which is several times faster.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
-        let mut columns: Vec<usize> = self.layout.of_time().chain([id]).collect();
+        let mut columns: Vec<usize> = self.layout.time_columns().chain([id]).collect();
         columns.extend(&self.layout.alternative_ids);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;

@@ -59,7 +59,7 @@ const EARLIEST_UTC_US: u64 = 1_000_000_000_000_000;
 /// Opens a log.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     axes::refuse_known(options, "a log of PX4")?;
-    let asked = match &options.topics[..] {
+    let topic_option = match &options.topics[..] {
         [] => None,
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
@@ -70,10 +70,10 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut log = Log::default();
     let is_complete = log.scan(BufReader::new(source.bytes()?))?;
     let mut notes = options.accept_unfinished(is_complete)?;
-    let topic = asked.unwrap_or(if log.global.is_empty() { LOCAL } else { GLOBAL });
+    let topic = topic_option.unwrap_or(if log.global.is_empty() { LOCAL } else { GLOBAL });
     let fixes = if topic == GLOBAL { &log.global } else { &log.local };
     let Some(first) = fixes.first() else {
-        let problem = format!("it has no {} with a known place on the Earth", asked.unwrap_or("position"));
+        let problem = format!("it has no {} with a known place on the Earth", topic_option.unwrap_or("position"));
         let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
         return refuse("recording/no-fix", problem, remedy);
     };
@@ -292,19 +292,19 @@ impl Log {
     }
 
     fn rows(&self, fixes: &[Fix], local: &LocalFrame) -> Result<Vec<Row>, ReadError> {
-        let mut there = *local;
-        let row = |fix: &Fix| self.row(fix, local, &mut there).map_err(|fault| fault.at(Place::Byte(fix.at)));
+        let mut fix_frame = *local;
+        let row = |fix: &Fix| self.row(fix, local, &mut fix_frame).map_err(|fault| fault.at(Place::Byte(fix.at)));
         fixes.iter().map(row).collect()
     }
 
-    /// Converts a position to the frame `local`; `there` caches the frame of the last origin.
-    fn row(&self, fix: &Fix, local: &LocalFrame, there: &mut LocalFrame) -> Result<Row, Fault> {
-        if !there.is_at(fix.origin) {
-            *there = LocalFrame::at(fix.origin)?;
+    /// Converts a position to the frame `local`; `fix_frame` caches the frame of the last origin.
+    fn row(&self, fix: &Fix, local: &LocalFrame, fix_frame: &mut LocalFrame) -> Result<Row, Fault> {
+        if !fix_frame.is_at(fix.origin) {
+            *fix_frame = LocalFrame::at(fix.origin)?;
         }
         let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
         let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);
-        let position = local.place_from(there, fix.position);
+        let position = local.position_from(fix_frame, fix.position);
         Ok(Row { stamp, place: fix.at, vehicle: 0, position, velocity: None, radius: None })
     }
 }

@@ -89,8 +89,8 @@ fn read(path: &Path) -> Result<Bag, ReadError> {
     let text = std::str::from_utf8(&bytes).map_err(|_| Fault::NotUtf8)?;
     let metadata: Metadata = serde_saphyr::from_str(text).map_err(|error| {
         let place = error.location().map(|location| Place::Line(location.line()));
-        let said = error.to_string();
-        let problem = format!("it is not the index of a ROS 2 bag: {}", said.lines().next().unwrap_or_default());
+        let message = error.to_string();
+        let problem = format!("it is not the index of a ROS 2 bag: {}", message.lines().next().unwrap_or_default());
         ReadError { place, ..Fault::coded("recording/bag-index", problem, REINDEX).into() }
     })?;
     Ok(metadata.bag)

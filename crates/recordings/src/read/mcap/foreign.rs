@@ -144,13 +144,13 @@ impl SplitFiles {
     pub(super) fn visit(&mut self, take: impl FnOnce(Part<'_>) -> Result<(), ReadError>) -> Result<bool, ReadError> {
         loop {
             if let Some((topics, source)) = &mut self.open {
-                let part = topics.next().map_err(|error| ReadError::from(error).of(&source.shown()))?;
+                let part = topics.next().map_err(|error| ReadError::from(error).of(&source.display_path()))?;
                 if let Some(part) = part {
-                    return take(part).map(|()| true).map_err(|error| error.of(&source.shown()));
+                    return take(part).map(|()| true).map_err(|error| error.of(&source.display_path()));
                 }
             }
             let Some(file) = self.files.get(self.next).cloned() else { return Ok(false) };
-            let shown = file.shown();
+            let shown = file.display_path();
             self.open = Some(self.opened(file).map_err(|error| error.of(&shown))?);
             self.next += 1;
         }
@@ -236,25 +236,29 @@ impl Poses {
 
     /// Appends the rows of a message.
     pub(super) fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
-        for seen in self.plan.outline.seen_in(message, &mut self.messages)? {
-            self.append(seen, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
+        for observation in self.plan.outline.observations_in(message, &mut self.messages)? {
+            self.append(observation, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
         }
         Ok(())
     }
 
-    fn append(&mut self, seen: Observation, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+    fn append(&mut self, observation: Observation, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        let time_ns = self.plan.time_of(topic, seen.stamp_ns, message.log_ns);
-        if let PoseKind::Transform(turn) = seen.what {
-            return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
+        let time_ns = self.plan.time_of(topic, observation.stamp_ns, message.log_ns);
+        if let PoseKind::Transform(turn) = observation.kind {
+            return if is_static(topic) {
+                Ok(())
+            } else {
+                self.append_bodies(&observation, turn, topic, time_ns, rows)
+            };
         }
-        check_finite(&seen.position)?;
-        if seen.frame == EARTH && is_no_fix(&seen.position) {
+        check_finite(&observation.position)?;
+        if observation.frame == EARTH && is_no_fix(&observation.position) {
             self.no_fixes += 1;
             return Ok(());
         }
-        let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };
-        let name = match seen.who {
+        let Some(position) = self.position(&observation, topic, time_ns)? else { return Ok(()) };
+        let name = match observation.vehicle {
             VehicleKey::Topic => topic.clone(),
             VehicleKey::Listed(number) => format!("{topic}/{number}"),
             VehicleKey::Named(name) => name,
@@ -263,13 +267,18 @@ impl Poses {
     }
 
     /// Returns a pose in the requested frame; `None` if it cannot be transformed.
-    fn position(&mut self, seen: &Observation, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
-        let Some(wanted) = &self.plan.wanted else {
-            self.check_frame(&seen.frame, topic)?;
-            let local = self.plan.earth.filter(|_| seen.frame == EARTH);
-            return local.map_or(Ok(seen.position), |local| local.place(seen.position)).map(Some);
+    fn position(
+        &mut self,
+        observation: &Observation,
+        topic: &str,
+        time_ns: i64,
+    ) -> Result<Option<Vector3<f64>>, Fault> {
+        let Some(target_frame) = &self.plan.target_frame else {
+            self.check_frame(&observation.frame, topic)?;
+            let local = self.plan.earth.filter(|_| observation.frame == EARTH);
+            return local.map_or(Ok(observation.position), |local| local.place(observation.position)).map(Some);
         };
-        if wanted == EARTH {
+        if target_frame == EARTH {
             let problem = format!("{EARTH} is not a metric frame: its positions are latitudes and longitudes");
             return refuse(
                 "recording/unusable-frame",
@@ -277,37 +286,37 @@ impl Poses {
                 "omit --frame, or name a frame of poses; choose topics with --topic",
             );
         }
-        if *wanted == seen.frame {
-            return Ok(Some(seen.position));
+        if *target_frame == observation.frame {
+            return Ok(Some(observation.position));
         }
-        let way = self.plan.conversion_of(topic, &seen.frame, time_ns)?;
+        let way = self.plan.conversion_of(topic, &observation.frame, time_ns)?;
         let known = self.conversions.count(&way);
-        Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
+        Ok(known.map(|known| known.transform.transform_point(&Point3::from(observation.position)).coords))
     }
 
     /// Appends the vehicles whose poses follow from a transform.
     fn append_bodies(
         &mut self,
-        seen: &Observation,
+        observation: &Observation,
         turn: [f64; 4],
         topic: &str,
         time_ns: i64,
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let space = space(topic);
-        let VehicleKey::Named(driver) = &seen.who else { return Ok(()) };
+        let VehicleKey::Named(driver) = &observation.vehicle else { return Ok(()) };
         let Some(bodies) = self.plan.bodies_of(space, driver).cloned() else { return Ok(()) };
-        check_finite(&seen.position)?;
-        if self.plan.wanted.is_none() {
-            self.check_frame(&seen.frame, topic)?;
+        check_finite(&observation.position)?;
+        if self.plan.target_frame.is_none() {
+            self.check_frame(&observation.frame, topic)?;
         }
         for body in bodies {
-            let is_there =
-                body.frame == *driver && self.plan.wanted.as_ref().is_none_or(|wanted| *wanted == seen.frame);
+            let is_there = body.frame == *driver
+                && self.plan.target_frame.as_ref().is_none_or(|target_frame| *target_frame == observation.frame);
             let position = if is_there {
-                Some(seen.position)
+                Some(observation.position)
             } else {
-                let placed = FramePose { position: seen.position, turn }.rigid()?;
+                let placed = FramePose { position: observation.position, turn }.rigid()?;
                 let way = self.plan.conversion_of_vehicle(space, &body, placed, time_ns)?;
                 self.conversions.count(&way).map(|known| known.transform.translation.vector)
             };
@@ -353,7 +362,8 @@ impl Poses {
         notes.extend(no_fixes(self.no_fixes, ""));
         let ConversionCounts { exact, interpolated, unknown } = self.conversions;
         if exact + interpolated + unknown > 0 {
-            let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
+            let into =
+                self.plan.target_frame.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
             notes.push(format!(
                 "positions transformed{into}: {exact} by transforms at their time, {interpolated} by interpolation \
                  between two samples at most 1 s apart; {unknown} omitted because a transform is unknown"

@@ -21,13 +21,13 @@ pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 /// Position in a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Observation {
-    pub(super) who: VehicleKey,
+    pub(super) vehicle: VehicleKey,
     /// Frame of the position.
     pub(super) frame: String,
     /// Time since the epoch of the clock \[ns\]; 0 if the message has none.
     pub(super) stamp_ns: i64,
     pub(super) position: Vector3<f64>,
-    pub(super) what: PoseKind,
+    pub(super) kind: PoseKind,
 }
 
 /// Identification of the vehicle of a position.
@@ -59,45 +59,45 @@ pub(super) fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
     let reader: Reader = match schema {
         "foxglove.PoseInFrame" => {
-            |encoding, bytes| decode_foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.seen()])
+            |encoding, bytes| decode_foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.observation()])
         }
-        "foxglove.PosesInFrame" => |encoding, bytes| decode_foxglove(encoding, bytes).map(PosesInFrame::seen),
-        "foxglove.FrameTransform" => {
-            |encoding, bytes| decode_foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.seen()])
-        }
+        "foxglove.PosesInFrame" => |encoding, bytes| decode_foxglove(encoding, bytes).map(PosesInFrame::observation),
+        "foxglove.FrameTransform" => |encoding, bytes| {
+            decode_foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.observation()])
+        },
         "foxglove.FrameTransforms" => |encoding, bytes| {
             let transforms = decode_foxglove(encoding, bytes).map(|message: FrameTransforms| message.transforms);
-            Ok(transforms?.into_iter().map(FrameTransform::seen).collect())
+            Ok(transforms?.into_iter().map(FrameTransform::observation).collect())
         },
         "geometry_msgs/msg/PoseStamped" | "geometry_msgs/msg/PoseWithCovarianceStamped" => |encoding, bytes| {
             // The covariance follows the pose.
             let (header, pose): (Header, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(VehicleKey::Topic, pose)])
+            Ok(vec![header.observation(VehicleKey::Topic, pose)])
         },
         "geometry_msgs/msg/PointStamped" => |encoding, bytes| {
             let (header, point): (Header, [f64; 3]) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(VehicleKey::Topic, CdrPose(point, [0.0; 4]))])
+            Ok(vec![header.observation(VehicleKey::Topic, CdrPose(point, [0.0; 4]))])
         },
         "geometry_msgs/msg/PoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<CdrPose>) = decode_ros(encoding, bytes)?;
-            Ok((1..).zip(poses).map(|(number, pose)| header.seen(VehicleKey::Listed(number), pose)).collect())
+            Ok((1..).zip(poses).map(|(number, pose)| header.observation(VehicleKey::Listed(number), pose)).collect())
         },
         "motion_capture_tracking_interfaces/msg/NamedPoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<(String, CdrPose)>) = decode_ros(encoding, bytes)?;
-            Ok(poses.into_iter().map(|(name, pose)| header.seen(VehicleKey::Named(name), pose)).collect())
+            Ok(poses.into_iter().map(|(name, pose)| header.observation(VehicleKey::Named(name), pose)).collect())
         },
         // The velocity after the pose is not read: publishers differ on its frame.
         "nav_msgs/msg/Odometry" => |encoding, bytes| {
             let (header, child, pose): (Header, String, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![Observation { what: PoseKind::Odometry(child), ..header.seen(VehicleKey::Topic, pose) }])
+            Ok(vec![Observation { kind: PoseKind::Odometry(child), ..header.observation(VehicleKey::Topic, pose) }])
         },
-        FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::seen),
+        FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::observation),
         "geometry_msgs/msg/TransformStamped" => {
-            |encoding, bytes| decode_ros(encoding, bytes).map(|transform: Transform| vec![transform.seen()])
+            |encoding, bytes| decode_ros(encoding, bytes).map(|transform: Transform| vec![transform.observation()])
         }
         "tf2_msgs/msg/TFMessage" => |encoding, bytes| {
             let (transforms,): (Vec<Transform>,) = decode_ros(encoding, bytes)?;
-            Ok(transforms.into_iter().map(Transform::seen).collect())
+            Ok(transforms.into_iter().map(Transform::observation).collect())
         },
         _ => return None,
     };
@@ -134,10 +134,10 @@ fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, St
 struct Header((i32, u32), String);
 
 impl Header {
-    fn seen(&self, who: VehicleKey, CdrPose(position, _): CdrPose) -> Observation {
+    fn observation(&self, vehicle: VehicleKey, CdrPose(position, _): CdrPose) -> Observation {
         let Self((sec, nanosec), frame) = self;
         let stamp_ns = nanoseconds((*sec).into(), (*nanosec).into());
-        Observation { who, frame: frame.clone(), stamp_ns, position: position.into(), what: PoseKind::Pose }
+        Observation { vehicle, frame: frame.clone(), stamp_ns, position: position.into(), kind: PoseKind::Pose }
     }
 }
 
@@ -150,9 +150,9 @@ struct CdrPose([f64; 3], [f64; 4]);
 struct Transform(Header, String, CdrPose);
 
 impl Transform {
-    fn seen(self) -> Observation {
+    fn observation(self) -> Observation {
         let Self(header, child, pose) = self;
-        Observation { what: PoseKind::Transform(pose.1), ..header.seen(VehicleKey::Named(child), pose) }
+        Observation { kind: PoseKind::Transform(pose.1), ..header.observation(VehicleKey::Named(child), pose) }
     }
 }
 
@@ -162,12 +162,12 @@ struct Fix(Header, (i8, u16), [f64; 3]);
 
 impl Fix {
     /// Returns the position, or nothing without a fix or a height.
-    fn seen(self) -> Vec<Observation> {
+    fn observation(self) -> Vec<Observation> {
         let Self(header, (status, _), place) = self;
         if status < 0 || place[2].is_nan() {
             return Vec::new();
         }
-        vec![Observation { frame: EARTH.to_owned(), ..header.seen(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
+        vec![Observation { frame: EARTH.to_owned(), ..header.observation(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
     }
 }
 
@@ -222,10 +222,15 @@ struct Pose {
 }
 
 /// Returns the position of a Foxglove message, whose absent values are 0.
-fn foxglove_seen(who: VehicleKey, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Observation {
+fn foxglove_observation(
+    vehicle: VehicleKey,
+    frame: String,
+    timestamp: Option<Timestamp>,
+    position: Option<Vec3>,
+) -> Observation {
     let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
     let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));
-    Observation { who, frame, stamp_ns, position, what: PoseKind::Pose }
+    Observation { vehicle, frame, stamp_ns, position, kind: PoseKind::Pose }
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]
@@ -240,8 +245,8 @@ struct PoseInFrame {
 }
 
 impl PoseInFrame {
-    fn seen(self) -> Observation {
-        foxglove_seen(VehicleKey::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
+    fn observation(self) -> Observation {
+        foxglove_observation(VehicleKey::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
     }
 }
 
@@ -257,9 +262,9 @@ struct PosesInFrame {
 }
 
 impl PosesInFrame {
-    fn seen(self) -> Vec<Observation> {
+    fn observation(self) -> Vec<Observation> {
         let one = |(number, pose): (usize, &Pose)| {
-            foxglove_seen(VehicleKey::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
+            foxglove_observation(VehicleKey::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
         };
         (1..).zip(&self.poses).map(one).collect()
     }
@@ -281,15 +286,15 @@ struct FrameTransform {
 }
 
 impl FrameTransform {
-    fn seen(self) -> Observation {
+    fn observation(self) -> Observation {
         let turn = self.rotation.map_or(NO_TURN, |q| [q.x, q.y, q.z, q.w]);
-        let seen = foxglove_seen(
+        let observation = foxglove_observation(
             VehicleKey::Named(self.child_frame_id),
             self.parent_frame_id,
             self.timestamp,
             self.translation,
         );
-        Observation { what: PoseKind::Transform(turn), ..seen }
+        Observation { kind: PoseKind::Transform(turn), ..observation }
     }
 }
 

@@ -67,11 +67,11 @@ impl Outline {
             if !outline.reads(message.of) && reader_of_topic(message.of).is_some() {
                 outline.unread.insert(message.of.topic.clone());
             }
-            let all = outline.seen_in(&message, &mut number)?;
-            let listed = all.iter().filter(|seen| matches!(seen.who, VehicleKey::Listed(_))).count();
+            let all = outline.observations_in(&message, &mut number)?;
+            let listed = all.iter().filter(|observation| matches!(observation.vehicle, VehicleKey::Listed(_))).count();
             let learnt = outline
                 .count(&message, listed)
-                .and_then(|()| all.into_iter().try_for_each(|seen| outline.learn(&message, seen)));
+                .and_then(|()| all.into_iter().try_for_each(|observation| outline.learn(&message, observation)));
             learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
         Ok(outline)
@@ -83,7 +83,11 @@ impl Outline {
     }
 
     /// Decodes the positions of a message; `number` counts the messages that can have some.
-    pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Observation>, ReadError> {
+    pub(super) fn observations_in(
+        &self,
+        message: &Message<'_>,
+        number: &mut u64,
+    ) -> Result<Vec<Observation>, ReadError> {
         let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
         *number += 1;
         if !self.reads(message.of) {
@@ -115,37 +119,37 @@ impl Outline {
         Ok(())
     }
 
-    fn learn(&mut self, message: &Message<'_>, seen: Observation) -> Result<(), Fault> {
+    fn learn(&mut self, message: &Message<'_>, observation: Observation) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        if seen.stamp_ns != 0 && !self.stamped.contains(topic) {
+        if observation.stamp_ns != 0 && !self.stamped.contains(topic) {
             self.stamped.insert(topic.clone());
         }
-        if let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (&seen.what, &seen.who) {
-            let fixed_pose = is_static(topic).then_some(FramePose { position: seen.position, turn: *turn });
+        if let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (&observation.kind, &observation.vehicle) {
+            let fixed_pose = is_static(topic).then_some(FramePose { position: observation.position, turn: *turn });
             if fixed_pose.is_none() && !self.transforms.contains(topic) {
                 self.transforms.insert(topic.clone());
             }
-            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, fixed_pose);
+            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &observation.frame, fixed_pose);
             return Ok(());
         }
-        if seen.frame == EARTH && message.of.schema != FIXES {
+        if observation.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame has the reserved name {}", quoted(EARTH));
             return refuse("recording/unusable-frame", problem, "rename the frame");
         }
         let described = self.topics.entry(topic.clone()).or_default();
         described.schema.clone_from(&message.of.schema);
-        if seen.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&seen.position) {
-            self.first_fix = Some(seen.position);
+        if observation.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&observation.position) {
+            self.first_fix = Some(observation.position);
         }
-        if !described.frames.contains(&seen.frame) {
-            described.frames.insert(seen.frame);
+        if !described.frames.contains(&observation.frame) {
+            described.frames.insert(observation.frame);
         }
-        match seen.who {
+        match observation.vehicle {
             VehicleKey::Topic => described.is_vehicle = true,
             VehicleKey::Named(name) => drop(described.names.insert(name)),
             VehicleKey::Listed(_) => {}
         }
-        let PoseKind::Odometry(child) = seen.what else { return Ok(()) };
+        let PoseKind::Odometry(child) = observation.kind else { return Ok(()) };
         if let Some(known) = described.child.as_ref().filter(|known| **known != child) {
             let problem =
                 format!("it is the odometry of {}, but earlier messages of {}", quoted(&child), quoted(known));
@@ -168,8 +172,8 @@ impl Outline {
     }
 
     /// Returns whether a topic named by the user has transforms of a namespace.
-    pub(super) fn is_told_by_named(&self, wanted: &str) -> bool {
-        self.transforms.iter().any(|topic| space(topic) == wanted && self.named.contains(topic))
+    pub(super) fn is_read_from_named(&self, target_frame: &str) -> bool {
+        self.transforms.iter().any(|topic| space(topic) == target_frame && self.named.contains(topic))
     }
 
     /// Refuses two topics with one vehicle. Vehicles inferred from topic names are not compared if the user names the
@@ -201,8 +205,8 @@ impl Outline {
             if *schema != described.schema
                 || (first != topic && [first, topic].iter().any(|topic| is_setpoint(last(topic))))
             {
-                let who = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
-                return Err(twice(first, topic, &who));
+                let vehicle = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
+                return Err(twice(first, topic, &vehicle));
             }
         }
         Ok(())
@@ -232,16 +236,16 @@ impl Outline {
     }
 
     /// Returns the vehicles that pose topics describe, for comparison with transforms.
-    pub(super) fn cover(&self) -> Coverage<'_> {
-        let mut cover = Coverage::default();
+    pub(super) fn coverage(&self) -> Coverage<'_> {
+        let mut coverage = Coverage::default();
         for (topic, described) in &self.topics {
-            cover.names.extend(described.names.iter().map(String::as_str));
-            cover.names.extend(Some(last(namespace(topic))).filter(|name| described.is_vehicle && !name.is_empty()));
+            coverage.names.extend(described.names.iter().map(String::as_str));
+            coverage.names.extend(Some(last(namespace(topic))).filter(|name| described.is_vehicle && !name.is_empty()));
             let Some((child, (space, tree))) = described.child.as_deref().zip(self.tree_of(topic)) else { continue };
-            cover.children.insert((space, child));
-            cover.carriers.extend(tree.way_up(child).into_iter().flatten().map(|frame| (space, frame)));
+            coverage.children.insert((space, child));
+            coverage.carriers.extend(tree.ancestry(child).into_iter().flatten().map(|frame| (space, frame)));
         }
-        cover
+        coverage
     }
 }
 
@@ -260,7 +264,7 @@ impl Coverage<'_> {
     pub(super) fn holds(&self, space: &str, tree: &Tree, body: &VehicleFrame) -> bool {
         let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
         let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
-        let way = tree.way_up(&body.frame);
+        let way = tree.ancestry(&body.frame);
         is_named
             || self.carriers.contains(&(space, &body.frame))
             || way.is_ok_and(|way| way.iter().any(|frame| self.children.contains(&(space, frame))))
@@ -269,16 +273,17 @@ impl Coverage<'_> {
 
 /// Refuses positions of several robots in frames that are usually local to each robot, such as `odom`. `given` holds
 /// topics or frames with the frames of their positions.
-pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
+pub(super) fn refuse_local_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
     let has_odom = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
     // Autopilots count local positions from the place of their start, and name the frame `map`.
-    let is_own = |teller: &str, frame: &str| has_odom(frame) || teller.contains("local_position");
+    let is_own = |source_name: &str, frame: &str| has_odom(frame) || source_name.contains("local_position");
     let mut known: BTreeMap<&str, &str> = BTreeMap::new();
-    for (teller, frame) in given.filter(|(teller, frame)| is_own(teller, frame)) {
-        let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
-        let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
-        let problem =
-            format!("{first} and {teller} give positions in a frame {shown}, which is usually local to each robot");
+    for (source_name, frame) in given.filter(|(source_name, frame)| is_own(source_name, frame)) {
+        let Some(first) = known.insert(frame, source_name).filter(|first| *first != source_name) else { continue };
+        let (first, source_name, shown) = (quoted(first), quoted(source_name), quoted(frame));
+        let problem = format!(
+            "{first} and {source_name} give positions in a frame {shown}, which is usually local to each robot"
+        );
         let remedy = format!("confirm a common frame with --frame {frame}, or name a frame that transforms lead to");
         return refuse("recording/several-frames", problem, remedy);
     }
@@ -340,7 +345,7 @@ mod tests {
 
     #[test]
     fn local_frames_of_several_robots_are_refused() {
-        let refused = |given: &[(&'static str, &'static str)]| refuse_own_frames(given.iter().copied()).is_err();
+        let refused = |given: &[(&'static str, &'static str)]| refuse_local_frames(given.iter().copied()).is_err();
         assert!(refused(&[("/r1/pose", "odom"), ("/r2/pose", "odom")]));
         assert!(refused(&[("/uav1/mavros/local_position/pose", "map"), ("/uav2/mavros/local_position/pose", "map")]));
         assert!(!refused(&[("/r1/pose", "map"), ("/r2/pose", "map")]));

@@ -175,7 +175,7 @@ impl Channels {
     /// Opens the channels of an MCAP file; `None` if its first instant has none.
     pub(in crate::read) fn open(path: &Path) -> Result<Option<Self>, ReadError> {
         let mut channels = Self { path: path.to_owned(), topics: TopicReader::open(path)?, next: None };
-        let first = channels.look()?;
+        let first = channels.read_instant()?;
         let has_some = !first.is_empty();
         channels.next = Some(first);
         Ok(has_some.then_some(channels))
@@ -189,7 +189,7 @@ impl Channels {
     pub fn next(&mut self, vehicles: usize) -> Result<Vec<Channel>, ReadError> {
         let found = match self.next.take() {
             Some(found) => Ok(found),
-            None => self.look(),
+            None => self.read_instant(),
         };
         let channels = found.and_then(|found| {
             let channels: Result<_, ReadFault> = found.into_iter().map(|found| found.into_channel(vehicles)).collect();
@@ -199,7 +199,7 @@ impl Channels {
     }
 
     /// Reads the channel messages before the next instant.
-    fn look(&mut self) -> Result<Vec<Read>, ReadError> {
+    fn read_instant(&mut self) -> Result<Vec<Read>, ReadError> {
         let mut found: Vec<Read> = Vec::new();
         while let Some(part) = self.topics.next()? {
             let Part::Message(Message { of, bytes, .. }) = part else { continue };

@@ -10,7 +10,7 @@ use super::super::error::{Fault, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
-use super::outline::{Outline, is_static, place, refuse_own_frames, space};
+use super::outline::{Outline, is_static, place, refuse_local_frames, space};
 use super::tree::{Chain, FramePose, TransformAt, Tree, VehicleFrame};
 use crate::mcap::topic::Part;
 
@@ -18,7 +18,7 @@ use crate::mcap::topic::Part;
 pub(super) struct ReadPlan {
     pub(super) outline: Outline,
     /// Frame to which all positions are transformed.
-    pub(super) wanted: Option<String>,
+    pub(super) target_frame: Option<String>,
     /// Local frame of places on the Earth, if there are any.
     pub(super) earth: Option<LocalFrame>,
     /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` without a
@@ -51,7 +51,7 @@ impl ReadPlan {
         let first_fix = outline.first_fix;
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
-            wanted: options.frame.clone(),
+            target_frame: options.frame.clone(),
             earth: origin.map(LocalFrame::at).transpose()?,
             chains: BTreeMap::new(),
             bodies: BTreeMap::new(),
@@ -66,12 +66,12 @@ impl ReadPlan {
         }
         plan.check()?;
         plan.find_bodies()?;
-        if plan.wanted.is_none() {
+        if plan.target_frame.is_none() {
             let bodies = plan
                 .bodies
                 .iter()
                 .flat_map(|(space, of)| of.values().flatten().map(|body| (space.as_str(), body.carrier.as_str())));
-            refuse_own_frames(plan.outline.given_in().chain(bodies))?;
+            refuse_local_frames(plan.outline.given_in().chain(bodies))?;
         }
         let needed = plan.find_chains()?;
         plan.gather(&needed, splits)?;
@@ -93,15 +93,15 @@ impl ReadPlan {
     fn find_bodies(&mut self) -> Result<(), Fault> {
         let is_chosen = !self.outline.named.is_empty();
         let beside_poses = !is_chosen && !self.outline.topics.is_empty();
-        let (cover, mut covered, mut uncovered) = (self.outline.cover(), Vec::new(), Vec::new());
+        let (coverage, mut covered, mut uncovered) = (self.outline.coverage(), Vec::new(), Vec::new());
         for (space, tree) in &self.outline.trees {
-            if is_chosen && !self.outline.is_told_by_named(space) {
+            if is_chosen && !self.outline.is_read_from_named(space) {
                 continue;
             }
             let bodies = tree.bodies()?;
             if beside_poses {
                 for body in bodies {
-                    let of = if cover.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
+                    let of = if coverage.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
                     of.push(body.frame);
                 }
                 continue;
@@ -135,15 +135,15 @@ impl ReadPlan {
         let mut ways: Vec<(String, String, String, Option<String>)> = Vec::new();
         for (space, drivers) in &self.bodies {
             for body in drivers.values().flatten() {
-                let into = self.wanted.as_ref().unwrap_or(&body.carrier);
+                let into = self.target_frame.as_ref().unwrap_or(&body.carrier);
                 ways.push((space.clone(), body.frame.clone(), into.clone(), Some(body.driver.clone())));
             }
         }
-        if let Some(wanted) = &self.wanted {
+        if let Some(target_frame) = &self.target_frame {
             for (topic, described) in &self.outline.topics {
                 let Some((space, _)) = self.outline.tree_of(topic) else { continue };
-                let others = described.frames.iter().filter(|frame| *frame != wanted && *frame != EARTH);
-                ways.extend(others.map(|frame| (space.to_owned(), frame.clone(), wanted.clone(), None)));
+                let others = described.frames.iter().filter(|frame| *frame != target_frame && *frame != EARTH);
+                ways.extend(others.map(|frame| (space.to_owned(), frame.clone(), target_frame.clone(), None)));
             }
         }
         let mut needed: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -175,13 +175,16 @@ impl ReadPlan {
             let Part::Message(message) = part else { return Ok(()) };
             let topic = &message.of.topic;
             let space = space(topic);
-            for seen in self.outline.seen_in(&message, &mut number)? {
-                let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (seen.what, seen.who) else { continue };
+            for observation in self.outline.observations_in(&message, &mut number)? {
+                let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (observation.kind, observation.vehicle)
+                else {
+                    continue;
+                };
                 if is_static(topic) || !needed.get(space).is_some_and(|frames| frames.contains(&child)) {
                     continue;
                 }
-                let time_ns = self.time_of(topic, seen.stamp_ns, message.log_ns);
-                let placed = FramePose { position: seen.position, turn };
+                let time_ns = self.time_of(topic, observation.stamp_ns, message.log_ns);
+                let placed = FramePose { position: observation.position, turn };
                 let tree = self.outline.trees.entry(space.to_owned()).or_default();
                 tree.store(&child, time_ns, &placed).map_err(|fault| fault.at(place(number, &message)))?;
             }
@@ -224,7 +227,7 @@ impl ReadPlan {
         driver: Isometry3<f64>,
         time_ns: i64,
     ) -> Result<Conversion, Fault> {
-        let chain = self.chain(space, &body.frame).filter(|chain| chain.leads_up_over(&body.driver));
+        let chain = self.chain(space, &body.frame).filter(|chain| chain.contains_upward(&body.driver));
         let transform_along =
             |chain| self.outline.trees[space].transform_along(chain, time_ns, Some((&body.driver, driver)));
         chain.map_or(Ok(Conversion::None), |chain| Ok(Conversion::of(transform_along(chain)?)))
@@ -233,7 +236,7 @@ impl ReadPlan {
     /// Returns the fault of a recording without positions.
     pub(super) fn none(&self) -> Fault {
         let trees = || self.outline.trees.values();
-        match &self.wanted {
+        match &self.target_frame {
             Some(frame) => {
                 let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
                 Fault::coded(
@@ -257,7 +260,7 @@ impl ReadPlan {
 
     /// Returns the local frame of places on the Earth, if these are read.
     pub(super) fn local(&self) -> Option<LocalFrame> {
-        self.earth.filter(|_| self.wanted.is_none())
+        self.earth.filter(|_| self.target_frame.is_none())
     }
 
     /// Returns the notes for the user.
@@ -287,23 +290,23 @@ impl ReadPlan {
 
     /// Returns the note on data without a transform to the requested frame.
     fn left_out(&self) -> Option<String> {
-        let wanted = self.wanted.as_ref()?;
+        let target_frame = self.target_frame.as_ref()?;
         let mut left_out = Vec::new();
         for (topic, described) in &self.outline.topics {
             let leads =
                 |frame: &str| self.outline.tree_of(topic).is_some_and(|(space, _)| self.chain(space, frame).is_some());
-            let strays = described.frames.iter().filter(|frame| *frame != wanted && !leads(frame));
-            left_out.extend(strays.map(|frame| format!("{topic} in {frame}")));
+            let unconnected = described.frames.iter().filter(|frame| *frame != target_frame && !leads(frame));
+            left_out.extend(unconnected.map(|frame| format!("{topic} in {frame}")));
         }
         for (space, body) in
             self.bodies.iter().flat_map(|(space, of)| of.values().flatten().map(move |body| (space, body)))
         {
-            if !self.chain(space, &body.frame).is_some_and(|chain| chain.leads_up_over(&body.driver)) {
+            if !self.chain(space, &body.frame).is_some_and(|chain| chain.contains_upward(&body.driver)) {
                 left_out.push(body.frame.clone());
             }
         }
-        let (wanted, list) = (quoted(wanted), left_out.join(", "));
-        (!left_out.is_empty()).then(|| format!("not read, because no transforms lead to {wanted}: {list}"))
+        let (target_frame, list) = (quoted(target_frame), left_out.join(", "));
+        (!left_out.is_empty()).then(|| format!("not read, because no transforms lead to {target_frame}: {list}"))
     }
 }
 

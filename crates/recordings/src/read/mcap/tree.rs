@@ -51,7 +51,7 @@ pub(super) struct Chain {
 
 impl Chain {
     /// Returns whether the upward part contains the transform of a frame.
-    pub(super) fn leads_up_over(&self, child: &str) -> bool {
+    pub(super) fn contains_upward(&self, child: &str) -> bool {
         self.up.iter().any(|frame| frame == child)
     }
 
@@ -113,7 +113,7 @@ impl Tree {
     }
 
     /// Returns a frame and all its ancestors, up to the root.
-    pub(super) fn way_up<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
+    pub(super) fn ancestry<'a>(&'a self, frame: &'a str) -> Result<Vec<&'a str>, Fault> {
         let mut way = vec![frame];
         while let Some((child, edge)) = way.last().and_then(|last| self.edges.get_key_value(*last)) {
             if let Some(second_parent) = &edge.second_parent {
@@ -138,7 +138,7 @@ impl Tree {
     /// Returns the vehicles.
     pub(super) fn bodies(&self) -> Result<Vec<VehicleFrame>, Fault> {
         let ways: BTreeMap<_, _> =
-            self.frames().map(|frame| Ok((frame, self.way_up(frame)?))).collect::<Result<_, Fault>>()?;
+            self.frames().map(|frame| Ok((frame, self.ancestry(frame)?))).collect::<Result<_, Fault>>()?;
         let moved = |way: &[&str]| way.iter().any(|frame| self.moves(frame));
         let named: BTreeSet<&str> = ways
             .iter()
@@ -169,7 +169,7 @@ impl Tree {
 
     /// Returns the transforms from a frame to another; `None` without a common ancestor.
     pub(super) fn chain(&self, from: &str, into: &str) -> Result<Option<Chain>, Fault> {
-        let (up, down) = (self.way_up(from)?, self.way_up(into)?);
+        let (up, down) = (self.ancestry(from)?, self.ancestry(into)?);
         let meeting = up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|of| of == frame)?)));
         let Some((top, bottom)) = meeting else { return Ok(None) };
         let owned = |frames: &[&str]| frames.iter().map(|frame| (*frame).to_owned()).collect();
@@ -230,7 +230,7 @@ impl Tree {
         self.check(frame)?;
         match &edge.fixed_pose {
             Some(placed) => Ok(Some(TransformAt { transform: placed.rigid()?, interpolated: false })),
-            None => Ok(at(&edge.samples, time_ns)),
+            None => Ok(pose_at(&edge.samples, time_ns)),
         }
     }
 }
@@ -290,7 +290,7 @@ pub(super) struct TransformAt {
 
 /// Returns a moving transform at a time from its samples in order of time; `None` outside of them or in a gap above
 /// [`LONGEST_BRACKET_NS`].
-pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<TransformAt> {
+pub(super) fn pose_at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<TransformAt> {
     let after = samples.partition_point(|(stamp, _)| *stamp < time_ns);
     let (to_ns, to) = samples.get(after)?;
     if *to_ns == time_ns {
@@ -300,12 +300,12 @@ pub(super) fn at(samples: &[(i64, Isometry3<f64>)], time_ns: i64) -> Option<Tran
     let span_ns = to_ns.checked_sub(*from_ns).filter(|span| *span <= LONGEST_BRACKET_NS)?;
     let part = (time_ns - from_ns) as f64 / span_ns as f64;
     let shift = from.translation.vector.lerp(&to.translation.vector, part);
-    let turn = between(from.rotation, to.rotation, part);
+    let turn = slerp(from.rotation, to.rotation, part);
     Some(TransformAt { transform: Isometry3::from_parts(shift.into(), turn), interpolated: true })
 }
 
 /// Spherical linear interpolation along the shortest arc.
-fn between(from: UnitQuaternion<f64>, to: UnitQuaternion<f64>, part: f64) -> UnitQuaternion<f64> {
+fn slerp(from: UnitQuaternion<f64>, to: UnitQuaternion<f64>, part: f64) -> UnitQuaternion<f64> {
     let cosine = from.coords.dot(&to.coords);
     let (cosine, to) = if cosine < 0.0 { (-cosine, -to.coords) } else { (cosine, to.coords) };
     let (a, b) = if cosine > NEARLY_SAME {
@@ -407,20 +407,20 @@ mod rigid_tests {
     #[test]
     fn transform_is_interpolated_only_between_samples() {
         let samples = [sample(0, 0.0, 0.0), sample(100, 1.0, 1.0), sample(1_000_000_101, 2.0, 0.0)];
-        assert_eq!(at(&samples, 100), Some(TransformAt { transform: samples[1].1, interpolated: false }));
-        let found = at(&samples, 25).expect("between");
+        assert_eq!(pose_at(&samples, 100), Some(TransformAt { transform: samples[1].1, interpolated: false }));
+        let found = pose_at(&samples, 25).expect("between");
         assert!(found.interpolated && found.transform.translation.x == 0.25);
         assert!(found.transform.rotation.angle_to(&turned(0.25)) < 1e-12);
         for outside in [-1, 101, 1_000_000_102, i64::MIN, i64::MAX] {
-            assert_eq!(at(&samples, outside), None, "{outside}");
+            assert_eq!(pose_at(&samples, outside), None, "{outside}");
         }
     }
 
     #[test]
     fn interpolation_takes_the_shortest_arc() {
         let far = UnitQuaternion::new_unchecked(-turned(1.0).into_inner());
-        assert!(between(turned(0.0), far, 0.5).angle_to(&turned(0.5)) < 1e-12);
-        assert!(between(turned(0.0), turned(1e-7), 0.5).angle_to(&turned(5e-8)) < 1e-15);
+        assert!(slerp(turned(0.0), far, 0.5).angle_to(&turned(0.5)) < 1e-12);
+        assert!(slerp(turned(0.0), turned(1e-7), 0.5).angle_to(&turned(5e-8)) < 1e-15);
     }
 
     #[test]
