@@ -81,7 +81,7 @@ fn tables_in_folders_of_a_folder_or_archive_are_named_with_the_way_to_give_them(
     for path in ["flight", "flight.zip"] {
         let ran = audit(top.path(), &[path]);
         assert_eq!(ran.exit, Some(0), "{path}: {ran:?}");
-        assert!(words(&ran).contains("not read, being no tables: old/"), "{path}: {ran:?}");
+        assert!(words(&ran).contains("not read, as they are not tables: old/"), "{path}: {ran:?}");
     }
 }
 
@@ -94,13 +94,13 @@ fn an_archive_in_an_archive_and_a_recording_in_a_folder_are_pointed_at() {
         ("words.zip", &zipped(&[("readme.md", b"words")])),
         ("bag/flight.mcap", b"\x89MCAP0\r\n"),
     ]);
-    let said = "there is no table in the archive: it holds inner.zip, readme.md";
+    let said = "there is no table in the archive; it contains inner.zip, readme.md";
     refused(folder.path(), &["outer.zip"], said, "unpack it, and give inner.zip");
-    refused(folder.path(), &["words.zip"], "there is no table in the archive", "pack a table for each vehicle");
-    refused(folder.path(), &["bag"], "there is no table in the folder", "give flight.mcap, which lies in it");
+    refused(folder.path(), &["words.zip"], "there is no table in the archive", "pack one table per vehicle");
+    refused(folder.path(), &["bag"], "there is no table in the folder", "give flight.mcap inside it");
     let beside = audit(folder.path(), &["beside.zip"]);
     assert_eq!(beside.exit, Some(0), "{beside:?}");
-    assert!(words(&beside).contains("not read, being no tables: inner.zip"), "{beside:?}");
+    assert!(words(&beside).contains("not read, as they are not tables: inner.zip"), "{beside:?}");
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
         for path in ["flight", "flight.zip"] {
             let ran = audit(both.path(), &[path]);
             assert_eq!(ran.exit, Some(0), "{path}: {ran:?}");
-            assert!(words(&ran).contains("not read, being no tables: readme.txt, site.dat"), "{path}: {ran:?}");
+            assert!(words(&ran).contains("not read, as they are not tables: readme.txt, site.dat"), "{path}: {ran:?}");
         }
     }
     // What is packed is unpacked, whichever comes first.
@@ -142,7 +142,7 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
         }
     }
     let broken = both(&[a, b, ("c.csv", b"mass,1.5\n")]);
-    refused(broken.path(), &["flight"], "c.csv", "take the file away, if it is none of the recording");
+    refused(broken.path(), &["flight"], "c.csv", "remove the file if it does not belong to the recording");
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn what_was_guessed_is_said() {
     ]);
     let ran = audit(folder.path(), &["wide.csv", "--delta", "1"]);
     assert_eq!(ran.exit, Some(0), "{}", ran.err);
-    assert!(ran.err.contains("vehicles, going by the names of columns: `cf1`, `cf2`"), "{}", ran.err);
+    assert!(ran.err.contains("vehicles by column names: `cf1`, `cf2`"), "{}", ran.err);
     assert!(ran.err.contains("columns not used: gyro_x, gyro_y"), "{}", ran.err);
     let asked = audit(folder.path(), &["plain.txt", "--delta", "1"]);
     assert!(asked.exit == Some(2) && asked.err.contains("--dimensions 2 or 3 or 3+3"), "{}", asked.err);
@@ -82,7 +82,7 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
         for arguments in [&["flight"][..], &["--join", "flight/a.csv", "flight/b.csv"]] {
             let ran = audit(folder.path(), &[arguments, &["--delta", delta]].concat());
             assert_eq!(ran.exit, Some(exit), "{arguments:?}: {}", ran.err);
-            assert!(ran.err.contains("a file is a vehicle: a, b"), "{}", ran.err);
+            assert!(ran.err.contains("each file is one vehicle: a, b"), "{}", ran.err);
         }
     }
     let several = audit(folder.path(), &["flight", "pair.csv", "--delta", "1.9"]);

@@ -18,7 +18,7 @@ fn fixes_at_zero_and_zero_are_gaps_that_are_counted() {
     let lost = audit(&|t| if t == 4 { "0,0,0".to_owned() } else { "47.001,8,400".to_owned() });
     assert_eq!(lost.exit, Some(1), "{lost:?}");
     assert!(lost.out.starts_with("UNDECIDED: b was not seen from 3.000 s to 5.000 s"), "{lost:?}");
-    assert!(lost.err.contains("1 place is no fix and was left out of `b`"), "{lost:?}");
+    assert!(lost.err.contains("1 position of `b` omitted for lack of a fix"), "{lost:?}");
     let limited = ran_by(TAUTLINE, folder.path(), &["audit", "gps.csv", "--limit", "climb=5,speed=1"]);
     assert!(limited.out.starts_with("UNDECIDED"), "{limited:?}");
 }

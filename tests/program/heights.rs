@@ -63,7 +63,7 @@ fn a_question_about_heights_needs_them() {
     assert!(asked.exit == Some(2) && asked.err.contains("tautline.toml"), "{asked:?}");
     let known = audit(folder.path(), &["high.csv"]);
     assert!(known.exit == Some(1) && known.out.contains("height of a was 11826.000 m"), "{known:?}");
-    assert!(known.err.contains("heights are those of column `geoaltitude`"), "{known:?}");
+    assert!(known.err.contains("heights are read from column `geoaltitude`"), "{known:?}");
 }
 
 #[test]

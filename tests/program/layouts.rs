@@ -47,7 +47,7 @@ fn a_layout_is_named_on_the_command_line_or_in_the_settings() {
     let unknown = audit(&["flight.npz", "--layout", "xyz"]);
     assert!(unknown.exit == Some(2) && unknown.err.contains("time,vehicle,axis"), "{unknown:?}");
     let needless = audit(&["flight.csv", "--layout", "time,vehicle,axis"]);
-    assert!(needless.exit == Some(2) && needless.err.contains("leave --layout away"), "{needless:?}");
+    assert!(needless.exit == Some(2) && needless.err.contains("omit --layout"), "{needless:?}");
 
     // Settings are for all recordings beside them, of any format.
     fs::write(folder.path().join("tautline.toml"), "[audit]\nlayout = \"time,axis,vehicle\"\n").expect("written");

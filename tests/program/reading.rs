@@ -73,7 +73,7 @@ fn heights_are_along_the_axis_that_is_up() {
         let ran = audit(&[("f.csv", NED)], &[&height[..], words].concat());
         assert_eq!(ran.exit, Some(exit), "{words:?}: {ran:?}");
         assert_eq!(
-            ran.err.contains("axes are turned"),
+            ran.err.contains("axes are mapped"),
             exit != 2 && !matches!(words, [] | ["--axes", "enu"]),
             "{ran:?}"
         );

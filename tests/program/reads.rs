@@ -90,12 +90,12 @@ fn nothing_is_proved_of_positions_that_interpolated_transforms_brought() {
     let exact = ran("robots_exact", &bounded);
     assert!(exact.exit == Some(0) && exact.out.starts_with("PROVED CLEAR"), "{exact:?}");
     let guessed = ran("robots", &bounded);
-    let if_so = "CLEAR if accelerations of at most 1.0 m/s^2, transforms even between their samples";
+    let if_so = "CLEAR if accelerations of at most 1.0 m/s^2, transforms uniform between their samples";
     assert!(guessed.exit == Some(0) && guessed.out.starts_with(if_so), "{guessed:?}");
-    assert!(guessed.err.contains("10 by those of their very time, 32 by some between"), "{guessed:?}");
+    assert!(guessed.err.contains("10 by transforms at their time, 32 by interpolation"), "{guessed:?}");
     let json: serde_json::Value = serde_json::from_str(&ran("robots", &["--json"]).out).expect("a report");
     assert_eq!(json["audit"]["proved"], false);
-    assert_eq!(json["audit"]["assumes"], "straight between samples, transforms even between their samples");
+    assert_eq!(json["audit"]["assumes"], "straight between samples, transforms uniform between their samples");
     assert_eq!(json["vehicles"], serde_json::json!(["r1/base_link", "r2/base_link"]));
     let refused = ran_by(TAUTLINE, folder.path(), &["audit", &bag("robots"), "--delta", "1"]);
     assert_eq!((refused.exit, refused.code()), (Some(2), "recording/several-frames"), "{refused:?}");
@@ -107,7 +107,7 @@ fn bags_and_places_on_the_earth_are_exported_as_they_are_judged() {
     let gps = "t,id,lat,lon,alt\n0,a,47,8,400\n0,b,47.0001,8,400\n1,a,47,8,401\n1,b,47.0001,8,401\n";
     fs::write(folder.path().join("gps.csv"), gps).expect("written");
     let split = bag("split");
-    let lost = "samples hold only if transforms even between their samples";
+    let lost = "the file does not contain: transforms uniform between their samples";
     let robots = bag("robots");
     for (recording, options, said) in [
         (split.as_str(), &[][..], ""),

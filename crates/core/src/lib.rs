@@ -7,8 +7,8 @@
 //! | [`record`] | a flight's samples as they are made, and the traits that receive them |
 //! | [`text`] | formatting of numbers |
 //!
-//! SI units, named at the end of each name (`clearance_m`). One inertial frame, z up. Vehicles are counted from 0 in code
-//! and from 1 in everything a person reads.
+//! SI units; each name ends with its unit (`clearance_m`). One inertial frame, z up. Vehicles count from 0 in code and
+//! from 1 in all output.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
@@ -20,5 +20,5 @@ pub mod track;
 /// Name of the program in its artefacts.
 pub const PROGRAM: &str = "tautline";
 
-/// The version of every crate of the program.
+/// Version of every crate of the workspace.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

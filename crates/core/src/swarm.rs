@@ -1,14 +1,14 @@
-//! The state of a swarm: where every vehicle is and how fast it moves.
+//! State of a swarm: position and velocity of every vehicle.
 //!
 //! A row is a vehicle and a column is an axis, so each axis is contiguous in memory. Lengths are metres, times seconds,
-//! in one inertial frame with z up. Vehicles are counted from 0 in code and from 1 in everything a person reads.
+//! in one inertial frame with z up. Vehicles count from 0 in code and from 1 in all output.
 
 use std::fmt;
 
 use nalgebra::{MatrixXx3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// An N x 3 table of vectors, a row per vehicle \[x, y, z\].
+/// N x 3 table of vectors, a row \[x, y, z\] per vehicle.
 pub type Rows = MatrixXx3<f64>;
 
 /// Positions \[m\] and velocities \[m/s\] of N vehicles.
@@ -21,49 +21,49 @@ pub struct Swarm {
 }
 
 impl Swarm {
-    /// A swarm at rest at the given positions \[m\].
+    /// Returns a swarm at rest at the given positions \[m\].
     #[must_use]
     pub fn at_rest(positions_m: Rows) -> Self {
         let velocities_m_s = Rows::zeros(positions_m.nrows());
         Self { positions_m, velocities_m_s }
     }
 
-    /// Takes the numbers of a swarm of as many vehicles, in the memory that is there.
+    /// Copies the state of `other` without allocation.
     ///
     /// # Panics
-    /// If there are more vehicles, or fewer.
+    /// If the two swarms have different numbers of vehicles.
     pub fn copy_from(&mut self, other: &Self) {
         self.positions_m.copy_from(&other.positions_m);
         self.velocities_m_s.copy_from(&other.velocities_m_s);
     }
 
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {
         self.positions_m.nrows()
     }
 
-    /// Mean velocity \[m/s\], zero for an empty swarm.
+    /// Returns the mean velocity \[m/s\], zero for an empty swarm.
     #[must_use]
     pub fn mean_velocity_m_s(&self) -> Vector3<f64> {
         mean_row(&self.velocities_m_s)
     }
 
-    /// Largest speed of a vehicle relative to the swarm's mean velocity \[m/s\].
+    /// Returns the largest speed of a vehicle relative to the mean velocity of the swarm \[m/s\].
     #[must_use]
     pub fn disagreement_m_s(&self) -> f64 {
         let mean = self.mean_velocity_m_s();
         (0..self.count()).map(|i| (row(&self.velocities_m_s, i) - mean).norm()).fold(0.0, f64::max)
     }
 
-    /// The first vehicle with a position or velocity that is not a finite number.
+    /// Returns the first vehicle with a position or velocity that is not a finite number.
     #[must_use]
     pub fn first_not_finite(&self) -> Option<usize> {
         first_row_not_finite(&self.positions_m).into_iter().chain(first_row_not_finite(&self.velocities_m_s)).min()
     }
 }
 
-/// Row `i` as a vector.
+/// Returns row `i` as a vector.
 #[inline]
 #[must_use]
 pub fn row(rows: &Rows, i: usize) -> Vector3<f64> {
@@ -76,7 +76,7 @@ pub fn set_row(rows: &mut Rows, i: usize, v: Vector3<f64>) {
     (rows[(i, 0)], rows[(i, 1)], rows[(i, 2)]) = (v.x, v.y, v.z);
 }
 
-/// The numbers along each axis, a number per vehicle.
+/// Returns the columns x, y and z, each with one number per vehicle.
 #[inline]
 #[must_use]
 pub fn columns(rows: &Rows) -> [&[f64]; 3] {
@@ -85,7 +85,7 @@ pub fn columns(rows: &Rows) -> [&[f64]; 3] {
     [x, y, z]
 }
 
-/// The numbers along each axis, to be written.
+/// Returns the columns x, y and z for writing.
 #[inline]
 #[must_use]
 pub fn columns_mut(rows: &mut Rows) -> [&mut [f64]; 3] {
@@ -95,38 +95,38 @@ pub fn columns_mut(rows: &mut Rows) -> [&mut [f64]; 3] {
     [x, y, z]
 }
 
-/// Distance between rows `i` and `j` of a table of positions.
+/// Returns the distance between rows `i` and `j` of a table of positions \[m\].
 #[inline]
 #[must_use]
 pub fn separation(positions_m: &Rows, i: usize, j: usize) -> f64 {
     (row(positions_m, j) - row(positions_m, i)).norm()
 }
 
-/// Mean of all rows, zero for an empty table.
+/// Returns the mean of all rows, zero for an empty table.
 #[must_use]
 pub fn mean_row(rows: &Rows) -> Vector3<f64> {
     let n = rows.nrows().max(1) as f64;
     Vector3::new(rows.column(0).sum() / n, rows.column(1).sum() / n, rows.column(2).sum() / n)
 }
 
-/// Largest Euclidean norm of a row, 0 for an empty table; NaN where there is one.
+/// Returns the largest Euclidean norm of a row: 0 for an empty table, NaN if a component is NaN.
 #[must_use]
 pub fn largest_row_norm(rows: &Rows) -> f64 {
     let squares = (0..rows.nrows()).map(|i| row(rows, i).norm_squared());
     squares.fold(0.0, |a: f64, b| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }).sqrt()
 }
 
-/// The first row that holds a number that is not finite.
+/// Returns the first row with a number that is not finite.
 #[must_use]
 pub fn first_row_not_finite(rows: &Rows) -> Option<usize> {
     first_row_beyond(rows, f64::MAX)
 }
 
-/// Returns the first row that holds a number beyond a limit in size, or one that is not finite.
+/// Returns the first row with a number whose absolute value exceeds `limit` or that is not finite.
 #[must_use]
 pub fn first_row_beyond(rows: &Rows, limit: f64) -> Option<usize> {
     let is_within = |x: &f64| x.abs() <= limit;
-    // Without a branch for each number, and in no order, many are looked at together.
+    // A fold without branches lets the compiler vectorize the comparison.
     let are_within = |some: &[f64]| some.iter().fold(true, |all, x| all & is_within(x));
     if rows.as_slice().chunks(256).all(are_within) {
         return None;
@@ -134,7 +134,7 @@ pub fn first_row_beyond(rows: &Rows, limit: f64) -> Option<usize> {
     (0..rows.nrows()).find(|&i| !rows.row(i).iter().all(is_within))
 }
 
-/// Two different vehicles, the lower index first. Shown from 1: `2-3`, and in JSON `[2, 3]`.
+/// Two different vehicles, the lower index first. Displayed with numbers from 1 as `2-3`, and in JSON as `[2, 3]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "[usize; 2]", try_from = "[usize; 2]")]
 pub struct Pair {
@@ -143,29 +143,29 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The pair of vehicles `i` and `j` (from 0), in either order.
+    /// Returns the pair of vehicles `i` and `j` (from 0), in either order.
     ///
     /// # Panics
-    /// If `i == j`: a vehicle is not a pair.
+    /// If `i == j`.
     #[must_use]
     pub fn new(i: usize, j: usize) -> Self {
         assert_ne!(i, j, "a pair needs two different vehicles");
         Self { first: i.min(j), second: i.max(j) }
     }
 
-    /// The lower index, from 0.
+    /// Returns the lower index, from 0.
     #[must_use]
     pub fn first(self) -> usize {
         self.first
     }
 
-    /// The higher index, from 0.
+    /// Returns the higher index, from 0.
     #[must_use]
     pub fn second(self) -> usize {
         self.second
     }
 
-    /// Both numbers as people read them, from 1.
+    /// Returns both vehicle numbers, from 1.
     #[must_use]
     pub fn numbers(self) -> [usize; 2] {
         [self.first + 1, self.second + 1]
@@ -178,7 +178,7 @@ impl From<Pair> for [usize; 2] {
     }
 }
 
-/// From numbers as people read them, from 1.
+/// Accepts vehicle numbers from 1.
 impl TryFrom<[usize; 2]> for Pair {
     type Error = &'static str;
 
@@ -196,18 +196,18 @@ impl fmt::Display for Pair {
     }
 }
 
-/// Two hulls that hit.
+/// Collision of two hulls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounce {
-    /// Whose.
+    /// The two vehicles.
     pub pair: Pair,
-    /// When the step began in which they hit \[s\].
+    /// Start of the step in which they collided \[s\].
     pub time_s: f64,
-    /// How fast their centres neared each other before \[m/s\].
+    /// Closing speed of their centres before the collision \[m/s\].
     pub closing_m_s: f64,
 }
 
-/// The closest that a pair came, and when.
+/// Closest approach of a pair of vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestApproach {
     /// The pair.

@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Formats numbers for output that people read.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ pub fn fixed(number: f64, decimals: usize) -> String {
     }
 }
 
-/// Like [`fixed`], rounded down: what is said to be "never closer than" this never is.
+/// Formats as [`fixed`] does, rounded down, so that the text is a lower bound of `number`.
 #[must_use]
 pub fn at_least(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
@@ -27,7 +27,7 @@ pub fn at_least(number: f64, decimals: u8) -> String {
     }
 }
 
-/// Like [`fixed`], rounded up: what is said to be "at most" this is.
+/// Formats as [`fixed`] does, rounded up, so that the text is an upper bound of `number`.
 #[must_use]
 pub fn at_most(number: f64, decimals: u8) -> String {
     let places = usize::from(decimals);
@@ -38,45 +38,48 @@ pub fn at_most(number: f64, decimals: u8) -> String {
     }
 }
 
-/// A limit with at least three decimals, and as many as it has: rounded it would be another one.
+/// Formats a limit exactly, with three decimals or more: rounding would show another limit.
 #[must_use]
 pub fn exact(limit: f64) -> String {
     let is_limit = |shown: &String| shown.parse() == Ok(limit);
     (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
 }
 
-/// Formats `number` \[m\], which is below `limit_m` \[m\], rounded down as [`at_least`] does, with at least three decimals and
-/// as many as it takes to differ from the limit; `just below ...` within 1e-9 of it.
+/// Formats `number` \[m\], which is below `limit_m` \[m\], so that the text differs from the limit.
+///
+/// Rounds down as [`at_least`] does, with three decimals or more. Returns `just below ...` within a relative 1e-9 of
+/// the limit.
 #[must_use]
 pub fn metres_below(number: f64, limit_m: f64) -> String {
     const JUST: f64 = 1e-9;
     if number >= limit_m * (1.0 - JUST) {
         return format!("just below {}", exact(limit_m));
     }
-    let is_told = |&decimals: &u8| {
+    let is_distinct = |&decimals: &u8| {
         let shown = fixed(number, usize::from(decimals));
         shown != fixed(limit_m, usize::from(decimals)) && (number == 0.0 || shown.parse() != Ok(0.0))
     };
-    (3..=17).find(is_told).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
+    (3..=17).find(is_distinct).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
 }
 
-/// A length \[m\] (or speed, or acceleration) with three decimals, or in powers of ten where that would show zero or fill a line.
+/// Formats a length \[m\], speed or acceleration with three decimals, or in powers of ten below 5e-3 and from 1e7 on.
 #[must_use]
 pub fn metres(number: f64) -> String {
     if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { fixed(number, 3) } else { format!("{number:.1e}") }
 }
 
-/// Replaces the control characters that reverse the direction of text by U+FFFD; names in foreign files may hold some.
+/// Replaces the control characters that reverse the direction of text by U+FFFD. Names in foreign files may contain
+/// them.
 #[must_use]
 pub fn in_order(words: &str) -> String {
-    const TURNS: [char; 12] = [
+    const BIDI_CONTROLS: [char; 12] = [
         '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
         '\u{2067}', '\u{2068}', '\u{2069}',
     ];
-    words.replace(TURNS, "\u{fffd}")
+    words.replace(BIDI_CONTROLS, "\u{fffd}")
 }
 
-/// A time with its unit.
+/// Formats a time with its unit.
 #[must_use]
 pub fn seconds(time_s: f64) -> String {
     format!("{} s", fixed(time_s, 2))
@@ -91,10 +94,10 @@ pub fn significant(number: f64, digits: u8) -> String {
     format!("{number:.decimals$}")
 }
 
-/// Rows of cells as columns.
+/// Formats rows of cells as aligned columns.
 ///
 /// # Panics
-/// Where a row has fewer cells than the first.
+/// If a row has fewer cells than the first.
 pub fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let widths: Vec<_> = (0..columns).map(|k| rows.iter().map(|row| row[k].len()).max().unwrap_or(0)).collect();
@@ -111,17 +114,17 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
     text
 }
 
-/// Number of decimals, at most `most`, that the multiples of `step` need; a step is 1, 2 or 5 times a power of ten.
+/// Returns the number of decimals, at most `most`, of the multiples of `step`, which is 1, 2 or 5 times a power of ten.
 #[must_use]
 pub fn decimals_of(step: f64, most: u8) -> usize {
-    /// Rounding must not take a step for the next smaller power.
+    /// Keeps the rounding error of the logarithm from lowering the power of ten.
     const ROUNDING: f64 = 1.000_001;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and most")]
     let decimals = (-(step * ROUNDING).log10().floor()).clamp(0.0, f64::from(most)) as usize;
     decimals
 }
 
-/// A rounding or truncation error beside what is allowed, as `below 1e-9`: its exact size differs between machines.
+/// Formats a rounding or truncation error as `below 1e-9` if it is allowed: its exact value differs between machines.
 #[must_use]
 pub fn bound(error: f64, allowed: f64) -> String {
     if error.abs() <= allowed {
@@ -131,7 +134,7 @@ pub fn bound(error: f64, allowed: f64) -> String {
     }
 }
 
-/// Names and what is said of each, a line each, as a table.
+/// Formats names and their descriptions as a table, one name per line.
 pub fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) -> String {
     let mut text = String::new();
     for (name, content) in rows {
@@ -141,7 +144,7 @@ pub fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) 
     text
 }
 
-/// A number as a whole one where it is, which keys of either kind take.
+/// Formats a number as TOML, integral values without a decimal point: both integer and float keys accept them.
 #[must_use]
 pub fn as_toml(value: f64) -> String {
     const WHOLE: f64 = 1e15;
@@ -159,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_length_is_never_shown_longer_than_it_is_and_less_than_a_digit_shorter() {
+    fn at_least_rounds_down_by_less_than_one_digit() {
         let lengths_m =
             [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.2 - 4.0 * f64::EPSILON, 0.0, -0.5, 123_456.789_9];
         for (decimals, digit) in [(3, 1e-3), (6, 1e-6)] {
@@ -175,13 +178,13 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_is_never_shown_smaller_than_it_is_and_a_length_below_a_limit_never_as_the_limit() {
+    fn at_most_rounds_up_and_metres_below_differs_from_the_limit() {
         for length_m in [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.0, -0.5, 123_456.789_9] {
             let shown: f64 = at_most(length_m, 6).parse().expect("a number");
             assert!(shown >= length_m && shown - length_m < 1e-6 * (1.0 + 1e-9), "{length_m:?}: {shown}");
         }
         assert_eq!(at_most(f64::INFINITY, 6), "inf");
-        for (number, limit_m, said) in [
+        for (number, limit_m, expected) in [
             (1.5, 2.0, "1.500"),
             (1.999_96, 2.0, "1.99996"),
             (1.999_999_9, 2.0, "1.9999999"),
@@ -189,12 +192,12 @@ mod tests {
             (0.3_f64.next_down(), 0.3, "just below 0.300"),
             (6e-13, 1e-12, "0.0000000000006"),
         ] {
-            assert_eq!(metres_below(number, limit_m), said);
+            assert_eq!(metres_below(number, limit_m), expected);
         }
     }
 
     #[test]
-    fn an_error_is_said_to_be_below_what_is_allowed_only_where_it_is() {
+    fn bound_is_met_only_up_to_the_allowed_error() {
         assert_eq!(bound(0.0, 1e-12), "below 1e-12");
         assert_eq!(bound(-1e-12, 1e-12), "below 1e-12");
         assert_eq!(bound(2e-12, 1e-12), "2.0e-12, which is not below 1e-12");
@@ -202,13 +205,13 @@ mod tests {
     }
 
     #[test]
-    fn significant_digits_are_counted_from_the_first_that_is_not_zero() {
+    fn significant_digits_count_from_the_first_nonzero_digit() {
         assert_eq!([0.0, 0.3, 1.5, 123.456].map(|number| significant(number, 3)), ["0.00", "0.300", "1.50", "123"]);
         assert_eq!(significant(1_234_567.8, 6), "1234568");
     }
 
     #[test]
-    fn multiples_of_a_step_have_the_decimals_of_the_step() {
+    fn decimals_of_a_step_cover_its_multiples() {
         assert_eq!([20.0, 1.0, 0.5, 0.1, 0.05, 1e-7].map(|step| decimals_of(step, 4)), [0, 0, 1, 1, 2, 4]);
     }
 }

@@ -1,13 +1,13 @@
-//! Reads recordings of any origin as tracks, writes and reads `run.mcap`, and exports to other formats.
+//! Reads recordings of many formats as tracks, writes and reads `run.mcap`, and exports recordings.
 //!
 //! | module | holds |
 //! | --- | --- |
-//! | [`read`] | recordings of any origin as tracks, one file per format or family of formats |
-//! | [`mcap`] | `run.mcap`, written as a flight goes and read back |
-//! | [`export`] | recordings written in other formats, one file per format |
+//! | [`read`] | readers: one file per format or family of formats |
+//! | [`mcap`] | `run.mcap`, written during a flight and read back |
+//! | [`export`] | writers of other formats, one file per format |
 //!
-//! Memory grows with the bytes read, not with lengths that a file claims. Ambiguous input is an error that names the option
-//! to set.
+//! Memory grows with the bytes read, not with the lengths in file headers. Ambiguous input is an error that names the
+//! option to set.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 

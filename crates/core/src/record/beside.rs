@@ -1,41 +1,42 @@
-//! A recorder in a thread of its own.
+//! Runs a recorder in its own thread.
 
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread;
 
 use super::{Event, OwnedSample, RecordError, Sample, Sink};
 
-/// Samples and events that wait for the recorder, at most: beyond, the flight waits.
-const WAITING: usize = 2;
+/// Capacity of the queue to the recorder thread. The flight waits while the queue is full.
+const CAPACITY: usize = 2;
 
-/// What is handed over.
-enum Said {
+/// Item of the queue to the recorder thread.
+enum Queued {
     Sample(Box<OwnedSample>),
     Event(Event),
 }
 
-/// Hands over copies of what it is given.
-struct Beside {
-    to_recorder: SyncSender<Said>,
-    /// Samples that have been recorded, to be written over.
+/// Sink that sends copies to the recorder thread.
+struct QueueSink {
+    queue: SyncSender<Queued>,
+    /// Recorded samples, whose memory is reused.
     recorded: Receiver<Box<OwnedSample>>,
 }
 
-/// Runs `fly` with a sink that records in a thread beside it, in the same order and with the same bits. Ends of steps that are
-/// not recorded are not looked at: a recorder whose [`Sink::step`] does something is to be called in the flight's own thread.
-/// Memory is taken for three samples, once.
+/// Runs `fly` with a sink that records in a parallel thread, in the same order and with the same bits.
+///
+/// Steps that are not recorded are not passed on: call a recorder that implements [`Sink::step`] in the thread of the
+/// flight. Allocates three samples once.
 ///
 /// # Errors
-/// The first error of the recorder, which the flight meets at something that it hands over later, or at its end.
+/// The first error of the recorder. The flight receives it with a later sample or event, or at its end.
 pub fn record_beside<T, E: From<RecordError>>(
     sink: &mut (dyn Sink + Send),
     fly: impl FnOnce(&mut dyn Sink) -> Result<T, E>,
 ) -> Result<T, E> {
-    let (to_recorder, said) = sync_channel(WAITING);
+    let (queue, queued) = sync_channel(CAPACITY);
     let (back, recorded) = channel();
     thread::scope(|scope| {
-        let recorder = scope.spawn(move || record(sink, &said, &back));
-        let flown = fly(&mut Beside { to_recorder, recorded });
+        let recorder = scope.spawn(move || record(sink, &queued, &back));
+        let flown = fly(&mut QueueSink { queue, recorded });
         match recorder.join() {
             Ok(written) => written.map_err(E::from).and(flown),
             Err(panic) => std::panic::resume_unwind(panic),
@@ -43,14 +44,14 @@ pub fn record_beside<T, E: From<RecordError>>(
     })
 }
 
-/// Records until nobody says anything more, or something cannot be kept.
-fn record(sink: &mut dyn Sink, said: &Receiver<Said>, back: &Sender<Box<OwnedSample>>) -> Result<(), RecordError> {
-    for said in said {
-        match said {
-            Said::Event(event) => sink.event(&event)?,
-            Said::Sample(sample) => {
+/// Records until the queue is closed or the sink fails.
+fn record(sink: &mut dyn Sink, queued: &Receiver<Queued>, back: &Sender<Box<OwnedSample>>) -> Result<(), RecordError> {
+    for item in queued {
+        match item {
+            Queued::Event(event) => sink.event(&event)?,
+            Queued::Sample(sample) => {
                 sink.sample(&sample.as_sample())?;
-                // A flight that is over wants no more samples.
+                // The receiver is gone after the end of the flight.
                 let _ = back.send(sample);
             }
         }
@@ -58,18 +59,18 @@ fn record(sink: &mut dyn Sink, said: &Receiver<Said>, back: &Sender<Box<OwnedSam
     Ok(())
 }
 
-impl Beside {
-    fn say(&self, said: Said) -> Result<(), RecordError> {
-        // The recorder tells its own error when it is waited for.
+impl QueueSink {
+    fn send(&self, item: Queued) -> Result<(), RecordError> {
+        // `record_beside` returns the recorder's own error after joining its thread.
         let gone = |_| RecordError::Write {
             path: "the recording".to_owned(),
             source: std::io::Error::other("writing failed before"),
         };
-        self.to_recorder.send(said).map_err(gone)
+        self.queue.send(item).map_err(gone)
     }
 }
 
-impl Sink for Beside {
+impl Sink for QueueSink {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         let copy = match self.recorded.try_recv() {
             Ok(mut used) => {
@@ -78,11 +79,11 @@ impl Sink for Beside {
             }
             Err(_) => Box::new(OwnedSample::from(sample)),
         };
-        self.say(Said::Sample(copy))
+        self.send(Queued::Sample(copy))
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.say(Said::Event(event.clone()))
+        self.send(Queued::Event(event.clone()))
     }
 }
 
@@ -92,7 +93,7 @@ mod tests {
     use crate::record::Peaks;
     use crate::swarm::{Rows, Swarm};
 
-    /// Keeps times, and cannot keep the one that it is given.
+    /// Sink that collects times; fails at the time in its second field.
     #[derive(Default)]
     struct Times(Vec<f64>, Option<f64>);
 
@@ -118,8 +119,9 @@ mod tests {
         }
     }
 
-    /// Samples at whole seconds, of more vehicles from second to second, each followed by an event half a second later.
-    fn told(sink: &mut dyn Sink) -> Result<usize, RecordError> {
+    /// Sends samples at whole seconds, with a growing number of vehicles, each followed by an event half a second
+    /// later.
+    fn fly(sink: &mut dyn Sink) -> Result<usize, RecordError> {
         for k in 0..20_u32 {
             let (time_s, count) = (f64::from(k), 2 + k as usize / 8);
             let swarm = Swarm::at_rest(Rows::from_element(count, time_s));
@@ -132,17 +134,17 @@ mod tests {
     }
 
     #[test]
-    fn everything_arrives_in_its_order() {
+    fn order_is_preserved() {
         let mut times = Times::default();
-        assert_eq!(record_beside(&mut times, told).expect("recorded"), 20);
+        assert_eq!(record_beside(&mut times, fly).expect("recorded"), 20);
         assert_eq!(times.0, (0..40).map(|k| 0.5 * f64::from(k)).collect::<Vec<_>>());
     }
 
     #[test]
-    fn an_error_of_the_recorder_ends_the_flight_and_is_told_even_at_its_very_end() {
+    fn recorder_error_ends_the_flight() {
         for failing_s in [0.0, 7.5, 19.5] {
             let mut times = Times(Vec::new(), Some(failing_s));
-            let error = record_beside(&mut times, told).expect_err("a full disk");
+            let error = record_beside(&mut times, fly).expect_err("a full disk");
             assert_eq!(error.to_string(), "cannot write run.mcap: the disk is full");
             assert_eq!(times.0.last().map_or(0.0, |last| last + 0.5), failing_s);
         }

@@ -1,6 +1,6 @@
-//! Why a recording could not be kept or read.
+//! Errors of writing and reading recordings.
 
-/// Why a sample could not be kept, or a recording not be read.
+/// Error of writing a sample or reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file could not be written.
@@ -8,34 +8,34 @@ pub enum RecordError {
     Write {
         /// The file.
         path: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The system could not read the file.
+    /// The operating system could not read the file.
     #[error("cannot read {path}: {source}")]
     Open {
         /// The file.
         path: String,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file was read, and its content is not a recording or is damaged.
+    /// The content of the file is damaged or is not a recording.
     #[error("{path} is not a recording that can be read: {fault}")]
     Read {
         /// The file.
         path: String,
-        /// What is wrong with it.
+        /// Problem of the content.
         fault: ReadFault,
     },
 }
 
-/// What is wrong with the content of a recording.
+/// Problem of the content of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ReadFault {
     /// The file has no bytes.
     #[error("the file is empty")]
     Empty,
-    /// The file does not begin as MCAP files do.
+    /// The file does not begin with the magic bytes of MCAP.
     #[error("it is not an MCAP file")]
     NotMcap,
     /// A channel that every recording has is missing.
@@ -44,7 +44,7 @@ pub enum ReadFault {
         /// The channel's topic.
         topic: &'static str,
     },
-    /// A channel has the expected topic and another message definition or encoding.
+    /// A channel has the expected topic but another message definition or encoding.
     #[error("its {topic} channel holds {found} instead of {expected} in cdr encoding")]
     ForeignChannel {
         /// The channel's topic.
@@ -54,12 +54,12 @@ pub enum ReadFault {
         /// Schema that was expected.
         expected: &'static str,
     },
-    /// A record is longer than any recording needs.
+    /// A record is longer than the limit.
     #[error("the record at byte {offset} claims {bytes} bytes, more than the limit of {limit}")]
     TooLong {
-        /// Where in the file.
+        /// Position in the file \[bytes\].
         offset: u64,
-        /// The length that it claims \[bytes\].
+        /// Length in the record's header \[bytes\].
         bytes: u64,
         /// The limit \[bytes\].
         limit: u64,
@@ -67,17 +67,17 @@ pub enum ReadFault {
     /// A record contradicts its checksum or the format.
     #[error("the record at byte {offset} is damaged: {reason}")]
     Damaged {
-        /// Where in the file.
+        /// Position in the file \[bytes\].
         offset: u64,
-        /// What is wrong with it.
+        /// Problem of the record.
         reason: String,
     },
-    /// A message does not hold what its channel promises.
+    /// A message does not match the definition of its channel.
     #[error("a {topic} message is wrong: {reason}")]
     Message {
         /// The channel's topic.
         topic: String,
-        /// What is wrong with it.
+        /// Problem of the message.
         reason: String,
     },
 }

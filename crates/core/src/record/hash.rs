@@ -1,4 +1,4 @@
-//! Hashes: of a text, and of every recorded state.
+//! SHA-256 of texts, messages and recorded states.
 
 use std::fmt::Write as _;
 
@@ -19,13 +19,13 @@ pub struct StateHash {
 }
 
 impl StateHash {
-    /// The hash of no samples yet.
+    /// Returns a hash of no samples.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes one sample. Allocates at the first one only.
+    /// Adds one sample. Allocates only for the first one.
     pub fn observe(&mut self, sample: &Sample<'_>) {
         self.bytes.clear();
         self.bytes.extend_from_slice(&sample.time_s.to_le_bytes());
@@ -35,7 +35,7 @@ impl StateHash {
         self.hasher.update(&self.bytes);
     }
 
-    /// The hash as 64 lower-case hexadecimal digits.
+    /// Returns the hash as 64 lower-case hexadecimal digits.
     #[must_use]
     pub fn finish(self) -> String {
         hex(&self.hasher.finalize())
@@ -77,14 +77,14 @@ impl MessageHash {
         self.0.update(message);
     }
 
-    /// The hash as 64 lower-case hexadecimal digits.
+    /// Returns the hash as 64 lower-case hexadecimal digits.
     #[must_use]
     pub fn digits(&self) -> String {
         hex(&self.0.clone().finalize())
     }
 }
 
-/// SHA-256 of a text as 64 lower-case hexadecimal digits.
+/// Returns the SHA-256 of a text as 64 lower-case hexadecimal digits.
 #[must_use]
 pub fn sha256_hex(text: &str) -> String {
     hex(&Sha256::digest(text.as_bytes()))

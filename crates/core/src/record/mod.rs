@@ -1,7 +1,7 @@
-//! Samples of a run, and the traits that receive them.
+//! Samples and events of a run, and the trait of their receivers.
 //!
-//! A recorder knows the state of a swarm and nothing of laws, plants or judges.
-//! Several recorders of one run are joined as a pair: `(first, (second, third))` is a recorder again.
+//! A [`Sink`] receives the states of a swarm and depends on no law, plant or judge. A pair of sinks is a sink: `(first,
+//! (second, third))`.
 
 mod beside;
 mod error;
@@ -17,22 +17,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
-/// Numbers of every vehicle beside its position and velocity at one instant, such as its attitude or the wind.
+/// Additional numbers of every vehicle at one instant, such as its attitude or the wind.
 ///
-/// Its source makes it once, writes new values into it before each sample, and names it nowhere else: what receives
-/// samples takes every channel alike.
+/// Its source creates a channel once and writes new values into it before each sample. Recorders treat all channels
+/// alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// What it is called; one word of the letters that topics are made of.
+    /// Name, used in topic names.
     pub name: Arc<str>,
-    /// What each column holds, with its unit, such as `wind_x_m_s`.
+    /// Names of the columns with their units, such as `wind_x_m_s`.
     pub columns: Arc<[String]>,
-    /// A row for each vehicle, one after the other, with a number for each column.
+    /// Values, row by row: one row per vehicle, one number per column.
     pub values: Vec<f64>,
 }
 
 impl Channel {
-    /// A channel without values yet.
+    /// Returns a channel without values.
     #[must_use]
     pub fn new(name: &str, columns: &[&str]) -> Self {
         Self {
@@ -48,24 +48,24 @@ impl Channel {
 pub struct Sample<'a> {
     /// Time since the start \[s\].
     pub time_s: f64,
-    /// Steps taken so far.
+    /// Number of steps since the start.
     pub step: u64,
     /// Positions \[m\] and velocities \[m/s\].
     pub swarm: &'a Swarm,
-    /// Commanded accelerations u \[m/s^2\], N x 3, at this instant; no rows where the law had no answer.
+    /// Commanded accelerations u \[m/s^2\], N x 3, at this instant; no rows if the law had no solution.
     pub control: &'a Rows,
-    /// Closest approach over the steps since the sample before (at the first sample: of the start itself).
+    /// Closest approach over the steps since the previous sample; at the first sample, of the initial state.
     pub separation: Option<ClosestApproach>,
-    /// The law's energy E \[m^2/s^2\] where it has one.
+    /// Energy E of the law \[m^2/s^2\], if the law defines one.
     pub energy: Option<f64>,
-    /// What was largest over the steps since the sample before, its end included.
+    /// Maxima over the steps since the previous sample, including this instant.
     pub peaks: Peaks,
-    /// What else is known of every vehicle, each under another name.
+    /// Additional numbers of every vehicle, each channel with its own name.
     pub channels: &'a [Channel],
 }
 
 impl<'a> Sample<'a> {
-    /// An instant of which nothing is known but states and commands.
+    /// Returns a sample with states and commands only.
     #[must_use]
     pub fn new(time_s: f64, step: u64, swarm: &'a Swarm, control: &'a Rows) -> Self {
         let peaks = Peaks::default();
@@ -73,18 +73,18 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// The end of one step, recorded or not; at first the start.
+/// End of one step, or the initial state; recorded or not.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {
     /// Time since the start \[s\].
     pub time_s: f64,
     /// Positions \[m\] and velocities \[m/s\].
     pub swarm: &'a Swarm,
-    /// Commanded accelerations u \[m/s^2\], N x 3, from here on; no rows where the law had no answer.
+    /// Commanded accelerations u \[m/s^2\], N x 3, from this instant on; no rows if the law had no solution.
     pub control: &'a Rows,
 }
 
-/// What was largest over some steps; nothing where nothing is known.
+/// Maxima over several steps; `None` for unknown values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peaks {
     /// Largest commanded acceleration of a vehicle, Euclidean norm \[m/s^2\].
@@ -94,7 +94,7 @@ pub struct Peaks {
 }
 
 impl Peaks {
-    /// Takes one more instant.
+    /// Updates the maxima with the values of one instant.
     pub fn take(&mut self, control_m_s2: f64, energy: Option<f64>) {
         let larger = |known: Option<f64>, new: f64| Some(known.map_or(new, |known| known.max(new)));
         self.control_m_s2 = larger(self.control_m_s2, control_m_s2);
@@ -104,29 +104,29 @@ impl Peaks {
     }
 }
 
-/// A [`Sample`] that owns its state, as a recording gives it back.
+/// A [`Sample`] that owns its data, as a recording returns it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OwnedSample {
     /// Time since the start \[s\].
     pub time_s: f64,
-    /// Steps taken so far.
+    /// Number of steps since the start.
     pub step: u64,
     /// Positions \[m\] and velocities \[m/s\].
     pub swarm: Swarm,
-    /// Commanded accelerations u \[m/s^2\], N x 3; no rows where the law had no answer.
+    /// Commanded accelerations u \[m/s^2\], N x 3; no rows if the law had no solution.
     pub control: Rows,
-    /// Closest approach over the steps since the sample before.
+    /// Closest approach over the steps since the previous sample.
     pub separation: Option<ClosestApproach>,
-    /// The law's energy E \[m^2/s^2\] where it has one.
+    /// Energy E of the law \[m^2/s^2\], if the law defines one.
     pub energy: Option<f64>,
-    /// What was largest over the steps since the sample before.
+    /// Maxima over the steps since the previous sample.
     pub peaks: Peaks,
-    /// What else is known of every vehicle.
+    /// Additional numbers of every vehicle.
     pub channels: Vec<Channel>,
 }
 
 impl OwnedSample {
-    /// Becomes a copy of another sample, in the memory that it has.
+    /// Copies `sample` and reuses the memory of this one.
     pub fn copy_from(&mut self, sample: &Sample<'_>) {
         let copy = |to: &mut Rows, from: &Rows| {
             if to.nrows() == from.nrows() {
@@ -144,7 +144,7 @@ impl OwnedSample {
         sample.channels.clone_into(&mut self.channels);
     }
 
-    /// The same sample by reference.
+    /// Returns a borrowed view of this sample.
     #[must_use]
     pub fn as_sample(&self) -> Sample<'_> {
         Sample {
@@ -175,164 +175,165 @@ impl From<&Sample<'_>> for OwnedSample {
     }
 }
 
-/// Something that happened between samples.
+/// Event of a run, between samples.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// A pair came closer than delta.
+    /// The separation of a pair fell below delta.
     ViolationBegan {
         /// The pair.
         pair: Pair,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// A pair that was closer than delta is clear again. One that still is closer at the end of the run has no such event.
+    /// The separation of a pair is at least delta again. A violation that lasts to the end of the run has no such
+    /// event.
     ViolationEnded {
         /// The pair.
         pair: Pair,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Smallest separation within \[m\].
+        /// Smallest separation during the violation \[m\].
         min_m: f64,
     },
-    /// The closest that two came while they were closer than delta. Told before that ends, and at the end of the run where it
-    /// has not.
+    /// Closest approach of a pair during a violation. Precedes the end of the violation, or the end of the run.
     Approach {
         /// The pair.
         pair: Pair,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// How close \[m\].
+        /// Separation \[m\].
         separation_m: f64,
     },
-    /// A vehicle came nearer to an obstacle than its clearance.
+    /// The distance of a vehicle from an obstacle fell below its clearance.
     ObstacleViolationBegan {
         /// The vehicle, from 0.
         vehicle: usize,
         /// The obstacle, from 0.
         obstacle: usize,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// A vehicle that was nearer to an obstacle than its clearance no longer is.
+    /// The distance of a vehicle from an obstacle is at least its clearance again.
     ObstacleViolationEnded {
         /// The vehicle, from 0.
         vehicle: usize,
         /// The obstacle, from 0.
         obstacle: usize,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Smallest distance from its surface within \[m\], below zero within.
+        /// Smallest distance from the surface during the violation \[m\], negative inside the obstacle.
         min_m: f64,
     },
-    /// The closest that a vehicle came to an obstacle: while it was nearer than its clearance, told before that ends, and of those
-    /// with the least room in the whole flight, told at its end.
+    /// Closest approach of a vehicle to an obstacle: during each violation, before its end, and once over the whole
+    /// flight for the smallest margin, at the end of the flight.
     ObstacleApproach {
         /// The vehicle, from 0.
         vehicle: usize,
         /// The obstacle, from 0.
         obstacle: usize,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Distance from its surface \[m\], below zero within.
+        /// Distance from the surface \[m\], negative inside the obstacle.
         distance_m: f64,
     },
-    /// The flight is under another law than the scenario's. Told at its start.
+    /// The flight uses another law than the scenario's. Sent at the start of the flight.
     OtherLaw {
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Name of the law that is flown.
+        /// Name of the law in use.
         name: String,
     },
-    /// A leg of the flight began; the first begins with the flight and is not told.
+    /// A leg of the flight began. The first leg has no event.
     LegBegan {
         /// The leg, from 0.
         leg: usize,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// Slots were spread, since vehicles stood in each other's way; what the law promised is renewed.
+    /// Slots were spread because vehicles blocked each other. The law's certificate is renewed.
     DeadlockRecovery {
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// They are scaled by this about their centre.
+        /// Scale factor of the slots about their centre.
         scale: f64,
     },
-    /// Interchangeable vehicles were given other slots, since they stood in each other's way; what the law promised is renewed.
+    /// Interchangeable vehicles exchanged slots because they blocked each other. The law's certificate is renewed.
     Assigned {
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// From now on vehicle i goes to the slot that was vehicle `slots[i]`'s.
+        /// New slots: vehicle i takes the slot of vehicle `slots[i]`.
         slots: Vec<usize>,
     },
-    /// The engine's own collision detection saw two keep-out balls overlap for the first time.
+    /// The collision detection of the engine found the first overlap of two keep-out balls.
     EngineContact {
         /// The pair.
         pair: Pair,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// The hulls of two vehicles hit.
+    /// The hulls of two vehicles collided.
     HullsHit {
         /// The pair.
         pair: Pair,
-        /// When the step began in which they did \[s\].
+        /// Start of the step of the collision \[s\].
         time_s: f64,
-        /// How fast their centres neared each other before \[m/s\].
+        /// Closing speed of their centres before the collision \[m/s\].
         closing_m_s: f64,
     },
-    /// A step is flown in shorter ones, because it is too long for the law's fastest rate, took more than half of a
-    /// clearance, or bent too far from the straight line that is audited. Told where their length changes.
+    /// A step is divided into substeps. Reasons: the step is too long for the law's fastest rate, used more than half
+    /// of a clearance, or deviated too far from the straight line of the audit. Sent when the length of substeps
+    /// changes.
     StepRefined {
-        /// When the step began \[s\].
+        /// Start of the step \[s\].
         time_s: f64,
-        /// Shortest step used instead \[s\].
+        /// Shortest substep \[s\].
         dt_s: f64,
     },
-    /// The run ended before its time.
+    /// The run ended before its scheduled time.
     EndedEarly {
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Why, in a sentence.
+        /// Reason, in a sentence.
         reason: String,
     },
 }
 
-/// A time at which slots were spread.
+/// Record of a spreading of slots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeadlockRecovery {
-    /// When \[s\].
+    /// Time \[s\].
     pub time_s: f64,
-    /// They were scaled by this about their centre.
+    /// Scale factor of the slots about their centre.
     pub scale: f64,
-    /// No pair comes closer than this in the whole flight, as far as that was certified up to then \[m\].
+    /// Certified lower bound of the separation over the whole flight, as of this time \[m\].
     pub certified_m: Option<f64>,
 }
 
-/// A time at which interchangeable vehicles were given other slots.
+/// Record of an exchange of slots among interchangeable vehicles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reassignment {
-    /// When \[s\].
+    /// Time \[s\].
     pub time_s: f64,
-    /// How many of them.
+    /// Number of vehicles with a new slot.
     pub vehicles: usize,
-    /// No pair comes closer than this in the whole flight, as far as that was certified up to then \[m\].
+    /// Certified lower bound of the separation over the whole flight, as of this time \[m\].
     pub certified_m: Option<f64>,
 }
 
-/// How far a law's energy rose while its target stayed as it was.
+/// Rise of a law's energy while its target was constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyRise {
-    /// Energy when the target was last changed, or at the start \[m^2/s^2\].
+    /// Energy at the last change of the target, or at the start \[m^2/s^2\].
     pub from: f64,
-    /// The largest one from then until it changed again \[m^2/s^2\].
+    /// Largest energy before the next change of the target \[m^2/s^2\].
     pub to: f64,
 }
 
 impl EnergyRise {
-    /// Part of the energy that the error of second-order integration at the honest step stays below.
+    /// Relative bound of the energy error of second-order integration at the stable step.
     pub const INTEGRATION: f64 = 1e-3;
 
-    /// What integration does not explain \[m^2/s^2\], negative where it explains all.
+    /// Returns the rise beyond the integration error \[m^2/s^2\]; negative if the error explains all of it.
     #[must_use]
     pub fn unexplained(self) -> f64 {
         self.to - (1.0 + Self::INTEGRATION) * self.from
@@ -340,7 +341,7 @@ impl EnergyRise {
 }
 
 impl Event {
-    /// When it happened \[s\].
+    /// Returns the time of the event \[s\].
     #[must_use]
     pub fn time_s(&self) -> f64 {
         match *self {
@@ -362,30 +363,30 @@ impl Event {
     }
 }
 
-/// Receives a run as it is made.
+/// Receiver of a run's samples, events and steps.
 pub trait Sink {
-    /// Takes one sample.
+    /// Receives one sample.
     ///
     /// # Errors
-    /// [`RecordError`] when it cannot be kept.
+    /// [`RecordError`] if the sample cannot be recorded.
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError>;
 
-    /// Takes one event.
+    /// Receives one event.
     ///
     /// # Errors
-    /// [`RecordError`] when it cannot be kept.
+    /// [`RecordError`] if the event cannot be recorded.
     fn event(&mut self, event: &Event) -> Result<(), RecordError>;
 
-    /// Looks at the end of a step, for what is folded over all of them. One that ends a flight may be told twice.
+    /// Receives the end of a step, recorded or not. The last step of a flight may arrive twice.
     fn step(&mut self, _step: &Step<'_>) {}
 
-    /// Whether it looks at steps. One that says no is not told of them where it records beside the flight ([`record_beside`]).
+    /// Returns whether [`Sink::step`] has an effect. If not, [`record_beside`] may run this sink in another thread.
     fn looks_at_steps(&self) -> bool {
         true
     }
 }
 
-/// Keeps nothing.
+/// Discards everything.
 impl Sink for () {
     fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
         Ok(())
@@ -418,7 +419,7 @@ impl<R: Sink + ?Sized> Sink for &mut R {
     }
 }
 
-/// Gives everything to the first, then to the second; stops at the first error.
+/// Passes everything to the first sink, then to the second; stops at the first error.
 impl<A: Sink, B: Sink> Sink for (A, B) {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         self.0.sample(sample)?;

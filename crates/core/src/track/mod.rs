@@ -1,59 +1,59 @@
-//! Recorded motion as plain data: what a reader gives and the judge takes.
+//! Recorded motion as plain data: output of readers, input of the judge.
 //!
-//! A recording is a stream of [`Item`]s in order of time, whoever wrote it: instants of vehicles, or pieces of their
-//! curves. Nothing here says what happens between two instants; the judge is told that.
+//! A recording is a stream of [`Item`]s in order of time: positions of vehicles at instants, or pieces of their curves.
+//! The motion between two instants is an assumption of the judge and not part of this data.
 
 use nalgebra::Vector3;
 
-/// A vehicle at an instant.
+/// State of a vehicle at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Which vehicle: an index into [`Tracks::vehicles`].
+    /// Index into [`Tracks::vehicles`].
     pub vehicle: usize,
     /// Time since the recording's epoch \[s\].
     pub time_s: f64,
     /// Position \[m\].
     pub position_m: Vector3<f64>,
-    /// Velocity \[m/s\], where the recording has one.
+    /// Velocity \[m/s\], if recorded.
     pub velocity_m_s: Option<Vector3<f64>>,
-    /// Radius of the vehicle \[m\], where the recording has one.
+    /// Radius of the vehicle \[m\], if recorded.
     pub radius_m: Option<f64>,
 }
 
-/// A piece of a vehicle's curve: its position at time t is the sum of `coefficients[k] (t - from_s)^k`.
+/// Piece of a vehicle's curve: the position at time t is the sum of `coefficients[k] (t - from_s)^k`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
-    /// Which vehicle: an index into [`Tracks::vehicles`].
+    /// Index into [`Tracks::vehicles`].
     pub vehicle: usize,
-    /// Where the piece begins \[s\] since the recording's epoch.
+    /// Start of the piece \[s\], since the recording's epoch.
     pub from_s: f64,
-    /// Where it ends \[s\]; after `from_s`.
+    /// End of the piece \[s\]; after `from_s`.
     pub to_s: f64,
-    /// Coefficients \[m/s^k\], the constant one first; at least one.
+    /// Coefficients \[m/s^k\] from degree 0 on; at least one.
     pub coefficients: Vec<Vector3<f64>>,
 }
 
-/// What places on the Earth are measured from, east, north and up.
+/// Origin of local east, north and up coordinates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EarthOrigin {
-    /// Latitude and longitude \[degrees\] and height above the ellipsoid \[m\], between commas.
+    /// Latitude and longitude \[degrees\] and height above the ellipsoid \[m\], separated by commas.
     pub place: String,
-    /// Whether it is the first place of the recording, because the user names none: only differences of positions can be judged
-    /// then, and not heights or places.
+    /// Whether the origin is the first place of the recording because the user gave none. Then only differences of
+    /// positions can be judged, not heights or places.
     pub is_inferred: bool,
 }
 
-/// What a recording says next.
+/// Element of a recording's stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
-    /// A vehicle was seen.
+    /// Position of a vehicle at one instant.
     Sample(Sample),
-    /// A vehicle flies a known curve.
+    /// Curve of a vehicle over a time interval.
     Piece(Piece),
 }
 
 impl Item {
-    /// When the item begins \[s\].
+    /// Returns the start of the item \[s\].
     #[must_use]
     pub fn time_s(&self) -> f64 {
         match self {
@@ -62,7 +62,7 @@ impl Item {
         }
     }
 
-    /// Whose it is.
+    /// Returns the index of the vehicle.
     #[must_use]
     pub fn vehicle(&self) -> usize {
         match self {
@@ -72,32 +72,32 @@ impl Item {
     }
 }
 
-/// How a recording counts time.
+/// Time scale of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
-    /// The unit that the recording writes: `s`, `ms`, `us` or `ns`; `given` where the user says how long one lasts.
+    /// Unit of the recorded times: `s`, `ms`, `us` or `ns`; `given` if the user gives its length.
     pub unit: &'static str,
-    /// Whether the unit was inferred from the numbers and not given by the format or by the user.
+    /// Whether the unit was inferred from the values, as neither the format nor the user gives it.
     pub inferred: bool,
-    /// Whether another unit fits as well. The unit was then inferred from whole numbers, or from steps of two units or more.
-    /// The numbers are not of the size of times since 1970. Questions in seconds should not rest on that unit.
+    /// Whether another unit fits as well. Then the unit was inferred from integral values, or from steps of two units
+    /// or more, and no time is as large as a time since 1970. Limits in seconds must not rest on such a unit.
     pub by_steps: bool,
-    /// What was taken from every time so that no digit of a clock in nanoseconds is lost \[ns\].
+    /// Offset that was subtracted from every time \[ns\], so that times in nanoseconds lose no digit.
     pub epoch_ns: i64,
 }
 
 /// Properties of a recording as a whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Metadata {
-    /// How time is counted.
+    /// Time scale.
     pub clock: Clock,
-    /// Notes for the user about how the recording was read, a sentence each: rows were sorted, the unit of time was inferred.
+    /// Notes for the user on how the recording was read, one sentence each, such as: rows were sorted.
     pub notes: Vec<String>,
-    /// Assumption that the positions at the times of items rest on, in words that follow "if"; none if the recording holds
-    /// these positions. A recording with an assumption proves nothing.
+    /// Assumption behind the positions, as a phrase after "if"; `None` if the recording holds all positions of its
+    /// items. A recording with an assumption proves nothing.
     pub assumed: Option<String>,
-    /// Whether the height of some vehicle is unknown. Then z is 0 in every item and has no meaning: only distances in the
-    /// plane of x and y can be judged.
+    /// Whether the height of a vehicle is unknown. Then z is 0 in every item, and only distances in the plane of x and
+    /// y can be judged.
     pub is_planar: bool,
     /// Whether the recording gives the directions of its axes. The axes are then east, north and up.
     pub has_directions: bool,
@@ -113,22 +113,22 @@ impl Metadata {
     }
 }
 
-/// A recording being read.
+/// Recording being read.
 ///
-/// Items come in order of time ([`Item::time_s`]), and those of one vehicle at strictly increasing times; pieces of one
-/// vehicle do not overlap. A reader whose source is in another order sorts it and says so in its notes.
+/// Items come in order of time ([`Item::time_s`]). The items of one vehicle have strictly increasing times, and its
+/// pieces do not overlap. A reader sorts a source in another order and adds a note.
 pub trait Tracks {
-    /// Why reading failed: names file, place, value and remedy.
+    /// Error type: names file, place, value and remedy.
     type Error;
 
-    /// Names of the vehicles known so far, in order of first appearance (numbers in order of value where all are
-    /// numbers). It may grow as the recording is read; an index keeps its meaning.
+    /// Returns the names of the vehicles known so far, in order of first appearance, or in numeric order if all are
+    /// numbers. The list may grow as the recording is read; an index keeps its meaning.
     fn vehicles(&self) -> &[String];
 
-    /// Appends the next items to `items`, some ten thousand at a time; `false` when there was none to append.
+    /// Appends the next items to `items`, some ten thousand at a time; returns `false` at the end of the recording.
     ///
     /// # Errors
-    /// When the recording cannot be read further; what was appended before stays true.
+    /// If the recording cannot be read further; items appended before the error remain valid.
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, Self::Error>;
 
     /// Properties of the recording as a whole. Notes may grow as the recording is read.

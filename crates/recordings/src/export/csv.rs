@@ -1,26 +1,26 @@
-//! A long table in text: `t_s,id,x,y,z`, and where they are known `vx,vy,vz` and `radius`.
+//! Writes a long table in CSV: `t_s,id,x,y,z`, and if known `vx,vy,vz` and `radius`.
 //!
-//! Numbers are written with as few digits as give the same bits again.
+//! Each number has the fewest digits that give the same bits when read back.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 
 use super::ExportError;
-use super::source::{About, Column, Source};
+use super::source::{Column, ExportInfo, Source};
 
-/// From here on a reader counts times from an epoch again \[s\].
+/// Smallest epoch that a reader restores from absolute times \[s\].
 const EPOCH_FROM_S: i64 = 1_000_000;
 
-pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<Option<String>, ExportError> {
-    let names = about.names.iter().map(|name| quoted(name)).collect::<Result<Vec<_>, _>>()?;
-    let (epoch_s, rest_ns) = (about.clock.epoch_ns / 1_000_000_000, about.clock.epoch_ns % 1_000_000_000);
+pub(super) fn write(source: &Source<'_>, info: &ExportInfo, file: &mut File) -> Result<Option<String>, ExportError> {
+    let names = info.names.iter().map(|name| quoted(name)).collect::<Result<Vec<_>, _>>()?;
+    let (epoch_s, rest_ns) = (info.clock.epoch_ns / 1_000_000_000, info.clock.epoch_ns % 1_000_000_000);
     let absolute = epoch_s >= EPOCH_FROM_S && rest_ns == 0;
     let epoch_s = if absolute { epoch_s } else { 0 };
     let mut out = BufWriter::new(file);
-    let columns: Vec<&Column> = about.position_columns().iter().chain(about.optional_columns()).collect();
+    let columns: Vec<&Column> = info.position_columns().iter().chain(info.optional_columns()).collect();
     out.write_all(b"t_s,id")?;
     columns.iter().try_for_each(|column| write!(out, ",{}", column.name))?;
-    for column in about.beside.columns() {
+    for column in info.extra.columns() {
         write!(out, ",{}", quoted(&column)?)?;
     }
     let mut cells = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
                 }
             }
             cells.clear();
-            about.beside.cells(channels, row, &mut cells);
+            info.extra.cells(channels, row, &mut cells);
             for cell in &cells {
                 if cell.is_finite() { write!(out, ",{cell:?}") } else { out.write_all(b",") }?;
             }
@@ -45,11 +45,12 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
         Ok(())
     })?;
     out.flush()?;
-    let lost = about.clock.epoch_ns != 0 && !absolute;
-    Ok(lost.then(|| format!("times count from {} ns, which the table does not say", about.clock.epoch_ns)))
+    let lost = info.clock.epoch_ns != 0 && !absolute;
+    Ok(lost.then(|| format!("the table does not contain its epoch: times count from {} ns", info.clock.epoch_ns)))
 }
 
-/// A time from an epoch on in decimal digits: whole seconds are added exactly. An epoch lies after 1970.
+/// Formats an absolute time in decimal digits; the whole seconds are added exactly. The epoch is after 1970, or 0 for
+/// none.
 fn time_text(epoch_s: i64, time_s: f64) -> String {
     if epoch_s == 0 {
         return format!("{time_s:?}");
@@ -60,8 +61,8 @@ fn time_text(epoch_s: i64, time_s: f64) -> String {
     let (whole, fraction) = if time_s >= 0.0 {
         (whole.and_then(|whole| epoch_s.checked_add(whole)), fraction.to_owned())
     } else {
-        let (lent_s, rest) = short_of_a_second(fraction);
-        (whole.and_then(|whole| epoch_s.checked_sub(whole + lent_s)), rest)
+        let (borrowed_s, rest) = complement_of_fraction(fraction);
+        (whole.and_then(|whole| epoch_s.checked_sub(whole + borrowed_s)), rest)
     };
     match whole {
         Some(whole @ 0..) => format!("{whole}.{fraction}"),
@@ -69,15 +70,15 @@ fn time_text(epoch_s: i64, time_s: f64) -> String {
     }
 }
 
-/// What is left of a second without these decimals: 1, and the ten's complement of the digits; 0 where there are none.
-fn short_of_a_second(decimals: &str) -> (i64, String) {
+/// Returns `1 - 0.decimals` as a borrowed second and the ten's complement of the digits; 0 and "0" if all digits are 0.
+fn complement_of_fraction(decimals: &str) -> (i64, String) {
     let digits = decimals.trim_end_matches('0').as_bytes();
     let Some((last, leading)) = digits.split_last() else { return (0, "0".to_owned()) };
     let nines = leading.iter().map(|digit| char::from(b'0' + b'9' - digit));
     (1, nines.chain([char::from(b'0' + (b'0' + 10 - last))]).collect())
 }
 
-/// A name as a field of a line.
+/// Quotes a name as a CSV field if needed.
 fn quoted(name: &str) -> Result<String, ExportError> {
     if name.is_empty() || name.trim() != name || name.contains(['\n', '\r']) {
         return Err(ExportError::Name(name.to_owned()));

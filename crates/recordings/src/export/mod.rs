@@ -1,9 +1,9 @@
-//! Recordings written in other formats, without losing a bit.
+//! Lossless export of recordings to other formats.
 //!
-//! What is read back from an exported file has the same times, vehicles, positions, velocities and radii, bit for bit;
-//! only a table in text cannot say what its times count from, and holds the same instants since 1970. A recording is
-//! read several times, so that memory is bounded by an instant and a block, not by the recording. Curves cannot be
-//! written as samples silently: [`ExportOptions::sample_hz`] says how often they are sampled.
+//! An exported file has the same times, vehicles, positions, velocities and radii as its source, bit for bit. One
+//! exception: CSV has no field for the epoch and holds absolute times since 1970 instead. A recording is read several
+//! times, so that memory is bounded by one instant and one block. Curves are sampled only at a rate that the user sets:
+//! [`ExportOptions::sample_hz`].
 
 mod csv;
 mod mcap;
@@ -19,31 +19,32 @@ use std::io;
 use crate::read::{Channels, ReadError, Recording};
 use source::Source;
 
-/// The formats that are written; files of each have its name as their extension.
+/// Formats that can be written; the extension of a file is the name of its format.
 pub const WRITTEN: &[Format] = &[Format::CSV, Format::PARQUET, Format::NPZ, Format::MCAP];
 
-/// How a recording is written.
+/// Options of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExportOptions {
-    /// How often curves are sampled \[Hz\], from the beginning of the recording on.
+    /// Sampling rate of curves \[Hz\], from the start of the recording on.
     pub sample_hz: Option<f64>,
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exported {
     /// Number of vehicles.
     pub vehicles: usize,
-    /// Number of samples: a vehicle at an instant each.
+    /// Number of samples; a sample is one vehicle at one instant.
     pub samples: u64,
-    /// What a person should know, a sentence each.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Writes a recording into an empty file. `open` opens the recording, each time from its beginning.
+/// Writes a recording into an empty file. `open` opens the recording from its start on each call.
 ///
 /// # Errors
-/// [`ExportError`] when the recording cannot be read, the file cannot be written, or one does not fit the other.
+/// [`ExportError`] if the recording cannot be read, the file cannot be written, or the format cannot hold the
+/// recording.
 pub fn export(
     open: &dyn Fn() -> Result<Recording, ReadError>,
     format: Format,
@@ -53,13 +54,14 @@ pub fn export(
     export_with(open, &|| Ok(None), format, options, file)
 }
 
-/// Writes a recording and its channels: what it says of every vehicle beside its motion. `channels` opens them, each time
-/// from the beginning.
+/// Writes a recording and its channels, the additional numbers of every vehicle. `channels` opens them from the start
+/// on each call.
 ///
-/// Tables have a column for each of theirs, NPZ an array for each channel, MCAP a topic. Readers of motion pass them over.
+/// A channel becomes columns of a table, an array of an NPZ archive or a topic of an MCAP file. Readers of motion
+/// ignore it.
 ///
 /// # Errors
-/// Those of [`export`].
+/// As [`export`].
 pub fn export_with(
     open: &dyn Fn() -> Result<Recording, ReadError>,
     channels: &dyn Fn() -> Result<Option<Channels>, ReadError>,
@@ -68,23 +70,23 @@ pub fn export_with(
     file: &mut File,
 ) -> Result<Exported, ExportError> {
     let source = Source { open, channels, sample_hz: options.sample_hz };
-    let about = source.survey()?;
-    let mut exported = Exported { vehicles: about.names.len(), samples: about.samples, notes: about.notes.clone() };
+    let info = source.survey()?;
+    let mut exported = Exported { vehicles: info.names.len(), samples: info.samples, notes: info.notes.clone() };
     if format == Format::CSV {
-        exported.notes.extend(csv::write(&source, &about, file)?);
+        exported.notes.extend(csv::write(&source, &info, file)?);
     } else if format == Format::PARQUET {
-        parquet::write(&source, &about, file)?;
+        parquet::write(&source, &info, file)?;
     } else if format == Format::NPZ {
-        npz::write(&source, &about, file)?;
+        npz::write(&source, &info, file)?;
     } else if format == Format::MCAP {
-        mcap::write(&source, &about, file)?;
+        mcap::write(&source, &info, file)?;
     } else {
         return Err(ExportError::NotWritten(format));
     }
     Ok(exported)
 }
 
-/// A recording cannot be exported.
+/// Error of an export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The recording cannot be read.
@@ -93,25 +95,25 @@ pub enum ExportError {
     /// The file cannot be written.
     #[error("cannot write the exported file: {0}")]
     Write(#[from] io::Error),
-    /// The recording holds curves, and no sampling rate is given.
-    #[error("the recording holds curves, and the file would hold samples")]
+    /// The recording holds curves, and no sampling rate was given.
+    #[error("the recording holds curves, but the file can hold only samples")]
     Curves,
-    /// The recording holds samples, which are written as they are.
-    #[error("the recording holds samples, which are written as they are and not sampled again")]
+    /// A sampling rate was given for a recording without curves.
+    #[error("the recording holds samples, which cannot be resampled")]
     NoCurves,
-    /// The curves cannot be sampled so often.
+    /// The sampling rate is invalid or gives too many samples.
     #[error("curves cannot be sampled at {0} Hz")]
     SampleRate(f64),
-    /// Nothing writes the format.
-    #[error("nothing writes {}", .0.title)]
+    /// The format cannot be written.
+    #[error("{} cannot be written", .0.title)]
     NotWritten(Format),
-    /// The name of a vehicle cannot be written in the format.
+    /// The name of a vehicle cannot be written in this format.
     #[error("the name {0:?} of a vehicle cannot be written in this format")]
     Name(String),
 }
 
 impl ExportError {
-    /// What helps, as a sentence without a full stop.
+    /// Returns the remedy, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {
         match self {
@@ -120,16 +122,16 @@ impl ExportError {
                 "write it to a file: this format goes back to what it has written"
             }
             Self::Write(_) => "free some space or write to another folder",
-            Self::Curves => "say how often curves are sampled with --sample-hz; between the samples they are lost",
-            Self::NoCurves => "leave --sample-hz away",
-            Self::SampleRate(_) => "give a positive number of samples per second, such that their count stays sensible",
-            Self::NotWritten(_) => "write csv, parquet, npz or mcap",
+            Self::Curves => "set the sampling rate with --sample-hz; the motion between samples is lost",
+            Self::NoCurves => "omit --sample-hz",
+            Self::SampleRate(_) => "give a positive rate that yields at most 1e9 samples",
+            Self::NotWritten(_) => "use csv, parquet, npz or mcap",
             Self::Name(_) => "export to mcap or parquet",
         }
         .to_owned()
     }
 
-    /// The stable name of the problem, such as `export/curves`.
+    /// Returns the stable code of the error, such as `export/curves`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {
@@ -143,7 +145,7 @@ impl ExportError {
         }
     }
 
-    /// Whether the machine failed and not the input.
+    /// Returns whether the operating system failed, not the input.
     #[must_use]
     pub fn is_machine(&self) -> bool {
         match self {

@@ -1,8 +1,10 @@
-//! An archive of `NumPy` arrays: `t`, `positions` (T x N x 3, or x 2 where no height is known), `axes`, and where they are known `velocities`, `radii` (T x N),
-//! `names`, `seen` (T x N) and `epoch_ns`. Each channel is an array of its name (T x N x its columns) beside one of the names
-//! of its columns, such as `attitude` and `attitude_columns`.
+//! Writes an NPZ archive of `NumPy` arrays.
 //!
-//! The recording is read once for each array, so that none of them is in memory.
+//! Arrays: `t`, `positions` (T x N x 3, or T x N x 2 without heights) and `axes`. If known also `velocities`, `radii`
+//! (T x N), `names`, `seen` (T x N) and `epoch_ns`. Each channel is an array with its name (T x N x columns) and an
+//! array of column names, such as `attitude` and `attitude_columns`.
+//!
+//! The recording is read once per array, so that no array is in memory.
 
 use std::fs::File;
 use std::io;
@@ -13,17 +15,17 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::ExportError;
-use super::source::{About, Source, Written};
+use super::source::{ChannelColumns, ExportInfo, Source};
 use tautline_core::track::Sample;
 
-/// Names of arrays that readers of motion use.
-const OWN: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];
+/// Array names with a meaning for readers of motion.
+const RESERVED: [&str; 8] = ["t", "positions", "axes", "velocities", "radii", "seen", "names", "epoch_ns"];
 
-/// Headers of arrays end at a multiple of this \[bytes\].
+/// Alignment of the end of an array header \[bytes\].
 const ALIGNMENT: usize = 64;
 
-pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
-    let (times, vehicles, axes) = (about.instants, about.names.len(), about.axes);
+pub(super) fn write(source: &Source<'_>, info: &ExportInfo, file: &mut File) -> Result<(), ExportError> {
+    let (times, vehicles, axes) = (info.instants, info.names.len(), info.axes);
     let file = FailsOnce { inner: BufWriter::new(file), failed: false };
     let mut archive = Archive { zip: ZipWriter::new(file), source, vehicles };
     archive.array("t", "<f8", &[times], |instant, _, out| {
@@ -33,33 +35,33 @@ pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Resu
     archive.array("positions", "<f8", &[times, vehicles, axes], |_, slots, out| {
         slots.iter().try_for_each(|slot| vector(slot.map(|sample| sample.position_m), axes, out))
     })?;
-    // Where there are as many times as vehicles, the shape would not tell which axis is which.
+    // If T = N, the shape alone does not identify the axes.
     archive.texts("axes", &["time", "vehicle", "xyz"].map(str::to_owned))?;
-    if about.velocities {
+    if info.velocities {
         archive.array("velocities", "<f8", &[times, vehicles, axes], |_, slots, out| {
             slots.iter().try_for_each(|slot| vector(slot.and_then(|sample| sample.velocity_m_s), axes, out))
         })?;
     }
-    if about.radii {
+    if info.radii {
         archive.array("radii", "<f8", &[times, vehicles], |_, slots, out| {
             let radius = |slot: Option<&Sample>| slot.and_then(|sample| sample.radius_m).unwrap_or(f64::NAN);
             slots.iter().try_for_each(|&slot| out.write_all(&radius(slot).to_le_bytes()))
         })?;
     }
-    if about.samples != (times * vehicles) as u64 {
+    if info.samples != (times * vehicles) as u64 {
         archive.array("seen", "|b1", &[times, vehicles], |_, slots, out| {
             slots.iter().try_for_each(|slot| out.write_all(&[u8::from(slot.is_some())]))
         })?;
     }
-    let numbered = about.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
+    let numbered = info.names.iter().enumerate().all(|(index, name)| *name == (index + 1).to_string());
     if !numbered {
-        archive.texts("names", &about.names)?;
+        archive.texts("names", &info.names)?;
     }
-    for channel in &about.beside.channels {
+    for channel in &info.extra.channels {
         archive.channel(channel, times)?;
     }
-    if about.clock.epoch_ns != 0 {
-        archive.begin("epoch_ns", "<i8", &[])?.write_all(&about.clock.epoch_ns.to_le_bytes())?;
+    if info.clock.epoch_ns != 0 {
+        archive.begin("epoch_ns", "<i8", &[])?.write_all(&info.clock.epoch_ns.to_le_bytes())?;
     }
     archive.zip.finish().map_err(io::Error::other)?.flush()?;
     Ok(())
@@ -70,17 +72,18 @@ fn vector(vector: Option<Vector3<f64>>, axes: usize, out: &mut dyn Write) -> io:
     vector.iter().take(axes).try_for_each(|x| out.write_all(&x.to_le_bytes()))
 }
 
-/// A writer that swallows everything after its first failure, which its owner was told: an unfinished archive writes its
-/// end when it is dropped, and would complain where nobody can answer.
+/// Writer that accepts and discards all data after its first error.
+///
+/// An unfinished archive writes its directory when dropped, where a second error could not be reported.
 struct FailsOnce<W> {
     inner: W,
     failed: bool,
 }
 
 impl<W> FailsOnce<W> {
-    fn attempt<T>(&mut self, swallowed: T, action: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
+    fn attempt<T>(&mut self, discarded: T, action: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
         if self.failed {
-            return Ok(swallowed);
+            return Ok(discarded);
         }
         let done = action(&mut self.inner);
         self.failed = done.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
@@ -104,7 +107,7 @@ impl<W: Seek> Seek for FailsOnce<W> {
     }
 }
 
-/// The archive being written.
+/// Writer of the zip container.
 type Zip<'a> = ZipWriter<FailsOnce<BufWriter<&'a mut File>>>;
 
 struct Archive<'a> {
@@ -113,13 +116,13 @@ struct Archive<'a> {
     vehicles: usize,
 }
 
-/// The samples of an instant, in the place of each vehicle.
+/// Sample of each vehicle at one instant, `None` for an absent vehicle.
 type Slots<'a> = [Option<&'a Sample>];
 
 impl<'a> Archive<'a> {
-    /// Begins an array.
+    /// Starts an array and writes its header.
     fn begin(&mut self, name: &str, descr: &str, shape: &[usize]) -> Result<&mut Zip<'a>, ExportError> {
-        // Times of files are the same always, so that the same recording gives the same bytes.
+        // The default options have a fixed time stamp, so that equal recordings give equal bytes.
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
         self.zip.start_file(format!("{name}.npy"), options).map_err(io::Error::other)?;
         let shape: Vec<_> = shape.iter().map(|length| format!("{length},")).collect();
@@ -152,11 +155,14 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 
-    /// Writes a channel; NaN where nothing is known.
-    fn channel(&mut self, channel: &Written, times: usize) -> Result<(), ExportError> {
+    /// Writes a channel, NaN for unknown values, and the names of its columns.
+    fn channel(&mut self, channel: &ChannelColumns, times: usize) -> Result<(), ExportError> {
         let (source, vehicles, width) = (self.source, self.vehicles, channel.columns.len());
-        let name =
-            if OWN.contains(&&*channel.name) { format!("channel_{}", channel.name) } else { channel.name.to_string() };
+        let name = if RESERVED.contains(&&*channel.name) {
+            format!("channel_{}", channel.name)
+        } else {
+            channel.name.to_string()
+        };
         let unknown = vec![f64::NAN; width];
         let mut out = BufWriter::new(self.begin(&name, "<f8", &[times, vehicles, width])?);
         source.each_instant(|instant, channels| {
@@ -171,7 +177,7 @@ impl<'a> Archive<'a> {
         self.texts(&format!("{name}_columns"), &channel.columns)
     }
 
-    /// Writes an array, instant by instant.
+    /// Writes an array, one instant after another.
     fn array(
         &mut self,
         name: &str,
@@ -181,7 +187,7 @@ impl<'a> Archive<'a> {
     ) -> Result<(), ExportError> {
         let (source, vehicles) = (self.source, self.vehicles);
         let zip = self.begin(name, descr, shape)?;
-        // Many small writes become few: the archive computes a checksum of each.
+        // Buffering saves checksum updates: the archive computes one per write.
         let mut out = BufWriter::new(zip);
         source.each_instant(|instant, _| {
             let mut slots = vec![None; vehicles];

@@ -1,4 +1,4 @@
-//! A long table in Parquet, with the columns of the table in text.
+//! Writes a long table in Parquet with the columns of the CSV export.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -12,46 +12,46 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{Type, TypePtr};
 
 use super::ExportError;
-use super::source::{About, Source};
+use super::source::{ExportInfo, Source};
 use crate::read::parquet::EPOCH_KEY;
 use tautline_core::track::Sample;
 
-/// Rows of a group, which is built in memory.
+/// Number of rows of a row group, which is built in memory.
 const GROUP_ROWS: usize = 200_000;
 
-pub(super) fn write(source: &Source<'_>, about: &About, file: &mut File) -> Result<(), ExportError> {
-    let schema = schema(about).map_err(write_error)?;
+pub(super) fn write(source: &Source<'_>, info: &ExportInfo, file: &mut File) -> Result<(), ExportError> {
+    let schema = schema(info).map_err(write_error)?;
     let mut properties = WriterProperties::builder().set_compression(Compression::SNAPPY).set_created_by(format!(
         "{} {}",
         tautline_core::PROGRAM,
         tautline_core::VERSION
     ));
-    if about.clock.epoch_ns != 0 {
-        let epoch = KeyValue::new(EPOCH_KEY.to_owned(), about.clock.epoch_ns.to_string());
+    if info.clock.epoch_ns != 0 {
+        let epoch = KeyValue::new(EPOCH_KEY.to_owned(), info.clock.epoch_ns.to_string());
         properties = properties.set_key_value_metadata(Some(vec![epoch]));
     }
     let file = file.try_clone()?;
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties.build())).map_err(write_error)?;
-    let names: Vec<ByteArray> = about.names.iter().map(|name| ByteArray::from(name.as_str())).collect();
-    let (mut rows, mut beside) = (Vec::new(), Vec::new());
+    let names: Vec<ByteArray> = info.names.iter().map(|name| ByteArray::from(name.as_str())).collect();
+    let (mut rows, mut extra) = (Vec::new(), Vec::new());
     source.each_instant(|instant, channels| {
         rows.extend_from_slice(instant);
-        (0..instant.len()).for_each(|row| about.beside.cells(channels, row, &mut beside));
+        (0..instant.len()).for_each(|row| info.extra.cells(channels, row, &mut extra));
         if rows.len() >= GROUP_ROWS {
-            write_group(&mut writer, (&rows, &beside), &names, about).map_err(write_error)?;
+            write_group(&mut writer, (&rows, &extra), &names, info).map_err(write_error)?;
             rows.clear();
-            beside.clear();
+            extra.clear();
         }
         Ok(())
     })?;
     if !rows.is_empty() {
-        write_group(&mut writer, (&rows, &beside), &names, about).map_err(write_error)?;
+        write_group(&mut writer, (&rows, &extra), &names, info).map_err(write_error)?;
     }
     writer.close().map_err(write_error)?;
     Ok(())
 }
 
-fn schema(about: &About) -> Result<TypePtr, ParquetError> {
+fn schema(info: &ExportInfo) -> Result<TypePtr, ParquetError> {
     let column = |name: &str, physical, repetition, logical| {
         let column = Type::primitive_type_builder(name, physical).with_repetition(repetition);
         column.with_logical_type(logical).build().map(Arc::new)
@@ -61,35 +61,35 @@ fn schema(about: &About) -> Result<TypePtr, ParquetError> {
         double("t_s", Repetition::REQUIRED)?,
         column("id", Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String))?,
     ];
-    for position in about.position_columns() {
+    for position in info.position_columns() {
         columns.push(double(position.name, Repetition::REQUIRED)?);
     }
-    for optional in about.optional_columns() {
+    for optional in info.optional_columns() {
         columns.push(double(optional.name, Repetition::OPTIONAL)?);
     }
-    for beside in about.beside.columns() {
-        columns.push(double(&beside, Repetition::OPTIONAL)?);
+    for extra in info.extra.columns() {
+        columns.push(double(&extra, Repetition::OPTIONAL)?);
     }
     Type::group_type_builder("samples").with_fields(columns).build().map(Arc::new)
 }
 
 fn write_group(
     writer: &mut SerializedFileWriter<File>,
-    (rows, beside): (&[Sample], &[f64]),
+    (rows, extra): (&[Sample], &[f64]),
     names: &[ByteArray],
-    about: &About,
+    info: &ExportInfo,
 ) -> Result<(), ParquetError> {
     let mut group = writer.next_row_group()?;
     let time = |sample: &Sample| Some(sample.time_s);
     write_column::<DoubleType, _>(&mut group, rows, time)?;
     write_column::<ByteArrayType, _>(&mut group, rows, |sample| Some(names[sample.vehicle].clone()))?;
-    for column in about.position_columns().iter().chain(about.optional_columns()) {
+    for column in info.position_columns().iter().chain(info.optional_columns()) {
         write_column::<DoubleType, _>(&mut group, rows, column.of)?;
     }
-    let width = about.beside.columns().len();
+    let width = info.extra.columns().len();
     for column in 0..width {
         let known = |row: &&[f64]| Some(row[column]).filter(|cell| cell.is_finite());
-        let cells: Vec<_> = beside.chunks_exact(width).collect();
+        let cells: Vec<_> = extra.chunks_exact(width).collect();
         write_column::<DoubleType, _>(&mut group, &cells, known)?;
     }
     group.close().map(drop)

@@ -1,4 +1,4 @@
-//! A recording that is exported: its instants, its curves as samples, and the channels beside positions.
+//! Access of exporters to a recording: instants, sampled curves and channels.
 
 use std::sync::Arc;
 
@@ -9,36 +9,36 @@ use crate::read::{Channels, ReadError, Recording, is_read};
 use tautline_core::record::Channel;
 use tautline_core::track::{Clock, Item, Piece, Sample, Tracks};
 
-/// A recording that can be read again and again.
+/// Recording that can be opened repeatedly.
 pub(super) struct Source<'a> {
     pub(super) open: &'a dyn Fn() -> Result<Recording, ReadError>,
-    /// Opens what it says beside the motion.
+    /// Opens the channels.
     pub(super) channels: &'a dyn Fn() -> Result<Option<Channels>, ReadError>,
     pub(super) sample_hz: Option<f64>,
 }
 
-/// What a recording holds.
+/// Properties of a recording, found in a first pass.
 #[derive(Debug, Default)]
-pub(super) struct About {
+pub(super) struct ExportInfo {
     pub(super) names: Vec<String>,
     pub(super) clock: Clock,
     pub(super) notes: Vec<String>,
     pub(super) samples: u64,
     pub(super) instants: usize,
-    /// Number of axes of positions and velocities: 2 where no height is known.
+    /// Number of axes of positions and velocities: 2 without heights.
     pub(super) axes: usize,
-    /// Whether some sample has a velocity.
+    /// Whether a sample has a velocity.
     pub(super) velocities: bool,
-    /// Whether some sample has a radius.
+    /// Whether a sample has a radius.
     pub(super) radii: bool,
-    /// What it says beside the motion.
-    pub(super) beside: Beside,
+    /// Channels.
+    pub(super) extra: ExtraColumns,
 }
 
-/// A column of numbers of a long table.
+/// Numeric column of a long table.
 pub(super) struct Column {
     pub(super) name: &'static str,
-    /// What stands in it; none where the cell is empty.
+    /// Returns the value of the cell; `None` for an empty cell.
     pub(super) of: fn(&Sample) -> Option<f64>,
 }
 
@@ -56,13 +56,13 @@ const VELOCITY: [Column; 3] = [
 
 const RADIUS: [Column; 1] = [Column { name: "radius", of: |sample| sample.radius_m }];
 
-impl About {
-    /// The columns that every sample fills.
+impl ExportInfo {
+    /// Returns the columns that every sample fills.
     pub(super) fn position_columns(&self) -> &'static [Column] {
         &POSITION[..self.axes]
     }
 
-    /// The columns that some samples fill and others may not.
+    /// Returns the columns that may have empty cells.
     pub(super) fn optional_columns(&self) -> impl Iterator<Item = &'static Column> {
         let velocities: &[_] = if self.velocities { &VELOCITY[..self.axes] } else { &[] };
         let radii: &[_] = if self.radii { &RADIUS } else { &[] };
@@ -71,30 +71,30 @@ impl About {
 }
 
 impl Source<'_> {
-    pub(super) fn survey(&self) -> Result<About, ExportError> {
-        let mut about = About::default();
+    pub(super) fn survey(&self) -> Result<ExportInfo, ExportError> {
+        let mut info = ExportInfo::default();
         let recording = self.each_instant(|instant, channels| {
-            about.beside.note(channels);
-            about.instants += 1;
-            about.samples += instant.len() as u64;
-            about.velocities |= instant.iter().any(|sample| sample.velocity_m_s.is_some());
-            about.radii |= instant.iter().any(|sample| sample.radius_m.is_some());
+            info.extra.note(channels);
+            info.instants += 1;
+            info.samples += instant.len() as u64;
+            info.velocities |= instant.iter().any(|sample| sample.velocity_m_s.is_some());
+            info.radii |= instant.iter().any(|sample| sample.radius_m.is_some());
             Ok(())
         })?;
-        about.names = recording.vehicles().to_vec();
-        about.axes = if recording.is_planar() { 2 } else { 3 };
-        about.clock = recording.clock().clone();
-        about.notes = recording.notes().to_vec();
+        info.names = recording.vehicles().to_vec();
+        info.axes = if recording.is_planar() { 2 } else { 3 };
+        info.clock = recording.clock().clone();
+        info.notes = recording.notes().to_vec();
         if let Some(assumed) = recording.assumed() {
-            about.notes.push(format!("what is written does not say that samples hold only if {assumed}"));
+            info.notes.push(format!("the samples rest on an assumption that the file does not contain: {assumed}"));
         }
         if let Some(hz) = self.sample_hz {
-            about.notes.push(format!("curves were sampled at {hz} Hz: what is between the samples is lost"));
+            info.notes.push(format!("curves were sampled at {hz} Hz; the motion between samples is lost"));
         }
-        Ok(about)
+        Ok(info)
     }
 
-    /// Calls `take` with the samples of each instant, in order of time, and the channels that have a row for each of them.
+    /// Calls `take` with the samples of each instant in order of time, and the channels with one row per sample.
     pub(super) fn each_instant(
         &self,
         mut take: impl FnMut(&[Sample], &[Channel]) -> Result<(), ExportError>,
@@ -106,8 +106,8 @@ impl Source<'_> {
         }
         let mut channels = (self.channels)()?;
         let mut take = |instant: &[Sample]| {
-            let beside = channels.as_mut().map_or_else(|| Ok(Vec::new()), |channels| channels.next(instant.len()))?;
-            take(instant, &beside)
+            let extra = channels.as_mut().map_or_else(|| Ok(Vec::new()), |channels| channels.next(instant.len()))?;
+            take(instant, &extra)
         };
         let (mut items, mut instant) = (Vec::new(), Vec::<Sample>::new());
         loop {
@@ -131,45 +131,45 @@ impl Source<'_> {
     }
 }
 
-/// The channels that are written, in order of first appearance.
+/// Channels to export, in order of first appearance.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Beside {
-    pub(super) channels: Vec<Written>,
+pub(super) struct ExtraColumns {
+    pub(super) channels: Vec<ChannelColumns>,
 }
 
-/// A channel that is written.
+/// Name and columns of an exported channel.
 #[derive(Clone, Debug)]
-pub(super) struct Written {
+pub(super) struct ChannelColumns {
     pub(super) name: Arc<str>,
     pub(super) columns: Arc<[String]>,
 }
 
-impl Written {
-    /// The channel at an instant; none where the instant does not have it.
+impl ChannelColumns {
+    /// Returns this channel at an instant, if present.
     pub(super) fn of<'a>(&self, channels: &'a [Channel]) -> Option<&'a Channel> {
         channels.iter().find(|channel| self.name == channel.name && self.columns == channel.columns)
     }
 
-    /// The row of a vehicle at an instant.
+    /// Returns a row of this channel at an instant, if present.
     pub(super) fn row<'a>(&self, channels: &'a [Channel], row: usize) -> Option<&'a [f64]> {
         let width = self.columns.len();
         self.of(channels)?.values.get(row * width..(row + 1) * width)
     }
 }
 
-impl Beside {
-    /// Takes note of the channels of an instant. Of two of one name the first is written.
+impl ExtraColumns {
+    /// Registers the channels of an instant. Of two channels with one name the first is exported.
     pub(super) fn note(&mut self, channels: &[Channel]) {
         for channel in channels {
             if self.channels.iter().all(|known| known.name != channel.name) {
                 let (name, columns) = (channel.name.clone(), channel.columns.clone());
-                self.channels.push(Written { name, columns });
+                self.channels.push(ChannelColumns { name, columns });
             }
         }
     }
 
-    /// Names of the columns of all channels in a long table: as the channels call them, behind the name of the channel where
-    /// one would be taken for another.
+    /// Returns the column names of all channels in a long table. A name with another meaning or a second use is
+    /// prefixed with its channel's name.
     pub(super) fn columns(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for channel in &self.channels {
@@ -181,7 +181,7 @@ impl Beside {
         names
     }
 
-    /// Appends what stands in those columns in a row of an instant; NaN where nothing is known.
+    /// Appends the values of these columns in one row, NaN for unknown values.
     pub(super) fn cells(&self, channels: &[Channel], row: usize, cells: &mut Vec<f64>) {
         for channel in &self.channels {
             match channel.row(channels, row) {
@@ -192,14 +192,14 @@ impl Beside {
     }
 }
 
-/// Most samples that are made of the curves of a recording.
+/// Largest number of samples of the curves of a recording.
 const MOST_SAMPLES: f64 = 1e9;
 
-/// Curves in memory, to be looked at in regular intervals.
+/// Curves in memory, sampled at regular intervals.
 pub(super) struct Sampled {
-    /// The pieces of each vehicle, in order of time.
+    /// Pieces of each vehicle, in order of time.
     pieces: Vec<Vec<Piece>>,
-    /// What was recorded as samples, in order of time.
+    /// Recorded samples, in order of time.
     samples: Vec<Sample>,
     hz: f64,
     from_s: f64,
@@ -231,7 +231,7 @@ impl Sampled {
         Ok(Self { pieces, samples, hz, from_s })
     }
 
-    /// When the curves are looked at \[s\]: in regular intervals, and where the curve of a vehicle ends.
+    /// Returns the sampling times \[s\]: regular intervals, and the end of each vehicle's curve.
     fn times_s(&self) -> impl Iterator<Item = f64> + '_ {
         let mut ends: Vec<f64> = self.pieces.iter().filter_map(|pieces| Some(pieces.last()?.to_s)).collect();
         ends.sort_by(f64::total_cmp);
@@ -278,7 +278,7 @@ impl Sampled {
     }
 }
 
-/// Position and velocity of a piece; none outside of it.
+/// Evaluates position and velocity of a piece by Horner's rule; `None` outside its interval.
 fn sample(piece: &Piece, time_s: f64) -> Option<Sample> {
     if !(piece.from_s..=piece.to_s).contains(&time_s) {
         return None;
@@ -298,16 +298,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_column_of_a_channel_is_called_as_one_that_is_read() {
-        let mut beside = Beside::default();
-        beside.note(&[
+    fn channel_columns_do_not_collide_with_read_columns() {
+        let mut extra = ExtraColumns::default();
+        extra.note(&[
             Channel::new("attitude", &["qw", "qx"]),
             Channel::new("gps", &["x", "y1", "t_s", "id", "radius", "vx", "qw"]),
             Channel::new("wind", &["wind_x_m_s"]),
         ]);
         let expected =
             ["qw", "qx", "gps_x", "gps_y1", "gps_t_s", "gps_id", "gps_radius", "gps_vx", "gps_qw", "wind_x_m_s"];
-        assert_eq!(beside.columns(), expected);
+        assert_eq!(extra.columns(), expected);
         assert!(expected.iter().all(|name| !is_read(name)), "{expected:?}");
     }
 }

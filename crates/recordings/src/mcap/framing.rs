@@ -1,8 +1,8 @@
-//! The records of an MCAP file, one after the other.
+//! Reads the records of an MCAP file one after another.
 //!
-//! The format's framing is read here and not by the `mcap` crate, because a recording may be damaged or hostile: the
-//! crate's readers reserve memory for whatever length a record claims and do unchecked arithmetic on lengths inside a
-//! chunk. Here memory grows only with bytes that are really in the file.
+//! The framing is parsed here because a recording may be damaged or hostile. The readers of the `mcap` crate allocate
+//! the length in a record header and use unchecked arithmetic inside chunks. Here memory grows only with bytes that are
+//! in the file.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -13,34 +13,34 @@ use mcap::records::op;
 
 use tautline_core::record::{ReadFault, RecordError};
 
-/// Longest record that is read \[bytes\]: a sample of three million vehicles.
+/// Largest accepted record \[bytes\]: a sample of three million vehicles.
 const RECORD_LIMIT_BYTES: u64 = 256 * 1024 * 1024;
 
-/// Bytes of a record's head: opcode and length.
+/// Size of a record header: opcode and length.
 const HEAD_BYTES: usize = 9;
 
-/// Bytes of a footer's content.
+/// Size of a footer's content.
 const FOOTER_BYTES: u64 = 20;
 
-/// One record: what it is and what it holds.
+/// Record of the file.
 pub(super) struct Record<'a> {
-    /// Where in the file it, or the chunk around it, begins \[bytes\].
+    /// Position of the record, or of its chunk, in the file \[bytes\].
     pub(super) offset: u64,
     pub(super) opcode: u8,
     pub(super) body: &'a [u8],
 }
 
-/// Reads the data section of an MCAP file record by record and goes into its chunks.
+/// Reader of the records in the data section of an MCAP file, including those inside chunks.
 pub(super) struct RecordReader {
     file: BufReader<File>,
-    /// Whether the file ends as a closed recording does.
+    /// Whether the file ends with a footer.
     complete: bool,
-    /// Where in the file the next record begins \[bytes\].
+    /// Position of the next record in the file \[bytes\].
     offset: u64,
-    /// Where in the file the record in `body` begins \[bytes\].
+    /// Position of the record in `body` \[bytes\].
     body_offset: u64,
     body: Vec<u8>,
-    /// The part of `body` that holds records of a chunk not yet given out.
+    /// Range of `body` with the unread records of a chunk.
     chunk: std::ops::Range<usize>,
     ended: bool,
 }
@@ -73,8 +73,8 @@ impl RecordReader {
         self.complete
     }
 
-    /// The next record, chunks taken apart; `None` at the end of the data section or where a file that was not closed
-    /// breaks off.
+    /// Returns the next record, with chunks unpacked; `None` at the end of the data section, or at the truncation of an
+    /// unclosed file.
     pub(super) fn next(&mut self) -> io::Result<Option<Record<'_>>> {
         while self.chunk.is_empty() {
             let Some(opcode) = self.read_record()? else { return Ok(None) };
@@ -105,7 +105,7 @@ impl RecordReader {
         }
     }
 
-    /// Reads the next record of the file into `body`, or only its opcode where the content is not used.
+    /// Reads the next record of the file into `body`; skips the content of unused record types.
     fn read_record(&mut self) -> io::Result<Option<u8>> {
         if self.ended {
             return Ok(None);
@@ -132,7 +132,7 @@ impl RecordReader {
         if read < bytes { self.broken_off() } else { Ok(Some(opcode)) }
     }
 
-    /// Refuses a file in which something follows the end of the recording, such as a second recording.
+    /// Refuses data after the end of the recording, such as a second recording.
     fn check_end(&mut self, mut opcode: u8) -> io::Result<()> {
         while opcode != op::FOOTER {
             let Some(next) = self.read_record()? else { return Ok(()) };
@@ -142,17 +142,17 @@ impl RecordReader {
         if self.fill(MAGIC.len() as u64 + 1)? == MAGIC.len() as u64 && self.body == MAGIC {
             return Ok(());
         }
-        Err(damaged(self.body_offset, "it follows the end of the recording: judge each recording by itself"))
+        Err(damaged(self.body_offset, "it follows the end of the recording; judge each recording separately"))
     }
 
-    /// Replaces `body` by the next `bytes` bytes, or by as many as there are.
+    /// Replaces `body` with the next `bytes` bytes, or with fewer at the end of the file.
     fn fill(&mut self, bytes: u64) -> io::Result<u64> {
         self.body.clear();
         let read = (&mut self.file).take(bytes).read_to_end(&mut self.body)?;
         Ok(read as u64)
     }
 
-    /// The end of a file that was not closed; a file that was closed cannot end here.
+    /// Handles the end of the file: accepted for an unclosed file, damage in a closed one.
     fn broken_off<T>(&mut self) -> io::Result<Option<T>> {
         self.ended = true;
         if self.complete {
@@ -162,7 +162,7 @@ impl RecordReader {
     }
 }
 
-/// Whether the file ends with a footer record and the format's closing bytes.
+/// Returns whether the file ends with a footer record and the closing magic bytes.
 fn ends_with_footer(file: &mut File) -> io::Result<bool> {
     let mut expected = vec![op::FOOTER];
     expected.extend_from_slice(&FOOTER_BYTES.to_le_bytes());
@@ -176,7 +176,7 @@ fn ends_with_footer(file: &mut File) -> io::Result<bool> {
     Ok(bytes.starts_with(&expected) && bytes.ends_with(MAGIC))
 }
 
-/// The records in a chunk's content, unpacked to no more than it says, once its checksum is found right.
+/// Unpacks the records of a chunk, up to the declared size, and verifies their checksum.
 fn chunk_records(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     let mut fields = Fields(body);
     let header = (|| {
@@ -185,25 +185,25 @@ fn chunk_records(body: &[u8]) -> Result<Vec<u8>, &'static str> {
     })();
     let (unpacked_bytes, crc, compression, bytes) = header.ok_or("the chunk has no header")?;
     let packed = usize::try_from(bytes).ok().and_then(|bytes| fields.0.get(..bytes));
-    let mut packed = packed.ok_or("the chunk is shorter than it says")?;
+    let mut packed = packed.ok_or("the chunk is shorter than its header declares")?;
     if unpacked_bytes > RECORD_LIMIT_BYTES {
-        return Err("the chunk claims to unpack to more than any recording needs");
+        return Err("the chunk declares an unpacked size above 256 MiB");
     }
     let mut records = Vec::new();
     let read = match compression {
         "" => packed.read_to_end(&mut records),
         "lz4" => lz4_flex::frame::FrameDecoder::new(packed).take(unpacked_bytes).read_to_end(&mut records),
         "zstd" => zstd::Decoder::new(packed).and_then(|zstd| zstd.take(unpacked_bytes).read_to_end(&mut records)),
-        _ => return Err("the chunk is packed by something else than lz4 and zstd (`mcap compress` changes that)"),
+        _ => return Err("the chunk compression is not lz4 or zstd; rewrite the file with `mcap compress`"),
     };
     read.map_err(|_| "the packed content of the chunk is wrong")?;
     if records.len() as u64 != unpacked_bytes {
-        return Err("the chunk is shorter than it says");
+        return Err("the chunk is shorter than its header declares");
     }
     if crc != 0 && crc32fast::hash(&records) != crc { Err("the checksum of the chunk is wrong") } else { Ok(records) }
 }
 
-/// A fault of the content on its way through calls that fail as the system does.
+/// Wraps a fault of the content as an `io::Error`.
 fn invalid(fault: ReadFault) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, fault)
 }
@@ -212,7 +212,7 @@ pub(super) fn damaged(offset: u64, reason: &str) -> io::Error {
     invalid(ReadFault::Damaged { offset, reason: reason.to_owned() })
 }
 
-/// The system's error or the file's fault.
+/// Returns the fault of the content, or the error of the system.
 pub(super) fn error(path: &Path, error: io::Error) -> RecordError {
     let path = path.display().to_string();
     match error.downcast() {
@@ -221,7 +221,7 @@ pub(super) fn error(path: &Path, error: io::Error) -> RecordError {
     }
 }
 
-/// Takes the fields of a record off its front; `None` where it is too short.
+/// Cursor over the fields of a record; `None` past its end.
 pub(super) struct Fields<'a>(pub(super) &'a [u8]);
 
 impl<'a> Fields<'a> {

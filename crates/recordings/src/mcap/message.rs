@@ -1,4 +1,4 @@
-//! The messages of a recording: what each topic carries, to CDR and back.
+//! Messages of `run.mcap`, converted to CDR and back.
 
 use std::sync::Arc;
 
@@ -9,17 +9,17 @@ use super::topic::Topic;
 use tautline_core::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
-/// A topic that every recording has.
+/// Topic that every run recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Own {
+pub(super) enum RunTopic {
     Scenario,
     Swarm,
     Summary,
     Events,
 }
 
-impl Own {
-    /// In the order in which a recorder declares them.
+impl RunTopic {
+    /// All topics, in the order of their declaration.
     pub(super) const ALL: [Self; 4] = [Self::Scenario, Self::Swarm, Self::Summary, Self::Events];
 
     pub(super) const fn topic(self) -> Topic<'static> {
@@ -31,7 +31,7 @@ impl Own {
         }
     }
 
-    /// The topic of this name.
+    /// Returns the topic with this name.
     pub(super) fn of(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|own| own.topic().name == name)
     }
@@ -41,30 +41,30 @@ impl Own {
     }
 }
 
-/// The topic that is declared and written when a run closes its recording.
+/// Topic of the audit, declared and written when a finished run closes its recording.
 pub(super) const AUDIT: Topic<'static> = Topic::cdr("/audit", "tautline_msgs/msg/Audit", include_str!("audit.msg"));
 
 pub(super) fn fault(topic: &str, reason: impl Into<String>) -> ReadFault {
     ReadFault::Message { topic: topic.to_owned(), reason: reason.into() }
 }
 
-/// Name of the schema of every state of a swarm.
+/// Schema name of swarm states.
 pub(crate) const SWARM_SCHEMA: &str = "tautline_msgs/msg/Swarm";
 
-/// Name of the schema of every channel.
+/// Schema name of channels.
 pub(crate) const CHANNEL_SCHEMA: &str = "tautline_msgs/msg/Channel";
 
-/// The name of a channel's topic.
+/// Returns the topic name of a channel.
 pub(crate) fn channel_topic(channel: &str) -> String {
     format!("/vehicles/{channel}")
 }
 
-/// The topic of a channel.
+/// Returns the topic with this name, with the schema of channels.
 pub(crate) fn topic_of_channel(name: &str) -> Topic<'_> {
     Topic::cdr(name, CHANNEL_SCHEMA, include_str!("channel.msg"))
 }
 
-/// The fields of `swarm.msg`, in order.
+/// Fields of `swarm.msg`, in order.
 #[derive(Serialize, Deserialize)]
 pub(super) struct SwarmMessage<V> {
     pub(super) time_s: f64,
@@ -87,12 +87,12 @@ impl<'a> From<&Sample<'a>> for SwarmMessage<VehicleByVehicle<'a>> {
 }
 
 impl SwarmMessage<Vec<f64>> {
-    /// Number of vehicles, going by the positions.
+    /// Returns the number of vehicles, derived from the positions.
     pub(super) fn vehicles(&self) -> usize {
         self.positions_m.len() / 3
     }
 
-    /// The sample of `vehicles` vehicles, with what came before it and is of the same step.
+    /// Returns the sample, combined with the preceding summary and channels if they belong to the same step.
     pub(super) fn into_sample(
         self,
         vehicles: usize,
@@ -108,7 +108,7 @@ impl SwarmMessage<Vec<f64>> {
             if Some(numbers.len()) != vehicles.checked_mul(3) && !without_command {
                 let reason =
                     format!("{name} has {} numbers, which is not 3 for each of {vehicles} vehicles", numbers.len());
-                return Err(Own::Swarm.fault(reason));
+                return Err(RunTopic::Swarm.fault(reason));
             }
         }
         let summary = summary.filter(|summary| summary.step == self.step);
@@ -129,7 +129,7 @@ impl SwarmMessage<Vec<f64>> {
     }
 }
 
-/// The fields of `channel.msg`, in order.
+/// Fields of `channel.msg`, in order.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct ChannelMessage<N, C, V> {
     time_s: f64,
@@ -158,7 +158,7 @@ impl ChannelMessage<String, Vec<String>, Vec<f64>> {
     }
 }
 
-/// A table as the sequence x1, y1, z1, x2, ...
+/// Table serialized as the sequence x1, y1, z1, x2, ...
 pub(super) struct VehicleByVehicle<'a>(&'a Rows);
 
 impl Serialize for VehicleByVehicle<'_> {
@@ -173,7 +173,7 @@ impl Serialize for VehicleByVehicle<'_> {
     }
 }
 
-/// The fields of `summary.msg`, in order.
+/// Fields of `summary.msg`, in order.
 #[derive(Serialize, Deserialize)]
 pub(super) struct SummaryMessage {
     time_s: f64,
@@ -202,15 +202,16 @@ impl SummaryMessage {
         if self.pair[0] == 0 {
             return Ok(None);
         }
-        let pair = pair_of(Own::Summary, self.pair)?;
+        let pair = pair_of(RunTopic::Summary, self.pair)?;
         Ok(Some(ClosestApproach { pair, separation_m: self.separation_m, time_s: self.separation_time_s }))
     }
 }
 
-/// Text before the slots that vehicles 1, 2, ... are given. A slot has the number of its previous vehicle.
+/// Prefix of the text of an `assigned` event. The new slots of vehicles 1, 2, ... follow, each named after its previous
+/// vehicle.
 const ASSIGNED: &str = "vehicles 1, 2, ... go to the slots of ";
 
-/// The fields of `event.msg`, in order.
+/// Fields of `event.msg`, in order.
 #[derive(Serialize, Deserialize)]
 pub(super) struct EventMessage<S> {
     kind: S,
@@ -220,7 +221,7 @@ pub(super) struct EventMessage<S> {
     text: String,
 }
 
-/// Numbers of an event that is of no pair.
+/// Vehicle numbers of an event without a pair.
 const NO_PAIR: [usize; 2] = [0, 0];
 
 impl From<&Event> for EventMessage<&'static str> {
@@ -300,7 +301,7 @@ impl From<&Event> for EventMessage<&'static str> {
 impl EventMessage<String> {
     pub(super) fn into_event(self) -> Result<Event, ReadFault> {
         let time_s = self.time_s;
-        let pair = || pair_of(Own::Events, self.pair);
+        let pair = || pair_of(RunTopic::Events, self.pair);
         Ok(match self.kind.as_str() {
             "violation-began" => Event::ViolationBegan { pair: pair()?, time_s },
             "violation-ended" => Event::ViolationEnded { pair: pair()?, time_s, min_m: self.value },
@@ -325,7 +326,7 @@ impl EventMessage<String> {
             "assigned" => Event::Assigned { time_s, slots: self.slots()? },
             "step-refined" => Event::StepRefined { time_s, dt_s: self.value },
             "ended-early" => Event::EndedEarly { time_s, reason: self.text },
-            unknown => return Err(Own::Events.fault(format!("unknown kind {unknown:?}"))),
+            unknown => return Err(RunTopic::Events.fault(format!("unknown kind {unknown:?}"))),
         })
     }
 
@@ -333,37 +334,37 @@ impl EventMessage<String> {
         let [vehicle, obstacle] =
             self.pair.map(|number| number.checked_sub(1).and_then(|index| usize::try_from(index).ok()));
         let both = vehicle.zip(obstacle).map(|(vehicle, obstacle)| [vehicle, obstacle]);
-        both.ok_or_else(|| Own::Events.fault("there is no vehicle or obstacle 0".to_owned()))
+        both.ok_or_else(|| RunTopic::Events.fault("vehicle or obstacle number is 0; numbers count from 1".to_owned()))
     }
 
-    /// Returns the slots in the text, from 0: a permutation of the vehicles.
+    /// Returns the slots in the text, from 0, if they are a permutation of the vehicles.
     fn slots(&self) -> Result<Vec<usize>, ReadFault> {
         let listed = self.text.strip_prefix(ASSIGNED).unwrap_or_default().split_whitespace();
         let slots = listed.map(|number| number.parse::<usize>().ok()?.checked_sub(1)).collect::<Option<Vec<_>>>();
-        let is_order = |slots: &Vec<usize>| {
+        let is_permutation = |slots: &Vec<usize>| {
             let mut sorted = slots.clone();
             sorted.sort_unstable();
             !slots.is_empty() && sorted.into_iter().eq(0..slots.len())
         };
         slots
-            .filter(is_order)
-            .ok_or_else(|| Own::Events.fault("the slots that vehicles are given are no order of them".to_owned()))
+            .filter(is_permutation)
+            .ok_or_else(|| RunTopic::Events.fault("the slots are not a permutation of the vehicles".to_owned()))
     }
 
     fn leg(&self) -> Result<usize, ReadFault> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let number = self.value as usize;
         let leg = number.checked_sub(1).filter(|_| self.value.fract() == 0.0);
-        leg.ok_or_else(|| Own::Events.fault(format!("there is no leg {}", self.value)))
+        leg.ok_or_else(|| RunTopic::Events.fault(format!("there is no leg {}", self.value)))
     }
 }
 
-/// Both numbers from 1, or zeros for no pair.
+/// Returns both vehicle numbers from 1, or zeros for no pair.
 fn numbers_of(pair: Option<Pair>) -> [u64; 2] {
     pair.map_or([0, 0], |pair| pair.numbers().map(|number| number as u64))
 }
 
-fn pair_of(topic: Own, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
+fn pair_of(topic: RunTopic, numbers: [u64; 2]) -> Result<Pair, ReadFault> {
     let index = |number: u64| number.checked_sub(1).and_then(|index| usize::try_from(index).ok());
     match numbers.map(index) {
         [Some(first), Some(second)] if first != second => Ok(Pair::new(first, second)),
@@ -381,11 +382,11 @@ mod tests {
     }
 
     #[test]
-    fn slots_that_vehicles_are_given_are_read_back_and_what_is_no_order_of_them_is_damage() {
+    fn slots_round_trip_and_must_be_a_permutation() {
         let event = Event::Assigned { time_s: 2.5, slots: vec![2, 0, 1] };
-        let kept = message(&event);
-        assert_eq!(kept.text, "vehicles 1, 2, ... go to the slots of 3 1 2");
-        assert_eq!(kept.into_event().expect("an event"), event);
+        let encoded = message(&event);
+        assert_eq!(encoded.text, "vehicles 1, 2, ... go to the slots of 3 1 2");
+        assert_eq!(encoded.into_event().expect("an event"), event);
         for wrong in ["", "3 1", "1 1 2", "0 1 2", "1 2 4", "1 2 x"] {
             let text = format!("{ASSIGNED}{wrong}");
             assert!(EventMessage { text, ..message(&event) }.into_event().is_err(), "{wrong}");

@@ -1,21 +1,21 @@
-//! `run.mcap`: a run as an [MCAP](https://mcap.dev/spec) file.
+//! Writes and reads `run.mcap`: a run as an [MCAP](https://mcap.dev/spec) file.
 //!
-//! Messages are in CDR (little-endian, as ROS 2 writes it), schemas are ROS 2 message definitions in plain text, so
-//! general MCAP tools show every field without knowing this program. Five topics:
+//! Messages are in CDR (little-endian, as in ROS 2), schemas are ROS 2 message definitions in plain text. General MCAP
+//! tools can therefore show every field. Five topics:
 //!
 //! | topic | schema | when | holds |
 //! | --- | --- | --- | --- |
 //! | `/scenario` | `tautline_msgs/msg/Scenario` | once, first | name, SHA-256 and text of the resolved scenario, N, delta |
 //! | `/summary` | `tautline_msgs/msg/Summary` | each sample | closest approach and energy |
 //! | `/swarm` | `tautline_msgs/msg/Swarm` | each sample | positions, velocities, controls |
-//! | `/events` | `tautline_msgs/msg/Event` | as they happen | kind, time, pair, a number, a sentence |
-//! | `/audit` | `tautline_msgs/msg/Audit` | once, last | the run's own audit, and a hash of the messages of the topics above |
+//! | `/events` | `tautline_msgs/msg/Event` | at each event | kind, time, pair, a number, a sentence |
+//! | `/audit` | `tautline_msgs/msg/Audit` | once, last | audit of the run, and a hash of all messages above |
 //!
-//! Each [`Channel`](tautline_core::record::Channel) of the samples has a topic `/vehicles/<name>` of `tautline_msgs/msg/Channel`, declared
-//! with its first values. An [`ExtraTopic`] may add one of another kind, such as the 3-D scene on `/scene`; readers pass
-//! over it.
+//! Each [`Channel`](tautline_core::record::Channel) of the samples has a topic `/vehicles/<name>` with the schema
+//! `tautline_msgs/msg/Channel`, declared with its first values. An [`ExtraTopic`] adds a topic of another schema, such
+//! as the 3-D scene on `/scene`, which readers ignore.
 //!
-//! The fields, with their units, are in the schemas themselves:
+//! The schemas document the fields and their units:
 //!
 //! ```text
 #![doc = include_str!("scenario.msg")]
@@ -41,13 +41,13 @@
 #![doc = include_str!("audit.msg")]
 //! ```
 //!
-//! `log_time` and `publish_time` are simulated nanoseconds since the start; nothing in the file depends on the clock
-//! or the machine, so two recordings of one run are equal byte for byte. The messages of a sample are always in the
-//! same chunk, `/summary` first and `/swarm` behind the channels.
+//! `log_time` and `publish_time` are simulated nanoseconds since the start. The file depends neither on the clock nor
+//! on the machine, so two recordings of one run are equal byte for byte. The messages of a sample are in one chunk:
+//! `/summary`, then the channels, then `/swarm`.
 //!
-//! A chunk is kept in memory until it is complete and is then handed to the system at once: when a message is
-//! [`FLUSH_PERIOD_S`] or more after the last chunk, or when [`FLUSH_BYTES`] are waiting. A process that is killed leaves
-//! every chunk up to then readable, and [`McapRecording`] reads such a file.
+//! A chunk stays in memory until it is complete and is then written at once: with the first message [`FLUSH_PERIOD_S`]
+//! or more after the previous chunk, or at [`FLUSH_BYTES`]. If the process is killed, all written chunks remain
+//! readable for [`McapRecording`].
 
 mod framing;
 mod message;
@@ -66,7 +66,7 @@ use serde::{Deserialize, Serialize};
 
 use tautline_core::record::{MessageHash, sha256_hex};
 
-/// What a recording says about the run as a whole: the fields of `scenario.msg`, in order.
+/// Description of a run: the fields of `scenario.msg`, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Name of the scenario.
@@ -81,7 +81,7 @@ pub struct Header {
     pub scenario_toml: String,
 }
 
-/// The run's own audit of every step: the fields of `audit.msg`, in order.
+/// Audit of every step by the run itself: the fields of `audit.msg`, in order.
 ///
 /// Lengths are in metres, or relative to the half axes if the scenario has ellipsoids.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -106,8 +106,8 @@ pub struct RunAudit {
     pub closest: Vec<RunFinding>,
     /// Violations in order of time, at most a bounded number.
     pub violations: Vec<RunFinding>,
-    /// Hash of the messages and of this audit, which [`McapRecorder::close`] computes. The hash reveals changes by
-    /// accident or by an editor. It is not a signature: a program can compute the hash again.
+    /// Hash of the messages and of this audit, computed by [`McapRecorder::close`]. The hash reveals accidental changes
+    /// and edits. It is not a signature: a program can recompute it.
     pub sha256: String,
 }
 
@@ -133,7 +133,7 @@ pub struct RunFinding {
 }
 
 impl RunAudit {
-    /// Returns the hash of this audit after the messages of its recording.
+    /// Returns the hash of the messages followed by this audit.
     fn hash(&self, mut messages: MessageHash) -> io::Result<String> {
         let mut bytes = Vec::new();
         topic::encode(&Self { sha256: String::new(), ..self.clone() }, &mut bytes)?;
@@ -143,7 +143,7 @@ impl RunAudit {
 }
 
 impl Header {
-    /// The header of a run of this scenario; its hash is computed here.
+    /// Returns the header of a run of this scenario and computes its hash.
     #[must_use]
     pub fn new(scenario_name: &str, scenario_toml: &str, vehicles: usize, delta_m: f64) -> Self {
         Self {

@@ -1,17 +1,19 @@
-//! Reading `run.mcap` back.
+//! Reads `run.mcap`.
 
 use std::collections::VecDeque;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-use super::message::{AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, fault};
+use super::message::{
+    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, fault,
+};
 use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
 use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
 use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
 
-/// What a recording gives back, in the order in which it was written.
+/// Entry of a recording, in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Entry {
     /// A sample.
@@ -20,20 +22,21 @@ pub enum Entry {
     Event(Event),
 }
 
-/// The run's own audit, as stored in a recording.
+/// State of the audit that a run stores in its recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StoredAudit {
     /// The recording has no audit, or was not closed.
     None,
-    /// The recording has an audit, but was changed after the run.
+    /// The recording was changed after the run.
     Altered,
     /// The recording is unchanged since the run.
     AsWritten(Box<RunAudit>),
 }
 
-/// A recording opened for reading: an iterator over its samples and events that holds one chunk in memory.
+/// Opened recording: an iterator over its samples and events that holds one chunk in memory.
 ///
-/// A file that was not closed gives everything up to where it breaks off. Damage gives an error, after which the
+/// A file that was not closed yields all entries of its complete chunks. Damage yields an error, after which the
+/// iterator ends.
 /// iterator ends.
 pub struct McapRecording {
     topics: TopicReader,
@@ -43,11 +46,11 @@ pub struct McapRecording {
 }
 
 impl McapRecording {
-    /// Opens a recording and reads as far as its scenario.
+    /// Opens a recording and reads up to its scenario.
     ///
     /// # Errors
-    /// [`RecordError::Open`] when the system refuses; [`RecordError::Read`] when the file is empty, is not MCAP, has no
-    /// `/scenario` message or no `/swarm` channel, or is damaged.
+    /// [`RecordError::Open`] if the system refuses. [`RecordError::Read`] if the file is empty, is not MCAP, is
+    /// damaged, or has no `/scenario` message or no `/swarm` channel.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
         let mut topics = TopicReader::open(path)?;
         let mut contents = Contents::default();
@@ -56,28 +59,28 @@ impl McapRecording {
                 break header;
             }
             if !contents.advance(&mut topics)? {
-                let missing = if contents.has_swarm { Own::Scenario } else { Own::Swarm };
+                let missing = if contents.has_swarm { RunTopic::Scenario } else { RunTopic::Swarm };
                 return Err(topics.fault(ReadFault::NoChannel { topic: missing.topic().name }));
             }
         };
         Ok(Self { topics, contents, header, failed: false })
     }
 
-    /// What the recording says about the run as a whole.
+    /// Returns the description of the run.
     #[must_use]
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Whether the file was closed. One that was not, because its writer was killed or could write no more, holds
-    /// everything up to the last chunk that was written.
+    /// Returns whether the file was closed. A file whose writer was killed or failed holds everything up to the last
+    /// complete chunk.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.topics.is_complete()
     }
 
-    /// Returns the run's own audit, after all entries were read. The audit is accepted only as the last message of a
-    /// closed file whose messages, in their order, have the hash of the audit.
+    /// Returns the audit of the run, once all entries are read. It is valid only as the last message of a closed file
+    /// whose messages have the hash of the audit.
     #[must_use]
     pub fn stored_audit(&self) -> StoredAudit {
         let Contents { audit, is_altered, messages, .. } = &self.contents;
@@ -90,7 +93,7 @@ impl McapRecording {
         }
     }
 
-    /// All remaining samples and events, each in order.
+    /// Returns all remaining samples and events, each in order.
     ///
     /// # Errors
     /// The first error of the iterator.
@@ -130,25 +133,25 @@ impl Iterator for McapRecording {
     }
 }
 
-/// What was read so far amounts to.
+/// State of the reader after the messages read so far.
 #[derive(Default)]
 struct Contents {
     /// Whether the topic of states is declared.
     has_swarm: bool,
     header: Option<Header>,
     summary: Option<SummaryMessage>,
-    /// The last message of each channel since the last state.
+    /// Last message of each channel since the last state.
     channels: Vec<ChannelMessage<String, Vec<String>, Vec<f64>>>,
     ready: VecDeque<Entry>,
     audit: Option<RunAudit>,
-    /// Whether the file has messages after the audit that a run does not write, or an audit that cannot be read.
+    /// Whether a message of a run follows the audit, or an audit is unreadable or repeated.
     is_altered: bool,
-    /// Over the messages of [`Own::ALL`].
+    /// Hash of the messages of [`RunTopic::ALL`].
     messages: MessageHash,
 }
 
 impl Contents {
-    /// Takes one part; returns `false` at the end of the file.
+    /// Processes one part of the file; returns `false` at its end.
     fn advance(&mut self, topics: &mut TopicReader) -> Result<bool, RecordError> {
         let taken = match topics.next()? {
             Some(Part::Topic(declared)) => self.declare(declared),
@@ -160,37 +163,37 @@ impl Contents {
     }
 
     fn declare(&mut self, declared: &Declared) -> Result<(), ReadFault> {
-        let Some(own) = Own::of(&declared.topic) else { return Ok(()) };
+        let Some(own) = RunTopic::of(&declared.topic) else { return Ok(()) };
         let Topic { name: topic, schema_name: expected, message_encoding, .. } = own.topic();
         if declared.schema != expected || declared.encoding != message_encoding {
             let schema = if declared.schema.is_empty() { "no schema" } else { &declared.schema };
             let found = format!("{schema} in {} encoding", declared.encoding);
             return Err(ReadFault::ForeignChannel { topic, found, expected });
         }
-        self.has_swarm |= own == Own::Swarm;
+        self.has_swarm |= own == RunTopic::Swarm;
         Ok(())
     }
 
     fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
         let Declared { topic, schema, encoding, .. } = message.of;
-        let own = Own::of(topic);
+        let own = RunTopic::of(topic);
         if own.is_some() {
             self.messages.take(topic, message.bytes);
             self.is_altered |= self.audit.is_some();
         }
         match own {
-            Some(Own::Scenario) => {
+            Some(RunTopic::Scenario) => {
                 let header = content(message)?;
                 self.header.get_or_insert(header);
             }
-            Some(Own::Summary) => self.summary = Some(content(message)?),
-            Some(Own::Swarm) => {
+            Some(RunTopic::Summary) => self.summary = Some(content(message)?),
+            Some(RunTopic::Swarm) => {
                 let state = content::<SwarmMessage<Vec<f64>>>(message)?;
                 let vehicles = self.header.as_ref().map_or(state.vehicles(), |header| header.vehicles);
                 let channels = std::mem::take(&mut self.channels);
                 self.ready.push_back(Entry::Sample(state.into_sample(vehicles, self.summary.as_ref(), channels)?));
             }
-            Some(Own::Events) => {
+            Some(RunTopic::Events) => {
                 self.ready.push_back(Entry::Event(content::<EventMessage<String>>(message)?.into_event()?));
             }
             None if topic == AUDIT.name => {

@@ -1,4 +1,4 @@
-//! Topics of an MCAP file: what they are called, their messages in CDR, and files of them written and read.
+//! Topics of an MCAP file: names and schemas, messages in CDR, writer and reader.
 
 use std::collections::BTreeMap;
 use std::io::{self, Seek, Write};
@@ -13,67 +13,67 @@ use serde::de::DeserializeOwned;
 use super::framing::{self, Fields, Record, RecordReader, damaged};
 use tautline_core::record::{ReadFault, RecordError};
 
-/// Name of the writer of the file, for MCAP tools.
+/// Library name in the file header, for MCAP tools.
 const LIBRARY: &str = concat!("tautline ", env!("CARGO_PKG_VERSION"));
 
-/// How ROS 2 marks plain little-endian CDR at the head of each message.
+/// Encapsulation header of plain little-endian CDR in ROS 2.
 const CDR_LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Encoding of messages in CDR.
+/// Name of the message encoding CDR.
 pub(crate) const CDR: &str = "cdr";
 
-/// What a topic is called and how its messages are to be read.
+/// Name, encoding and schema of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Topic<'a> {
-    /// Its name, such as `/scene`.
+    /// Name, such as `/scene`.
     pub name: &'a str,
-    /// How messages are encoded, such as `protobuf`.
+    /// Encoding of the messages, such as `protobuf`.
     pub message_encoding: &'a str,
-    /// Name of their schema.
+    /// Name of the schema.
     pub schema_name: &'a str,
-    /// How the schema is encoded.
+    /// Encoding of the schema.
     pub schema_encoding: &'a str,
-    /// The schema.
+    /// Content of the schema.
     pub schema: &'a [u8],
 }
 
 impl<'a> Topic<'a> {
-    /// A topic of messages in CDR whose schema is a ROS 2 message definition.
+    /// Returns a topic with messages in CDR and a ROS 2 message definition as schema.
     pub(crate) const fn cdr(name: &'a str, schema_name: &'a str, schema: &'a str) -> Self {
         let schema = schema.as_bytes();
         Self { name, message_encoding: CDR, schema_name, schema_encoding: "ros2msg", schema }
     }
 }
 
-/// Replaces the content of `bytes` by the message in CDR.
+/// Replaces the content of `bytes` with the message in CDR.
 pub(crate) fn encode(message: &impl Serialize, bytes: &mut Vec<u8>) -> io::Result<()> {
     bytes.clear();
     bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
     cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message).map_err(io::Error::other)
 }
 
-/// Reads a message in CDR of either byte order; the error says what is wrong with it. Bytes behind its last field are
-/// ignored, so that fields can be added later.
+/// Reads a message in CDR of either byte order; the error describes the damage. Bytes after the last field are ignored,
+/// so that later versions can append fields.
 pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     let message = match bytes {
         [0, 1, _, _, body @ ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
         [0, 0, _, _, body @ ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
-        _ => return Err("it does not begin as CDR does".to_owned()),
+        _ => return Err("it has no CDR header".to_owned()),
     };
     message.map(|(message, _)| message).map_err(|error| error.to_string())
 }
 
-/// Nanoseconds since the zero of a clock; 0 for what is before it or not a number.
+/// Returns the time in nanoseconds since the epoch of the clock; 0 for earlier times and NaN.
 pub(crate) fn log_time_ns(epoch_ns: i64, time_s: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let since_epoch = (time_s * 1e9).round() as i64;
     u64::try_from(epoch_ns.saturating_add(since_epoch)).unwrap_or(0)
 }
 
-/// Writes the messages of some topics.
+/// Writer of messages on several topics.
 pub(crate) struct TopicWriter<W: Write + Seek> {
     out: Writer<W>,
-    /// Number of each topic's channel and of its messages so far.
+    /// Channel number and message count of each topic.
     channels: Vec<(u16, u32)>,
 }
 
@@ -83,7 +83,7 @@ impl<W: Write + Seek> TopicWriter<W> {
         Ok(Self { out, channels: Vec::new() })
     }
 
-    /// Declares a topic and gives its place among all that are declared.
+    /// Declares a topic and returns its index.
     pub(crate) fn declare(&mut self, topic: &Topic<'_>) -> io::Result<usize> {
         let schema = self.out.add_schema(topic.schema_name, topic.schema_encoding, topic.schema).map_err(io_error)?;
         let channel = self.out.add_channel(schema, topic.name, topic.message_encoding, &BTreeMap::new());
@@ -91,7 +91,7 @@ impl<W: Write + Seek> TopicWriter<W> {
         Ok(self.channels.len() - 1)
     }
 
-    /// Writes a message of the topic in this place.
+    /// Writes a message on the topic with this index.
     pub(crate) fn write(&mut self, topic: usize, log_time: u64, message: &[u8]) -> io::Result<()> {
         let (channel_id, sequence) = &mut self.channels[topic];
         let header = MessageHeader { channel_id: *channel_id, sequence: *sequence, log_time, publish_time: log_time };
@@ -99,17 +99,17 @@ impl<W: Write + Seek> TopicWriter<W> {
         self.out.write_to_known_channel(&header, message).map_err(io_error)
     }
 
-    /// Closes the chunk and hands it to the system.
+    /// Closes the chunk and writes it to the file.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.out.flush().map_err(io_error)
     }
 
-    /// Writes what is waiting and the closing index.
+    /// Writes the remaining messages and the closing index.
     pub(crate) fn finish(&mut self) -> io::Result<()> {
         self.out.finish().map(drop).map_err(io_error)
     }
 
-    /// Leaves the file as it is: a writer that is dropped closes it as if it were whole.
+    /// Leaves the file unfinished. Dropping the writer instead would close the file as if it were complete.
     pub(crate) fn abandon(self) {
         drop(self.out.into_inner());
     }
@@ -122,36 +122,36 @@ fn io_error(error: McapError) -> io::Error {
     }
 }
 
-/// A topic as a file declares it.
+/// Topic as declared in a file.
 #[derive(Clone, Debug)]
 pub(crate) struct Declared {
     pub(crate) channel: u16,
     pub(crate) topic: String,
-    /// Name of the schema; empty where it has none.
+    /// Name of the schema; empty without a schema.
     pub(crate) schema: String,
     pub(crate) encoding: String,
 }
 
-/// A message of a topic.
+/// Message of a topic.
 pub(crate) struct Message<'a> {
-    /// Where in the file it, or the chunk around it, begins \[bytes\].
+    /// Position of the message, or of its chunk, in the file \[bytes\].
     pub(crate) offset: u64,
     pub(crate) of: &'a Declared,
     pub(crate) log_ns: u64,
     pub(crate) bytes: &'a [u8],
 }
 
-/// What a file says next.
+/// Next part of a file.
 pub(crate) enum Part<'a> {
     /// The name of a schema.
     Schema(&'a str),
     Topic(&'a Declared),
     Message(Message<'a>),
-    /// What tells nothing of topics, or a message of a topic that was not declared.
+    /// Record without topic information, or a message of an undeclared topic.
     Other,
 }
 
-/// Reads topics and their messages in the order of the file.
+/// Reader of topics and their messages in the order of the file.
 pub(crate) struct TopicReader {
     path: PathBuf,
     records: RecordReader,
@@ -165,17 +165,17 @@ impl TopicReader {
         Ok(Self { path: path.to_owned(), records, schemas: BTreeMap::new(), topics: BTreeMap::new() })
     }
 
-    /// A fault of the file's content.
+    /// Returns the error for a fault in the content of this file.
     pub(crate) fn fault(&self, fault: ReadFault) -> RecordError {
         RecordError::Read { path: self.path.display().to_string(), fault }
     }
 
-    /// Whether the file was closed.
+    /// Returns whether the file was closed.
     pub(crate) fn is_complete(&self) -> bool {
         self.records.is_complete()
     }
 
-    /// The next part; `None` at the end, or where a file that was not closed breaks off.
+    /// Returns the next part; `None` at the end, or at the truncation of an unclosed file.
     pub(crate) fn next(&mut self) -> Result<Option<Part<'_>>, RecordError> {
         let path = &self.path;
         let record = self.records.next().map_err(|error| framing::error(path, error))?;
@@ -207,7 +207,7 @@ fn declared(mut fields: Fields<'_>, schemas: &BTreeMap<u16, String>) -> Option<D
     Some(Declared { channel, topic, schema: schemas.get(&schema).cloned().unwrap_or_default(), encoding })
 }
 
-/// Channel, time of logging \[ns\] and content of a message.
+/// Returns channel, log time \[ns\] and content of a message.
 fn message(mut fields: Fields<'_>) -> Option<(u16, u64, &[u8])> {
     let channel = fields.u16()?;
     let _sequence = fields.u32()?;

@@ -1,4 +1,4 @@
-//! Writing `run.mcap`.
+//! Writes `run.mcap`.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -10,66 +10,66 @@ use mcap::write::NoSeek;
 use serde::Serialize;
 
 use super::message::{
-    AUDIT, ChannelMessage, EventMessage, Own, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
+    AUDIT, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
 use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
 use tautline_core::record::{Channel, Event, RecordError, Sample, Sink};
 
-/// A chunk is closed and handed to the system with the first message this long after the chunk before \[simulated s\].
+/// Time after which the next message closes a chunk \[simulated s\].
 pub const FLUSH_PERIOD_S: f64 = 1.0;
 
-/// A chunk is closed and handed to the system when it holds this much \[bytes\].
+/// Size at which a chunk is closed and written \[bytes\].
 pub const FLUSH_BYTES: usize = 256 * 1024;
 
-/// Bytes that MCAP adds to each message: record head and message header.
+/// Overhead of MCAP per message: record header and message header.
 const MESSAGE_OVERHEAD_BYTES: usize = 31;
 
-/// Makes the messages of one more topic out of the samples.
+/// Source of messages of an additional topic.
 pub trait ExtraTopic: Send {
-    /// What is declared of it; its name is none of the recording's own.
+    /// Returns the declaration of the topic; its name must differ from the topics of the recording.
     fn topic(&self) -> Topic<'_>;
 
-    /// Replaces the content of `message` by the one that belongs to a sample; `false` where none is due.
+    /// Replaces the content of `message` with the message of a sample; returns `false` if no message is due.
     ///
     /// # Errors
-    /// When the message cannot be encoded.
+    /// If the message cannot be encoded.
     fn message(&mut self, sample: &Sample<'_>, message: &mut Vec<u8>) -> io::Result<bool>;
 
-    /// Hears of an event, in order with the samples.
+    /// Receives an event, in order with the samples.
     fn note(&mut self, _event: &Event) {}
 }
 
-/// Topics without seeking: a chunk is built in memory and written whole.
+/// Topic writer without seeking: a chunk is built in memory and written as a whole.
 type Out = TopicWriter<NoSeek<BufWriter<File>>>;
 
-/// Records a run into an MCAP file as it is made.
+/// Recorder of a run into an MCAP file.
 ///
-/// Memory holds one chunk ([`FLUSH_BYTES`] and one sample at most) and an index entry of some 200 bytes per chunk
-/// written. [`McapRecorder::finish`] closes the file and reports what went wrong. A recorder that is dropped closes the
-/// file too, but cannot report an error. After an error the file stays as it is and every further call fails.
+/// Memory holds one chunk (at most [`FLUSH_BYTES`] and one sample) and an index entry of about 200 bytes per written
+/// chunk. [`McapRecorder::finish`] closes the file and reports errors. A dropped recorder closes the file too, but
+/// cannot report an error. After an error the file is left as it is and every further call fails.
 pub struct McapRecorder {
     path: PathBuf,
-    /// Begins with [`Own::ALL`], so that their numbers are their places.
+    /// Writer whose first topics are [`RunTopic::ALL`], so that `RunTopic as usize` is the index of a topic.
     out: Option<Out>,
-    /// Channels met so far, and the places of their topics.
+    /// Channels so far, with the indices of their topics.
     channels: Vec<(Arc<str>, usize)>,
-    /// The extra topic and its place.
+    /// Additional topic and its index.
     extra: Option<(Box<dyn ExtraTopic>, usize)>,
-    /// The message being written.
+    /// Buffer of the current message.
     message: Vec<u8>,
     waiting_bytes: usize,
     flushed_at_s: f64,
-    /// Over the messages of [`Own::ALL`].
+    /// Hash of the messages of [`RunTopic::ALL`].
     messages: MessageHash,
 }
 
 impl McapRecorder {
-    /// Creates the file (an existing one is overwritten) and writes the scenario into it.
+    /// Creates the file, overwriting an existing one, and writes the scenario into it.
     ///
     /// # Errors
-    /// [`RecordError::Write`] when the system refuses.
+    /// [`RecordError::Write`] if the system refuses.
     pub fn create(path: &Path, header: &Header) -> Result<Self, RecordError> {
         let out = open(path).map_err(|source| write_error(path, source))?;
         let mut recorder = Self {
@@ -82,32 +82,32 @@ impl McapRecorder {
             flushed_at_s: f64::NEG_INFINITY,
             messages: MessageHash::default(),
         };
-        recorder.write(Own::Scenario as usize, 0.0, header)?;
+        recorder.write(RunTopic::Scenario as usize, 0.0, header)?;
         Ok(recorder)
     }
 
-    /// Records one more topic beside the recording's own, from the next sample on.
+    /// Adds a topic, recorded from the next sample on.
     ///
     /// # Errors
-    /// [`RecordError::Write`] when the system refuses.
+    /// [`RecordError::Write`] if the system refuses.
     pub fn with(mut self, extra: Box<dyn ExtraTopic>) -> Result<Self, RecordError> {
         let place = self.with_out(|out| out.declare(&extra.topic()))?;
         self.extra = Some((extra, place));
         Ok(self)
     }
 
-    /// Writes what is waiting and the closing index, and closes the file.
+    /// Writes the remaining messages and the closing index, and closes the file.
     ///
     /// # Errors
-    /// [`RecordError::Write`] when the system refuses, or has refused before.
+    /// [`RecordError::Write`] if the system refuses or refused before.
     pub fn finish(mut self) -> Result<(), RecordError> {
         self.with_out(Out::finish)
     }
 
-    /// Writes the audit of the finished run, with its hash, and closes the file as [`McapRecorder::finish`] does.
+    /// Writes the audit of the finished run with its hash, and closes the file as [`McapRecorder::finish`] does.
     ///
     /// # Errors
-    /// [`RecordError::Write`] when the system refuses, or has refused before.
+    /// [`RecordError::Write`] if the system refuses or refused before.
     pub fn close(mut self, audit: RunAudit) -> Result<(), RecordError> {
         let sha256 = audit.hash(self.messages.clone()).map_err(|source| write_error(&self.path, source))?;
         let audit = RunAudit { sha256, ..audit };
@@ -118,13 +118,13 @@ impl McapRecorder {
 
     fn write(&mut self, topic: usize, time_s: f64, message: &impl Serialize) -> Result<(), RecordError> {
         self.write_if_due(topic, time_s, |bytes| encode(message, bytes).map(|()| true))?;
-        if let Some(own) = Own::ALL.get(topic) {
+        if let Some(own) = RunTopic::ALL.get(topic) {
             self.messages.take(own.topic().name, &self.message);
         }
         Ok(())
     }
 
-    /// Writes the message that `fill` makes, if it says that one is due.
+    /// Writes the message from `fill`, unless `fill` returns `false`.
     fn write_if_due(
         &mut self,
         topic: usize,
@@ -165,7 +165,7 @@ impl McapRecorder {
         Ok(())
     }
 
-    /// Runs `action` on the open file, which the first error closes for good.
+    /// Runs `action` on the open file; the first error closes the file permanently.
     fn with_out<T>(&mut self, action: impl FnOnce(&mut Out) -> io::Result<T>) -> Result<T, RecordError> {
         let Some(out) = self.out.as_mut() else {
             return Err(write_error(&self.path, io::Error::other("writing failed before")));
@@ -181,11 +181,11 @@ impl McapRecorder {
 
 impl Sink for McapRecorder {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
-        self.write(Own::Summary as usize, sample.time_s, &SummaryMessage::from(sample))?;
+        self.write(RunTopic::Summary as usize, sample.time_s, &SummaryMessage::from(sample))?;
         for channel in sample.channels {
             self.write_channel(sample, channel)?;
         }
-        self.write(Own::Swarm as usize, sample.time_s, &SwarmMessage::from(sample))?;
+        self.write(RunTopic::Swarm as usize, sample.time_s, &SwarmMessage::from(sample))?;
         if let Some((mut extra, topic)) = self.extra.take() {
             let written = self.write_if_due(topic, sample.time_s, |bytes| extra.message(sample, bytes));
             self.extra = Some((extra, topic));
@@ -198,7 +198,7 @@ impl Sink for McapRecorder {
         if let Some((extra, _)) = &mut self.extra {
             extra.note(event);
         }
-        self.write(Own::Events as usize, event.time_s(), &EventMessage::from(event))?;
+        self.write(RunTopic::Events as usize, event.time_s(), &EventMessage::from(event))?;
         self.flush_if_due(event.time_s())
     }
 
@@ -208,10 +208,10 @@ impl Sink for McapRecorder {
 }
 
 fn open(path: &Path) -> io::Result<Out> {
-    // Chunks are closed by the recorder and not by their size alone, so that the messages of one sample stay together.
+    // The recorder closes the chunks, not their size alone: the messages of one sample stay in one chunk.
     let options = WriteOptions::new().chunk_size(None).disable_seeking(true);
     let mut out = TopicWriter::new(NoSeek::new(BufWriter::new(File::create(path)?)), options)?;
-    for own in Own::ALL {
+    for own in RunTopic::ALL {
         out.declare(&own.topic())?;
     }
     Ok(out)

@@ -1,11 +1,11 @@
-//! Directions of the axes of a recording, and recordings turned to x east, y north and z up.
+//! Converts recordings to axes x east, y north and z up.
 //!
-//! The directions are those that the user gives, or those that the names of columns give:
+//! The directions of the axes come from the user or from column names:
 //!
 //! | columns | frame | vehicle |
 //! | --- | --- | --- |
-//! | `north`, `east`, `down` or `up`; `n`, `e`, `d` or `u` | as they say | as in any table |
-//! | `x_ned`, `ned_x` and the like, with any three directions | as they say | as in any table |
+//! | `north`, `east`, `down` or `up`; `n`, `e`, `d` or `u` | as named | as in any table |
+//! | `x_ned`, `ned_x` and the like, with any three directions | as named | as in any table |
 //! | `x`, `y`, `z` beside `ref_lat`, `ref_lon`, `ref_alt` (PX4 `vehicle_local_position`) | north, east, down of the reference | one |
 //! | `px`, `py`, `pz` beside `ledr`, `ledg`, `ledb` (trajectories of MAVSDK Drone Show) | north, east, down | one |
 //! | `p_RS_R_x`, ... (ground truth of `EuRoC`) | x, y, z | one |
@@ -21,7 +21,7 @@ use super::options::{ColumnNames, ReadOptions};
 use super::order::Recording;
 use tautline_core::track::{Item, Metadata, Tracks};
 
-/// Which axis of a recording becomes x, y and z, and by what it is multiplied.
+/// Mapping of the axes of a recording to x, y and z: a permutation with factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
     from: [usize; 3],
@@ -29,7 +29,7 @@ pub struct Axes {
 }
 
 impl Default for Axes {
-    /// Axes as they are.
+    /// Returns the identity.
     fn default() -> Self {
         Self { from: [0, 1, 2], factors: [1.0; 3] }
     }
@@ -38,16 +38,16 @@ impl Default for Axes {
 impl FromStr for Axes {
     type Err = String;
 
-    /// As [`Self::from_name`].
+    /// Parses as [`Self::from_name`] does.
     fn from_str(name: &str) -> Result<Self, String> {
-        let help = "three directions such as enu, ned or nwu, or what becomes x, y and z, such as y,x,-z";
+        let help = "three directions such as enu, ned or nwu, or the source of x, y and z such as y,x,-z";
         Self::from_name(name).ok_or_else(|| format!("`{name}` is not {help}"))
     }
 }
 
 impl Axes {
-    /// Reads the directions of the axes of a recording, such as `enu`, `ned` or `nwu`, or what becomes x, y and z, such as
-    /// `y,x,-z`; none where it is neither.
+    /// Parses the directions of the recorded axes, such as `enu`, `ned` or `nwu`, or the sources of x, y and z, such as
+    /// `y,x,-z`.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         let mut found: [Option<(usize, f64)>; 3] = [None; 3];
@@ -87,76 +87,76 @@ impl Axes {
         is_permutation.then_some(Self { from: [x.0, y.0, z.0], factors: [x.1, y.1, z.1] })
     }
 
-    /// The same, with the axes of the recording multiplied by these numbers first.
+    /// Returns this mapping, applied after multiplying the recorded axes by these factors.
     #[must_use]
     pub fn scaled(self, by: [f64; 3]) -> Self {
         let factors = [0, 1, 2].map(|axis| self.factors[axis] * by[self.from[axis]]);
         Self { factors, ..self }
     }
 
-    /// Where an axis of the recording goes, and by what it is multiplied.
+    /// Returns the target axis of a recorded axis, and its factor.
     pub(super) fn of(&self, axis: usize) -> (usize, f64) {
         let to = self.from.iter().position(|from| *from == axis).unwrap_or(axis);
         (to, self.factors[to])
     }
 
-    /// Whether axes stay as they are.
+    /// Returns whether the mapping is the identity.
     pub(super) fn is_identity(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Whether z stays the third axis: its sign may change, and its length.
+    /// Returns whether z remains the third axis; its sign and scale may change.
     pub(super) fn keeps_plane(&self) -> bool {
         self.from[2] == 2
     }
 
-    /// Whether what is up stays up.
+    /// Returns whether z remains up.
     pub(super) fn keeps_up(&self) -> bool {
         self.keeps_plane() && self.factors[2] > 0.0
     }
 
-    /// Whether lengths stay as they are.
+    /// Returns whether lengths are preserved.
     pub(super) fn keeps_lengths(&self) -> bool {
         self.factors.iter().all(|factor| factor.abs() == 1.0)
     }
 
-    /// Whether all factors can be multiplied by.
+    /// Returns whether all factors are finite and not 0.
     pub(super) fn are_finite(&self) -> bool {
         self.factors.iter().all(|factor| factor.is_finite() && *factor != 0.0)
     }
 
     pub(super) fn turn(&self, vector: Vector3<f64>) -> Vector3<f64> {
-        // Adding 0 makes a zero positive.
+        // Adding 0 converts -0 to +0.
         Vector3::from_fn(|axis, _| self.factors[axis] * vector[self.from[axis]] + 0.0)
     }
 
-    /// What a person should know.
+    /// Returns the note for the user.
     pub(super) fn note(&self) -> String {
         let named = |axis: usize| match self.factors[axis] {
             1.0 => ["x", "y", "z"][self.from[axis]].to_owned(),
             -1.0 => format!("-{}", ["x", "y", "z"][self.from[axis]]),
             factor => format!("{factor:?} {}", ["x", "y", "z"][self.from[axis]]),
         };
-        format!("axes are turned: x, y, z are {}, {}, {} of the recording", named(0), named(1), named(2))
+        format!("axes are mapped: x, y, z are {}, {}, {} of the recording", named(0), named(1), named(2))
     }
 }
 
-/// A recording whose axes are turned as the user says.
+/// Applies the mapping of the user to a recording.
 pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.turn().is_identity() {
         return Ok(recording);
     }
     if recording.is_planar() && !options.turn().keeps_plane() {
-        let problem = "its third axis would become x or y, and it has none";
-        let remedy = "name the column of the third axis with --column z=NAME, or give --axes that leave z in its place";
+        let problem = "--axes maps its third axis to x or y, but it has none";
+        let remedy = "name the column of the third axis with --column z=NAME, or keep z in --axes";
         return refuse("recording/contradicts-option", problem, remedy);
     }
     let mut metadata = recording.metadata().clone();
     metadata.notes.push(options.turn().note());
-    Ok(Box::new(Turned { recording, axes: options.turn(), metadata }))
+    Ok(Box::new(MappedRecording { recording, axes: options.turn(), metadata }))
 }
 
-/// Refuses to turn axes whose directions are known, in what is called so.
+/// Refuses a mapping of axes by the user if the directions are known; `what` names their source.
 pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Fault> {
     if options.turn().is_identity() {
         return Ok(());
@@ -164,28 +164,28 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
     refuse(
         "recording/contradicts-option",
         format!("{what} gives the directions of its axes"),
-        "leave --axes and signs of --scale away",
+        "omit --axes and the signs of --scale",
     )
 }
 
-/// Refuses to turn a height over that is up by the name of its column.
+/// Refuses a mapping that changes the direction of a height column.
 pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Result<(), Fault> {
     if options.turn().keeps_up() {
         return Ok(());
     }
     let problem =
-        format!("column {} says by its name which way is up, and --axes or --scale another way", quoted(column));
-    let remedy = format!("leave z as it is there, or have the numbers taken as they are with --column z={column}");
+        format!("column {} is a height by its name, but --axes or --scale change its direction", quoted(column));
+    let remedy = format!("keep z in --axes and --scale, or take the numbers as z with --column z={column}");
     refuse("recording/contradicts-option", problem, remedy)
 }
 
-struct Turned {
+struct MappedRecording {
     recording: Recording,
     axes: Axes,
     metadata: Metadata,
 }
 
-impl Tracks for Turned {
+impl Tracks for MappedRecording {
     type Error = ReadError;
 
     fn vehicles(&self) -> &[String] {
@@ -199,12 +199,8 @@ impl Tracks for Turned {
             match item {
                 Item::Sample(sample) => {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
-                        let problem = "its axes are scaled by different numbers, and vehicles have a radius";
-                        return refuse(
-                            "recording/contradicts-option",
-                            problem,
-                            "give one number of metres with --scale",
-                        );
+                        let problem = "--scale has different factors for its axes, but vehicles have a radius";
+                        return refuse("recording/contradicts-option", problem, "give one factor in --scale");
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
@@ -225,39 +221,38 @@ impl Tracks for Turned {
     }
 }
 
-/// The remedy for positions that are relative to a place of each vehicle.
-pub(super) const GLOBAL: &str =
-    "give vehicle_global_position in its place: its lat, lon and alt are measured from one place for all vehicles";
+/// Remedy for positions with a separate origin per vehicle.
+pub(super) const GLOBAL: &str = "use vehicle_global_position: its lat, lon and alt have one origin for all vehicles";
 
-/// What stands between the words of a name.
+/// Separators of words in a name.
 const SEPARATORS: [char; 4] = ['_', '.', '/', ' '];
 
-/// Words that name a frame. Others of such letters are words of English, such as `end`.
+/// Words that name a frame. Other combinations of such letters are English words, such as `end`.
 const FRAMES: [&str; 5] = ["enu", "ned", "nwu", "seu", "eus"];
 
-/// What the set of columns of a table says.
+/// Frame and program recognised by the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Convention {
-    /// The names of the columns as any other table has them.
+    /// Column names, converted to those of x, y and z.
     pub(super) header: Vec<String>,
-    /// What the numbers of each column are multiplied by: -1 where an axis points the other way.
+    /// Sign of each column: -1 for an axis in the opposite direction.
     pub(super) signs: Vec<f64>,
-    /// Columns that lie along an axis of known direction.
+    /// Columns along an axis of known direction.
     pub(super) directed: BTreeSet<usize>,
-    /// Columns of latitude, longitude and height of the place that positions are measured from.
+    /// Columns of latitude, longitude and height of the origin of positions.
     pub(super) reference: Option<[usize; 3]>,
-    /// Columns that hold 0 where the position is not known.
+    /// Columns that hold 0 if the position is unknown.
     pub(super) valid: Vec<usize>,
-    /// Whether times count from the start of each vehicle's computer, in microseconds.
+    /// Whether times count from the start of each vehicle's computer \[us\].
     pub(super) counts_from_boot: bool,
-    /// Whether the table is of one vehicle, whatever other columns it has.
+    /// Whether the table has one vehicle, whatever other columns it has.
     pub(super) is_one_vehicle: bool,
-    /// What a person should know.
+    /// Note for the user.
     pub(super) note: Option<String>,
 }
 
 impl Convention {
-    /// What these columns say. Nothing beside the names themselves where the user names columns of positions.
+    /// Recognises the convention of these columns. Position columns named by the user disable recognition.
     pub(super) fn of(header: &[String], options: &ReadOptions) -> Result<Self, Fault> {
         let plain = Self { header: header.to_vec(), signs: vec![1.0; header.len()], ..Self::default() };
         let is_place = |role: usize| !matches!(ColumnNames::ROLES[role], "t" | "id" | "radius");
@@ -274,12 +269,12 @@ impl Convention {
         Ok(found.unwrap_or(plain))
     }
 
-    /// Whether the directions of axes are known.
+    /// Returns whether the directions of axes are known.
     pub(super) fn has_directions(&self) -> bool {
         !self.directed.is_empty()
     }
 
-    /// Gives a column that lies along an axis of these its name, with what the name has before and behind the axis.
+    /// Renames a column along a directed axis to x, y or z, keeping the text before and after the axis.
     fn turn(&mut self, column: usize, axes: &Axes, axis: usize, [before, behind]: [&str; 2]) {
         let (to, sign) = axes.of(axis);
         self.header[column] = format!("{before}{}{behind}", ["x", "y", "z"][to]);
@@ -287,7 +282,7 @@ impl Convention {
         self.directed.insert(column);
     }
 
-    /// Turns the columns of this start and an axis, such as `vx`.
+    /// Renames the columns that consist of this prefix and an axis, such as `vx`.
     fn turn_all(&mut self, lower: &[String], start: &str, axes: &Axes) {
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
             let named = lower.iter().enumerate().filter(|(_, name)| name.strip_prefix(start) == Some(letter));
@@ -303,7 +298,7 @@ impl Convention {
             return Ok(None);
         };
         let Some(alt) = at("ref_alt") else {
-            let problem = "its positions are relative to `ref_lat` and `ref_lon`, and there is no column `ref_alt`";
+            let problem = "its positions are relative to `ref_lat` and `ref_lon`, but there is no column `ref_alt`";
             return refuse("recording/missing-column", problem, GLOBAL);
         };
         let mut px4 = self.clone();
@@ -314,7 +309,7 @@ impl Convention {
         px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(at).collect();
         px4.counts_from_boot = at("timestamp").is_some();
         px4.is_one_vehicle = true;
-        let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt`, as PX4 writes them";
+        let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt` (PX4)";
         let clock = "; times count from the start of the vehicle's computer";
         px4.note = Some(format!("{what}{}", if px4.counts_from_boot { clock } else { "" }));
         Ok(Some(px4))
@@ -330,7 +325,7 @@ impl Convention {
             show.turn_all(lower, start, &ned());
         }
         show.is_one_vehicle = true;
-        show.note = Some("positions are north, east and down, as MAVSDK Drone Show writes them".to_owned());
+        show.note = Some("positions are north, east and down (MAVSDK Drone Show)".to_owned());
         Some(show)
     }
 
@@ -349,7 +344,7 @@ impl Convention {
         Some(truth)
     }
 
-    /// Columns that are called by directions.
+    /// Recognises columns named by directions.
     fn of_directions(&self, lower: &[String]) -> Option<Self> {
         let mut turned = self.clone();
         // `x_ned`, `ned_x`, `cf1.vx_ned [m/s]`.
@@ -384,7 +379,7 @@ impl Convention {
         if !turned.has_directions() {
             return None;
         }
-        turned.note = Some("positions are turned to east, north and up, as the names of columns say".to_owned());
+        turned.note = Some("positions are converted to east, north and up, by the names of columns".to_owned());
         Some(turned)
     }
 }
@@ -393,7 +388,7 @@ fn ned() -> Axes {
     Axes::from_name("ned").unwrap_or_default()
 }
 
-/// A name without the unit at its end, and this end as it is written.
+/// Splits a name into the part before its unit and the unit as written.
 fn without_unit(name: &str) -> (&str, &str) {
     let name = name.trim();
     let stem = match heading::bracketed(name) {
@@ -403,16 +398,16 @@ fn without_unit(name: &str) -> (&str, &str) {
     name.split_at(stem.len())
 }
 
-/// A name without the word that says a frame, and the axes of that.
+/// Removes the word that names a frame; returns the rest and the axes of the frame.
 fn without_frame(stem: &str) -> Option<(String, Axes)> {
     let lower = stem.to_lowercase();
-    // A name that changes its length in lower case is none of ours.
+    // A name whose length changes in lower case contains no known word.
     let words = lower.split(SEPARATORS).filter(|_| lower.len() == stem.len());
     let (at, word, axes) = words
         .map(|word| (word.as_ptr() as usize - lower.as_ptr() as usize, word))
         .find_map(|(at, word)| Some((at, word, Axes::from_name(word).filter(|_| FRAMES.contains(&word))?)))?;
     let (before, behind) = (&stem[..at], &stem[at + word.len()..]);
-    // One of the two separators around it goes with it.
+    // One of the two separators around the word is removed too.
     let rest = if behind.is_empty() {
         before.strip_suffix(SEPARATORS)?.to_owned()
     } else {
@@ -421,13 +416,13 @@ fn without_frame(stem: &str) -> Option<(String, Axes)> {
     (!rest.is_empty()).then_some((rest, axes))
 }
 
-/// A column that is called by a direction.
+/// Column named by a direction.
 #[derive(Debug, PartialEq)]
 struct Direction<'a> {
-    /// What stands before the quantity, with its separator.
+    /// Text before the quantity, with its separator.
     vehicle: &'a str,
     is_velocity: bool,
-    /// East, north or up.
+    /// 0 for east, 1 for north, 2 for up.
     axis: usize,
     sign: f64,
     is_letter: bool,
@@ -460,13 +455,13 @@ impl<'a> Direction<'a> {
                 None => (true, true, by_velocity()?),
             },
         };
-        // The quantity before it: `vel_n`, `position_east`.
+        // Quantity before the direction: `vel_n`, `position_east`.
         let quantity = before.trim_end_matches(SEPARATORS);
         let start = quantity.rfind(SEPARATORS).map_or(0, |at| at + 1);
         match quantity[start..].to_lowercase().as_str() {
             "v" | "vel" | "velocity" => (is_velocity, before) = (true, &before[..start]),
             "p" | "pos" | "position" => before = &before[..start],
-            // A letter alone behind the name of anything may be anything.
+            // A single letter after another name is ambiguous.
             _ if is_letter && !quantity.is_empty() => return None,
             _ => {}
         }
@@ -481,7 +476,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn axes_are_read_by_direction_and_by_place() {
+    fn axes_are_parsed_by_direction_and_by_position() {
         let file = vector![1.0, 2.0, 3.0];
         for (name, expected) in [
             ("enu", [1.0, 2.0, 3.0]),
@@ -501,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_is_of_the_axes_of_the_recording() {
+    fn scale_applies_to_the_axes_of_the_recording() {
         let ned = Axes::from_name("ned").expect("axes");
         assert_eq!(ned.scaled([2.0, 1.0, -1.0]).turn(vector![1.0, 2.0, 3.0]).as_slice(), [2.0, 2.0, 3.0]);
         assert!(
@@ -516,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_say_a_frame_are_turned() {
+    fn columns_with_a_frame_are_converted() {
         for (header, expected, signs) in [
             ("t,north,east,down", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
             ("t,n,e,d", "t,y,x,z", [1.0, 1.0, 1.0, -1.0]),
@@ -538,7 +533,7 @@ mod tests {
     }
 
     #[test]
-    fn other_names_stay() {
+    fn other_columns_are_unchanged() {
         for header in [
             "t,x,y,z",
             "t,x,y,up",

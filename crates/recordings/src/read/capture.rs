@@ -1,7 +1,7 @@
-//! CSV exports of motion capture: takes of `OptiTrack` Motive, and of Vicon Nexus and Tracker. Rows follow a head of several
-//! lines. A vehicle has one or several markers.
+//! Reads motion capture takes in CSV: `OptiTrack` Motive, and Vicon Nexus and Tracker. Rows follow a head of several
+//! lines; a vehicle has one or several markers.
 //!
-//! An export of Vicon has sections, each with a rate, names, axes and units above its rows:
+//! A Vicon export has sections, each with a rate, names, axes and units above its rows:
 //!
 //! ```text
 //! Trajectories
@@ -12,11 +12,12 @@
 //! 1,0,102.5,-3.1,955.0,82.5,-3.0,955.1
 //! ```
 //!
-//! Objects have translations (`TX`, `TY`, `TZ`) beside their rotations. A section with translations is read if the file has
-//! one, else the trajectories of markers.
+//! Objects have translations (`TX`, `TY`, `TZ`) and rotations. A section with translations is read if there is one,
+//! else the trajectories of markers.
 //!
-//! The first line of a take of Motive gives the unit of length. Some five lines name the columns: type, name, ID, perhaps the
-//! parent, the quantity (`Position`) and its axis. The y axis is up. Rigid bodies are read, or markers where there are none.
+//! The first line of a Motive take gives the unit of length. About five lines name the columns: type, name, ID,
+//! optionally the parent, the quantity (`Position`) and its axis. The y axis is up. Rigid bodies are read, or markers
+//! otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::str;
@@ -27,45 +28,45 @@ use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 
-/// Time of a row.
+/// Source of the time of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
-    /// In a column \[s\].
+    /// A column \[s\].
     Column(usize),
-    /// The first column counts frames at this rate \[Hz\]; the second column counts parts of frames.
+    /// Frame numbers in the first column, at this rate \[Hz\]; the second column counts subframes.
     Frames(f64),
 }
 
-/// A vehicle, with the columns x, y and z of its markers.
+/// Vehicle with the columns x, y and z of its markers.
 type Marked = (String, Vec<[usize; 3]>);
 
-/// Columns of a table.
+/// Columns of a take.
 struct Capture {
-    /// The line of the first row, from 1.
+    /// First line with a row, from 1.
     first_line: u64,
     when: When,
-    /// Vehicles, each with the columns x, y and z of its markers: its place is the middle of these.
+    /// Vehicles with their marker columns; the position of a vehicle is the mean of its markers.
     vehicles: Vec<Marked>,
-    /// The length of a unit \[m\].
+    /// Length of a unit \[m\].
     metres: f64,
     /// Whether y is up, x right and z backwards.
     y_up: bool,
     notes: Vec<String>,
 }
 
-/// Groups the columns of markers by what is before the colon of their names: these are on one vehicle. Two markers of one
-/// name are refused: their middle would be where neither is.
+/// Groups markers into vehicles by the name before the colon. Two markers with one name are refused, because their mean
+/// has no meaning.
 fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> {
     let mut vehicles: Vec<Marked> = Vec::new();
     let (mut known, mut names) = (BTreeMap::new(), BTreeSet::new());
     for (name, columns) in markers {
         if !names.insert(name.clone()) {
-            let problem = format!("two markers are called {}", quoted(&name));
-            return refuse("recording/vehicle-twice", problem, "give each a name of its own, and export it again");
+            let problem = format!("two markers have the name {}", quoted(&name));
+            return refuse("recording/vehicle-twice", problem, "give each marker its own name, and export again");
         }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
         let at = *known.entry(subject.clone()).or_insert(vehicles.len());
@@ -77,36 +78,36 @@ fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> 
     Ok(vehicles)
 }
 
-/// Names that are not read, a few of them by name.
+/// Returns the note on names that are not read, with the first few names.
 fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Option<String> {
     const LISTED: usize = 8;
     let others: BTreeSet<_> = others.collect();
     let more = others.len().saturating_sub(LISTED);
     let listed = others.iter().take(LISTED).copied().collect::<Vec<_>>().join(", ");
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    (!others.is_empty()).then(|| format!("not read, {why}: {listed}{more}"))
+    (!others.is_empty()).then(|| format!("not read, as {why}: {listed}{more}"))
 }
 
-/// Which vehicles are the middle of several markers.
+/// Returns the note on vehicles with several markers.
 fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
     let several = vehicles.iter().filter(|(_, markers)| markers.len() > 1);
     let several: Vec<_> = several.map(|(name, markers)| format!("{name} ({})", markers.len())).collect();
-    let what = "the middle of markers, where all of them are seen, is the place of";
+    let what = "the position is the mean of the markers, if all of them are seen, for";
     (!several.is_empty()).then(|| format!("{what} {}", several.join(", ")))
 }
 
-/// Opens a table with these columns.
+/// Opens a take with these columns.
 fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.metres() != 1.0 {
-        let problem = format!("it says its unit of length, and --scale {} another", options.metres());
-        return refuse("recording/contradicts-option", problem, "leave --scale away");
+        let problem = format!("it has a unit of length, which contradicts --scale {}", options.metres());
+        return refuse("recording/contradicts-option", problem, "omit --scale");
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
-    let (said, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
-    let about = About::new(source, options, said, notes, Fault::header_only());
+    let (unit, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
+    let info = RecordingInfo::new(source, options, unit, notes, Fault::header_only());
     let mut lines = Lines::new(source)?;
     while lines.number() + 1 < capture.first_line && lines.advance()? {}
-    Ok(Box::new(Ordered::open(Table { capture, names, lines, ended: false }, about)?))
+    Ok(Box::new(Ordered::open(Table { capture, names, lines, ended: false }, info)?))
 }
 
 struct Table {
@@ -136,8 +137,8 @@ impl Table {
             When::Column(column) => needed(column).map(Stamp::Real),
             When::Frames(rate) => {
                 if let Some(part) = number(cells, 1)?.filter(|part| *part != 0.0) {
-                    let problem = format!("it is part {part} of a frame");
-                    return refuse("recording/frame-rate", problem, "export trajectories at the rate of the cameras");
+                    let problem = format!("it is subframe {part}");
+                    return refuse("recording/frame-rate", problem, "export trajectories at the camera rate");
                 }
                 Ok(Stamp::Real(needed(0)? / rate))
             }
@@ -145,7 +146,7 @@ impl Table {
     }
 }
 
-/// The middle of some markers; none where one of them is not seen.
+/// Returns the mean of the markers; `None` if one of them is not seen.
 fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>>, Fault> {
     let mut sum = Vector3::zeros();
     for columns in markers {
@@ -162,14 +163,14 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
     Ok(Some(if markers.len() > 1 { sum / markers.len() as f64 } else { sum }))
 }
 
-/// The number in a cell; none where it is empty.
+/// Returns the number in a cell; `None` for an empty cell.
 fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
-        let problem = format!("it has {} fields, and field {} belongs to a vehicle", cells.len(), column + 1);
+        let problem = format!("it has {} fields, but field {} belongs to a vehicle", cells.len(), column + 1);
         return refuse(
             "recording/field-count",
             problem,
-            "every line needs a field for each column; a marker that is lost has empty ones",
+            "every line needs one field per column; the fields of a lost marker are empty",
         );
     };
     let text = str::from_utf8(cell).map_err(|_| Fault::NotUtf8)?;
@@ -179,13 +180,13 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
         Ok(_) => Err(Fault::not_finite(&(column + 1).to_string(), text, UNSEEN)),
         Err(_) => {
             let problem = format!("column `{}` holds {}, which is not a number", column + 1, quoted(text));
-            refuse("recording/not-a-number", problem, "export it again, with numbers that have a decimal point")
+            refuse("recording/not-a-number", problem, "export again, with decimal points")
         }
     }
 }
 
 impl Rows for Table {
-    /// A table ends with the file, or with a line that is blank.
+    /// The table ends with the file, or at a blank line.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let before = rows.len();
         while rows.len() < before + BATCH && !self.ended {
@@ -216,20 +217,20 @@ pub(super) const MOTIVE: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
     open: open_motive,
-    takes: &[Takes::Rows],
+    supports: &[FormatOption::Rows],
     packing: Packing::Any,
 };
 
-/// Lines among which those that name the columns are.
+/// Number of lines in which the column names must occur.
 const HEAD_LINES: u64 = 20;
 
 const EXPORT: &str = "export the take again as CSV, with header information and positions";
 
-/// The lines that name the columns.
+/// Lines with the column names.
 #[derive(Default)]
 struct MotiveHead {
-    /// What the first line says: names and values by turns.
-    said: Vec<String>,
+    /// First line: alternating names and values.
+    header: Vec<String>,
     types: Vec<String>,
     names: Vec<String>,
     measures: Vec<String>,
@@ -237,7 +238,7 @@ struct MotiveHead {
     first_line: u64,
 }
 
-/// Opens a take.
+/// Opens a Motive take.
 fn open_motive(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let head = MotiveHead::read(source)?;
     let capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
@@ -253,7 +254,7 @@ impl MotiveHead {
             let text = std::str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(Place::Line(lines.number())))?;
             let cells: Vec<String> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
             match (lines.number(), cells.first().map(String::as_str), cells.get(1).map(String::as_str)) {
-                (1, ..) => head.said = cells,
+                (1, ..) => head.header = cells,
                 (_, Some("Frame"), _) => {
                     (head.axes, head.measures, head.first_line) = (cells, before, lines.number() + 1);
                     return Ok(head);
@@ -263,30 +264,29 @@ impl MotiveHead {
                 _ => before = cells,
             }
         }
-        Err(Fault::Truncated("the lines that name the columns are missing".to_owned()).into())
+        Err(Fault::Truncated("the lines with the column names are missing".to_owned()).into())
     }
 
-    /// What the first line says of something.
-    fn said(&self, what: &str) -> Option<&str> {
-        self.said.iter().position(|said| said == what).and_then(|at| self.said.get(at + 1)).map(String::as_str)
+    /// Returns the value of a name in the first line.
+    fn header_value(&self, what: &str) -> Option<&str> {
+        self.header.iter().position(|name| name == what).and_then(|at| self.header.get(at + 1)).map(String::as_str)
     }
 
     fn capture(&self) -> Result<Capture, Fault> {
-        let unit = self.said("Length Units").unwrap_or_default();
+        let unit = self.header_value("Length Units").unwrap_or_default();
         let metres = heading::size_of(unit, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
-                format!("its unit of length is not known: {}", quoted(unit)),
+                format!("unknown unit of length {}", quoted(unit)),
                 "export it in metres",
             )
         })?;
-        if let Some(space) = self.said("Coordinate Space").filter(|space| *space != "Global") {
-            let problem = format!("its places are given in the space {}", quoted(space));
+        if let Some(space) = self.header_value("Coordinate Space").filter(|space| *space != "Global") {
+            let problem = format!("its coordinate space is {}", quoted(space));
             return refuse("recording/unusable-frame", problem, "export it in global coordinates");
         }
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
-        let time =
-            time.ok_or_else(|| Fault::coded("recording/no-time-column", "there is no column of time", EXPORT))?;
+        let time = time.ok_or_else(|| Fault::coded("recording/no-time-column", "no column gives the time", EXPORT))?;
         let bodies = self.positions("Rigid Body");
         let has_bodies = !bodies.is_empty();
         let vehicles = if has_bodies {
@@ -297,29 +297,25 @@ impl MotiveHead {
         if vehicles.is_empty() {
             return refuse(
                 "recording/no-positions",
-                "it has neither the position of a rigid body nor of a labelled marker",
+                "it has neither a rigid body nor a labelled marker with positions",
                 EXPORT,
             );
         }
         let mut known = BTreeSet::new();
         if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
-            let problem = format!("two rigid bodies are called {}", quoted(name));
-            return refuse(
-                "recording/vehicle-twice",
-                problem,
-                "give each a name of its own, and export the take again",
-            );
+            let problem = format!("two rigid bodies have the name {}", quoted(name));
+            return refuse("recording/vehicle-twice", problem, "give each rigid body its own name, and export again");
         }
-        let mut notes = vec!["axes of Motive, y up, are turned: x, -z, y".to_owned()];
+        let mut notes = vec!["axes of Motive, with y up, are mapped to x, -z, y".to_owned()];
         notes.extend(note_of_markers(&vehicles));
         let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
         let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));
-        let why = if has_bodies { "being no rigid bodies" } else { "being no labelled markers" };
+        let why = if has_bodies { "they are not rigid bodies" } else { "they are not labelled markers" };
         notes.extend(note_of_others(why, others));
         Ok(Capture { first_line: self.first_line, when: When::Column(time), vehicles, metres, y_up: true, notes })
     }
 
-    /// The columns of the positions of things of a type.
+    /// Returns the position columns of all items of a type.
     fn positions(&self, wanted: &str) -> Vec<(String, [usize; 3])> {
         let is = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
         let starts = (2..self.axes.len()).filter(|&column| {
@@ -342,18 +338,18 @@ pub(super) const VICON: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(is_export),
     open: open_vicon,
-    takes: &[Takes::Rows, Takes::Axes],
+    supports: &[FormatOption::Rows, FormatOption::Axes],
     packing: Packing::Any,
 };
 
-/// Names that a first section has.
+/// Names of the first section of an export.
 const SECTIONS: [&str; 9] =
     ["Trajectories", "Objects", "Object", "Segments", "Model Outputs", "Devices", "Events", "Joints", "Global Angle"];
 
-/// The section of markers.
+/// Name of the section with markers.
 const MARKERS: &str = "Trajectories";
 
-/// Whether a text begins as an export does: a section, and its rate.
+/// Returns whether a text begins with a section name and a rate.
 fn is_export(text: &[u8]) -> bool {
     let mut lines = text.split(|&byte| byte == b'\n').map(cells);
     let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
@@ -361,7 +357,7 @@ fn is_export(text: &[u8]) -> bool {
     first.first().is_some_and(|name| SECTIONS.contains(&name.as_str())) && rate.is_some()
 }
 
-/// The cells of a line without empty ones at its end.
+/// Splits a line into cells, without empty ones at its end.
 fn cells(line: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(line);
     let mut cells: Vec<_> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
@@ -369,7 +365,7 @@ fn cells(line: &[u8]) -> Vec<String> {
     cells
 }
 
-/// The lines above the rows of a section.
+/// Head of a section.
 struct ViconSection {
     section: String,
     rate: String,
@@ -379,13 +375,13 @@ struct ViconSection {
     first_line: u64,
 }
 
-/// Opens an export.
+/// Opens a Vicon export.
 fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let heads = heads(source)?;
     let objects = heads.iter().find(|head| head.axes.iter().any(|axis| axis == "TX"));
     let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
-        let problem = format!("it has neither objects nor trajectories, but {}", sections.join(", "));
+        let problem = format!("it has neither objects nor trajectories; its sections are {}", sections.join(", "));
         return refuse(
             "recording/no-positions",
             problem,
@@ -397,7 +393,7 @@ fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadE
     let others = heads.iter().filter(|other| other.first_line != head.first_line).flat_map(|other| &other.names);
     let others =
         others.map(|name| subject(name)).filter(|name| !name.is_empty() && !name.starts_with('*') && !read(name));
-    let note = note_of_others(&format!("beside those of the section {}", head.section), others);
+    let note = note_of_others(&format!("they are outside the section {}", head.section), others);
     capture.notes.extend(note);
     open(source, capture, options)
 }
@@ -407,7 +403,7 @@ fn subject(name: &str) -> &str {
     name.split(':').next().unwrap_or_default()
 }
 
-/// The heads of all sections: behind a blank line, or at the begin.
+/// Reads the heads of all sections, which follow a blank line or begin the file.
 fn heads(source: &Source) -> Result<Vec<ViconSection>, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut heads, mut blank) = (Vec::new(), true);
@@ -430,7 +426,7 @@ fn heads(source: &Source) -> Result<Vec<ViconSection>, ReadError> {
         }
     }
     if heads.is_empty() {
-        return Err(Fault::Truncated("the lines that name the columns are missing".to_owned()).into());
+        return Err(Fault::Truncated("the lines with the column names are missing".to_owned()).into());
     }
     Ok(heads)
 }
@@ -439,11 +435,11 @@ impl ViconSection {
     fn capture(&self) -> Result<Capture, Fault> {
         let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
         let rate = rate.ok_or_else(|| {
-            let problem = format!("the rate of {} is {}", self.section, quoted(&self.rate));
+            let problem = format!("the rate of {} must be a positive number, got {}", self.section, quoted(&self.rate));
             Fault::coded(
                 "recording/frame-rate",
                 problem,
-                "export it again: the second line of a section says how many frames a second has",
+                "export again: the second line of a section gives the number of frames per second",
             )
         })?;
         let is_objects = self.axes.iter().any(|axis| axis == "TX");
@@ -454,8 +450,8 @@ impl ViconSection {
         if vehicles.is_empty() {
             return refuse(
                 "recording/no-positions",
-                "it names no marker and no object",
-                "export it again, with labelled trajectories",
+                "it has no named marker and no object",
+                "export again, with labelled trajectories",
             );
         }
         if is_objects && vehicles.len() < parts {
@@ -464,7 +460,7 @@ impl ViconSection {
             return refuse(
                 "recording/ambiguous-column",
                 problem,
-                "export objects of one segment each, or the trajectories of markers",
+                "export objects with one segment each, or the trajectories of markers",
             );
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
@@ -472,7 +468,7 @@ impl ViconSection {
         Ok(Capture { first_line: self.first_line, when, vehicles, metres, y_up: false, notes })
     }
 
-    /// The columns of each name that has these axes.
+    /// Returns the columns of each name that has these axes.
     fn markers(&self, axes: [&str; 3]) -> Vec<(String, [usize; 3])> {
         let named: Vec<_> = (2..self.names.len()).filter(|&column| !self.names[column].is_empty()).collect();
         let ends = named.iter().skip(1).copied().chain([self.axes.len()]);
@@ -483,19 +479,19 @@ impl ViconSection {
         named.iter().zip(ends).filter_map(columns).filter(|(name, _)| !name.starts_with('*')).collect()
     }
 
-    /// The length of the unit that all columns of places have.
+    /// Returns the length of the unit of all position columns \[m\].
     fn metres(&self, markers: &[(String, [usize; 3])]) -> Result<f64, Fault> {
         let mut units = markers.iter().flat_map(|(_, columns)| columns).map(|&column| self.units.get(column));
         let first = units.next().flatten().map_or("", String::as_str);
         if let Some(other) = units.find(|unit| unit.map_or("", |unit| unit.as_str()) != first) {
             let problem =
-                format!("some of its places are in {} and some in {}", quoted(first), quoted(other.map_or("", |u| u)));
-            return refuse("recording/unit-conflict", problem, "export all in millimetres");
+                format!("positions have different units: {} and {}", quoted(first), quoted(other.map_or("", |u| u)));
+            return refuse("recording/unit-conflict", problem, "export all positions in millimetres");
         }
         heading::size_of(first, false).ok_or_else(|| {
             Fault::coded(
                 "recording/unknown-unit",
-                format!("its unit of length is not known: {}", quoted(first)),
+                format!("unknown unit of length {}", quoted(first)),
                 "export it in millimetres",
             )
         })

@@ -1,4 +1,4 @@
-//! Times and dates as a recording writes them, the columns that hold them, and the clock that converts them to seconds.
+//! Parses times and dates, finds their columns, and converts them to seconds.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -10,23 +10,22 @@ use super::heading;
 use super::options::ReadOptions;
 use tautline_core::track::Clock;
 
-/// From this distance to zero on, a clock is counted from an epoch \[s\]: there doubles are coarser than 0.1 ns.
+/// Distance from zero from which a clock is counted from an epoch \[s\]: doubles are coarser than 0.1 ns there.
 const EPOCH_FROM_S: f64 = 1e6;
 
-/// Longest step that times of the size of those since 1970 have \[s\]; where it is longer, the size is that of a clock
-/// which counts smaller units from somewhere else.
+/// Longest step of times taken as times since 1970 \[s\]. A longer step means smaller units from another zero.
 const LONGEST_STEP_S: f64 = 1e3;
 
-/// Why whole numbers are taken as a unit shorter than a second.
+/// Reason for inferring a unit shorter than a second from whole numbers.
 const BY_STEPS: &str = "because they are whole numbers with steps of that size";
 
-/// From here on the whole part of a double is no longer looked at: it may not fit into 64 bits.
+/// Limit of the whole part of a double, below the range of 64 bits.
 const TOP: f64 = 9.3e18;
 
-/// Decimals that a [`Stamp::Fixed`] keeps.
+/// Number of decimals of a [`Stamp::Fixed`].
 const DECIMALS: usize = 18;
 
-/// A unit of time.
+/// Unit of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimeUnit {
     /// s.
@@ -43,7 +42,7 @@ impl TimeUnit {
     /// All units, the longest first.
     pub const ALL: [Self; 4] = [Self::Seconds, Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
 
-    /// What it is called, the usual name first, and how many make a second.
+    /// Returns the names, the usual one first, and the number of units per second.
     const fn names(self) -> (&'static [&'static str], i64) {
         match self {
             Self::Seconds => (&["s", "sec", "secs", "second", "seconds"], 1),
@@ -60,41 +59,41 @@ impl TimeUnit {
         }
     }
 
-    /// `s`, `ms`, `us` or `ns`.
+    /// Returns `s`, `ms`, `us` or `ns`.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.names().0[0]
     }
 
-    /// The unit of this name.
+    /// Returns the unit with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|unit| unit.names().0.contains(&name))
     }
 
-    /// How many make a second.
+    /// Returns the number of units per second.
     pub(super) fn per_second(self) -> i64 {
         self.names().1
     }
 }
 
-/// A time as it is written, in the unit of the recording and exact.
+/// Exact time in the unit of the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Stamp {
-    /// A whole number of units.
+    /// Whole number of units.
     Whole(i64),
-    /// A number whose double is exact enough.
+    /// Number that a double represents accurately enough.
     Real(f64),
-    /// A positive decimal number too long for a double: whole units and units of 10^-18.
+    /// Positive decimal number too long for a double: whole units and units of 10^-18.
     Fixed { whole: i64, decimals: u64 },
 }
 
 impl Stamp {
-    /// Reads a time; none where it is not a number. The result may be infinite or NaN.
+    /// Parses a time; `None` if the text is not a number. The result may be infinite or NaN.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
         if let Some((whole, fraction)) = text.split_once('.') {
-            // From seven digits on the text tells more than a double of it.
+            // From seven digits on, a double loses decimals of the text.
             if whole.len() >= 7 && digits(whole) && digits(fraction) && fraction.len() <= DECIMALS {
                 let decimals = fraction.bytes().chain(std::iter::repeat(b'0')).take(DECIMALS);
                 let decimals = decimals.fold(0, |sum: u64, digit| 10 * sum + u64::from(digit - b'0'));
@@ -108,9 +107,9 @@ impl Stamp {
         text.parse().ok().map(Self::Real)
     }
 
-    /// The whole number that it is; none where it has a part below one.
+    /// Returns the time as a whole number; `None` if it has a fraction.
     pub(super) fn whole(self) -> Option<i64> {
-        /// Doubles below it are exact to the last unit.
+        /// Limit below which doubles represent whole numbers exactly.
         const EXACT: f64 = 9_007_199_254_740_992.0;
         match self {
             Self::Whole(whole) | Self::Fixed { whole, decimals: 0 } => Some(whole),
@@ -120,7 +119,7 @@ impl Stamp {
         }
     }
 
-    /// The nearest double \[units\].
+    /// Returns the nearest double \[units\].
     pub(super) fn approximately(self) -> f64 {
         match self {
             Self::Whole(whole) => whole as f64,
@@ -129,7 +128,7 @@ impl Stamp {
         }
     }
 
-    /// A total order, also of times that are written in different ways.
+    /// Total order, also between different variants.
     pub(super) fn compare(self, other: Self) -> Ordering {
         match (self, other) {
             (Self::Whole(a), Self::Whole(b)) => a.cmp(&b),
@@ -141,7 +140,7 @@ impl Stamp {
         }
     }
 
-    /// The largest whole number that is not above it, and what is left in units of 10^-18.
+    /// Returns the floor and the rest in units of 10^-18.
     fn digits(self) -> (i64, u64) {
         match self {
             Self::Whole(whole) => (whole, 0),
@@ -151,7 +150,7 @@ impl Stamp {
         }
     }
 
-    /// The difference to a whole number, rounded once \[units\].
+    /// Returns the difference to a whole number, rounded once \[units\].
     fn since(self, epoch: i64) -> f64 {
         match self {
             Self::Whole(whole) => (i128::from(whole) - i128::from(epoch)) as f64,
@@ -159,7 +158,7 @@ impl Stamp {
             Self::Real(real) => real - epoch as f64,
             Self::Fixed { whole, decimals } => match whole.checked_sub(epoch) {
                 Some(whole) if whole >= 0 => {
-                    // The decimal text of the difference, because only a parser rounds it correctly.
+                    // Parsing the decimal text of the difference rounds correctly.
                     let mut text = String::with_capacity(40);
                     let _ = write!(text, "{whole}.{decimals:018}");
                     text.parse().unwrap_or(f64::NAN)
@@ -170,7 +169,7 @@ impl Stamp {
     }
 }
 
-/// Smallest step of times that may be in milliseconds, since vehicles are recorded at most 500 times a second.
+/// Smallest step that may be in milliseconds: vehicles are recorded at most 500 times a second.
 const LONG_STEP: f64 = 2.0;
 
 /// Properties of the times of a recording.
@@ -182,9 +181,9 @@ pub(super) struct Probe {
     step: f64,
     /// Whether all times are written as whole numbers.
     whole: bool,
-    /// Whether all times are whole numbers, however they are written.
+    /// Whether all times are whole numbers in any notation.
     integral: bool,
-    /// Whether time never ran backwards.
+    /// Whether no time was smaller than the one before.
     pub(super) in_order: bool,
 }
 
@@ -209,13 +208,11 @@ impl Probe {
         self.last = stamp;
     }
 
-    /// The unit that times of this size and step are most likely in, and what speaks for it.
+    /// Returns the most likely unit for times of this size and step, the reason, and whether another unit fits as well.
     ///
-    /// The last part of the result is whether another unit fits as well, as for whole numbers and for long steps.
-    ///
-    /// Times of day since 1970 tell by their size, unless their step is too long for it. Other whole numbers tell by their
-    /// step: vehicles are recorded up to 500 times a second, and hardly ever every two seconds. Everything else is in
-    /// seconds.
+    /// Times since 1970 are recognised by size, unless their step is too long. Other whole numbers are recognised by
+    /// their step: vehicles are recorded up to 500 times a second, and rarely more slowly than every two seconds. All
+    /// other times are in seconds.
     fn likely_unit(&self) -> (TimeUnit, &'static str, bool) {
         let size = self.first.approximately();
         let by_size = TimeUnit::ALL.into_iter().find(|unit| {
@@ -227,28 +224,28 @@ impl Probe {
             return (unit, "because they are of the size of times since 1970", false);
         }
         let (unit, why) = match self.step {
-            step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "because nothing says otherwise"),
+            step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "which is the default"),
             step if step >= 1e6 => (TimeUnit::Nanoseconds, BY_STEPS),
             step if step >= 1e3 => (TimeUnit::Microseconds, BY_STEPS),
             step if step >= LONG_STEP => (TimeUnit::Milliseconds, BY_STEPS),
-            _ => (TimeUnit::Seconds, "because nothing says otherwise"),
+            _ => (TimeUnit::Seconds, "which is the default"),
         };
         // A long step in seconds may be a short step in a smaller unit.
         (unit, why, self.step.is_finite() && (self.integral || self.step >= LONG_STEP))
     }
 }
 
-/// Turns stamps into seconds.
+/// Converter of stamps to seconds.
 #[derive(Clone, Debug)]
 pub(super) struct Timing {
     pub(super) clock: Clock,
     per_second: f64,
-    /// Whole seconds in units.
+    /// Epoch: a whole number of seconds, in units.
     epoch: i64,
 }
 
 impl Timing {
-    /// A clock that fits what was seen, and a sentence where its unit is not known but inferred.
+    /// Returns a clock for the probed times, and a note if its unit was inferred.
     pub(super) fn settle(probe: &Probe, known: Option<TimeUnit>) -> (Self, Option<String>) {
         let inferred = || {
             let (unit, why, unsure) = probe.likely_unit();
@@ -256,8 +253,8 @@ impl Timing {
         };
         let (unit, why, by_steps) = known.map_or_else(inferred, |unit| (unit, None, false));
         let name = unit.name();
-        let note =
-            why.map(|why| format!("times carry no unit and are taken as {name}, {why} (--time-unit {name} says so)"));
+        let note = why
+            .map(|why| format!("times carry no unit and are taken as {name}, {why} (confirm with --time-unit {name})"));
         let per_second = unit.per_second();
         let seconds = probe.first.digits().0.div_euclid(per_second);
         let fits = probe.first.approximately().abs() < TOP;
@@ -268,36 +265,37 @@ impl Timing {
         (Self { clock, per_second: per_second as f64, epoch }, note)
     }
 
-    /// Returns a clock with `per_second` units in a second.
+    /// Returns a clock with `per_second` units per second.
     pub(super) fn given(per_second: f64) -> Self {
         Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
     }
 
-    /// The longest time that a difference of two times may be \[s\]: where the unit is a guess, the numbers may be seconds.
+    /// Returns the longest duration that a difference of times can mean \[s\]: with a guessed unit, the numbers may be
+    /// seconds.
     pub(super) fn longest_s(&self, difference_s: f64) -> f64 {
         if self.clock.by_steps { difference_s * self.per_second } else { difference_s }
     }
 
-    /// Seconds since the epoch.
+    /// Returns the seconds since the epoch.
     pub(super) fn seconds(&self, stamp: Stamp) -> f64 {
         stamp.since(self.epoch) / self.per_second
     }
 }
 
-/// An instant, and whether the text says its zone.
+/// Instant, and whether its text has a time zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Date {
-    /// Since 1970 \[ns\]; of a text without a zone as if that were UTC.
+    /// Time since 1970 \[ns\]; a text without a zone counts as UTC.
     pub(super) since_1970_ns: i64,
     pub(super) has_zone: bool,
 }
 
 impl Date {
-    /// Reads a date with a time of day, `T` or a blank between the two, with or without a zone; none where it is none, or is
-    /// outside the years 1678 to 2261.
+    /// Parses a date with a time of day, separated by `T` or a blank, with or without a zone. Returns `None` for other
+    /// text and outside the years 1678 to 2261.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
-        // The shortest is `2023-11-14T22:13:20`.
+        // The shortest form is `2023-11-14T22:13:20`.
         let (day, of_day) = text.split_at_checked(10).filter(|(day, _)| day.as_bytes()[4] == b'-')?;
         let of_day = of_day.strip_prefix(['T', 't', ' '])?.replacen(',', ".", 1);
         let text = format!("{day}T{of_day}").replace('z', "Z");
@@ -310,21 +308,21 @@ impl Date {
     }
 }
 
-/// Words before the unit of a column that gives a part of a time, as in `header.stamp.nanosec`.
+/// Words before the unit of a column with a part of a time, as in `header.stamp.nanosec`.
 const CLOCK_WORDS: [&str; 8] = ["", "t", "time", "timestamp", "stamp", "header", "tv", "unix"];
 
-/// The rest of a time below a unit of its first column.
+/// Column with the remainder of a time, in a smaller unit than the first column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rest {
+pub(super) struct SubunitColumn {
     pub(super) column: usize,
-    /// How many units of this column make one of the first.
+    /// Number of units of this column per unit of the first.
     per_unit: i64,
-    /// The unit of this column, which is that of the two together.
+    /// Unit of this column and of the sum.
     pub(super) unit: TimeUnit,
 }
 
-impl Rest {
-    /// The time of a row, exact.
+impl SubunitColumn {
+    /// Returns the exact time of a row.
     pub(super) fn join(self, whole: Stamp, rest: Stamp, header: &[String], first: usize) -> Result<Stamp, Fault> {
         let (first, own) = (quoted(&header[first]), quoted(&header[self.column]));
         let problem = match (whole.whole(), rest.whole()) {
@@ -333,32 +331,35 @@ impl Rest {
                 return joined.map(Stamp::Whole).ok_or_else(Fault::out_of_range);
             }
             (Some(_), Some(below)) => {
-                format!("column {own} holds {below}, which is not the rest below a unit of {first}")
+                format!("column {own} holds {below}, which is not a remainder of a unit of {first}")
             }
             (None, _) => {
-                format!("column {first} holds {}, which is no whole number beside {own}", whole.approximately())
+                format!("column {first} holds {}, which must be whole beside {own}", whole.approximately())
             }
-            (_, None) => format!("column {own} holds {}, which is no whole number", rest.approximately()),
+            (_, None) => format!("column {own} holds {}, which is not a whole number", rest.approximately()),
         };
-        let remedy = "where one of the two is the whole time, name it with --column t=NAME";
+        let remedy = "if one of the two is the whole time, name it with --column t=NAME";
         refuse("recording/time-format", problem, remedy)
     }
 }
 
-/// A column that gives a time or a part of one.
+/// Column with a time or a part of a time.
 struct Candidate {
     column: usize,
-    /// What stands before the unit; empty where nothing does.
+    /// Name before the unit; empty for the unit alone.
     stem: String,
     unit: Option<TimeUnit>,
 }
 
-/// The columns of time of a header: the first, and that of the rest if there is one; none where nothing gives a time.
-pub(super) fn time_columns(header: &[String], options: &ReadOptions) -> Result<Option<(usize, Option<Rest>)>, Fault> {
+/// Returns the time column of a header, and the column of the remainder if there is one; `None` without a time.
+pub(super) fn time_columns(
+    header: &[String],
+    options: &ReadOptions,
+) -> Result<Option<(usize, Option<SubunitColumn>)>, Fault> {
     let mut candidates: Vec<_> =
         header.iter().enumerate().filter_map(|(column, name)| candidate(column, name)).collect();
     let is_whole_time = |candidate: &Candidate| heading::is_time(&header[candidate.column]);
-    // A part alone, such as `sec` or `ms`, is no time: what it is a part of is not known.
+    // A part alone, such as `sec` or `ms`, is not a time: the whole is unknown.
     if candidates.len() == 1 && !is_whole_time(&candidates[0]) {
         candidates.clear();
     }
@@ -371,11 +372,7 @@ pub(super) fn time_columns(header: &[String], options: &ReadOptions) -> Result<O
             if options.time_unit.is_some() || options.times_per_second.is_some() {
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
-                return refuse(
-                    "recording/contradicts-option",
-                    problem,
-                    "leave --time-unit, --fps and --time-scale away",
-                );
+                return refuse("recording/contradicts-option", problem, "omit --time-unit, --fps and --time-scale");
             }
             Ok(Some((whole.column, Some(rest))))
         }
@@ -383,7 +380,7 @@ pub(super) fn time_columns(header: &[String], options: &ReadOptions) -> Result<O
     }
 }
 
-/// Whether a column of this name gives a time or a part of one.
+/// Returns whether a column with this name gives a time or a part of a time.
 pub(super) fn is_part_of_time(name: &str) -> bool {
     candidate(0, name).is_some()
 }
@@ -394,34 +391,30 @@ fn candidate(column: usize, name: &str) -> Option<Candidate> {
     if heading::is_time(name) {
         return Some(Candidate { column, stem, unit: known });
     }
-    // `sec`, `tv_usec`, `header.stamp.nanosec`: the last word is a unit of more than one letter.
+    // In `sec`, `tv_usec` and `header.stamp.nanosec` the last word is a unit of more than one letter.
     let name = name.trim().to_lowercase();
     let (before, word) = name.rsplit_once(['.', '/', '_', ' ']).unwrap_or(("", &name));
     let unit = TimeUnit::from_name(word).filter(|_| word.len() > 1)?;
     let is_clock = before.rsplit(['.', '/', '_', ' ']).next().is_some_and(|word| CLOCK_WORDS.contains(&word));
-    // The same words of anything else, such as `flight_sec`, are durations.
+    // The same words after other names, such as `flight_sec`, are durations.
     is_clock.then(|| Candidate { column, stem: before.to_owned(), unit: Some(unit) })
 }
 
-/// How one column continues another one, where they may be the two parts of a time.
-fn split(whole: &Candidate, rest: &Candidate) -> Option<Rest> {
+/// Returns how `rest` continues `whole`, if they can be two parts of a time.
+fn split(whole: &Candidate, rest: &Candidate) -> Option<SubunitColumn> {
     let unit = rest.unit?;
     let per_unit = unit.per_second() / whole.unit.unwrap_or(TimeUnit::Seconds).per_second();
     let are_of_one = whole.stem == rest.stem || whole.stem.is_empty() || rest.stem.is_empty();
-    (are_of_one && per_unit > 1).then_some(Rest { column: rest.column, per_unit, unit })
+    (are_of_one && per_unit > 1).then_some(SubunitColumn { column: rest.column, per_unit, unit })
 }
 
 fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     let (first, second) = (quoted(&header[a.column]), quoted(&header[b.column]));
     let problem = format!("the columns {first} and {second} both give the time");
-    Fault::coded(
-        "recording/ambiguous-column",
-        problem,
-        "name the one that is meant with --column t=NAME, or take the other out",
-    )
+    Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
 }
 
-/// The unit that the name of a column of time says, where the user says nothing of it.
+/// Returns the unit in the name of a time column, unless the user gives the unit.
 pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
     if options.time_unit.is_some() || options.times_per_second.is_some() {
         return Ok(None);
@@ -429,13 +422,12 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     if heading::is_frame(name) {
         return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
     }
-    // `time (utc)` says a zone.
+    // `time (utc)` gives a zone, not a unit.
     let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
-    let Some(unit) = heading::said_unit(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
+    let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
-        let problem = format!("column {} says a unit of time that is not known, {}", quoted(name), quoted(&unit));
-        let remedy =
-            "say how many seconds it lasts with --time-scale, such as 60 for minutes, or what it is with --time-unit";
+        let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
+        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes, or name it with --time-unit";
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }
@@ -456,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_in_nanoseconds_loses_no_digit() {
+    fn nanosecond_clock_keeps_all_digits() {
         let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], None);
         assert_eq!(
             timing.clock,
@@ -467,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn decimal_seconds_since_1970_lose_no_digit() {
+    fn decimal_seconds_since_1970_keep_all_digits() {
         let (timing, _, seconds) = timing(&["1700000000.123456789", "1700000003.000000001"], None);
         assert_eq!((timing.clock.unit, timing.clock.epoch_ns), ("s", 1_700_000_000_000_000_000));
         assert_eq!(seconds, [0.123_456_789, 3.000_000_001]);
@@ -481,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn units_are_told_by_steps_where_the_size_tells_nothing() {
+    fn units_are_inferred_from_steps_unless_the_size_decides() {
         for (texts, unit, by_steps) in [
             (["0", "10"], "ms", true),
             (["0", "10000"], "us", true),
@@ -502,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_and_long_steps_may_be_of_any_unit() {
+    fn whole_numbers_and_long_steps_leave_the_unit_uncertain() {
         for (texts, by_steps) in
             [(["0.0", "10.0"], true), (["0", "1"], true), (["0.0", "10.5"], true), (["0.0", "1.5"], false)]
         {
@@ -513,7 +505,7 @@ mod tests {
     }
 
     #[test]
-    fn times_written_in_different_ways_are_in_one_order() {
+    fn stamps_of_all_variants_have_one_order() {
         let texts = [
             "-1",
             "-1e-3",
@@ -541,7 +533,7 @@ mod tests {
     }
 
     #[test]
-    fn time_that_runs_backwards_is_seen() {
+    fn decreasing_time_is_detected() {
         let mut probe = Probe::new(Stamp::Whole(2));
         probe.see(Stamp::Whole(2));
         assert!(probe.in_order);
@@ -572,7 +564,7 @@ mod dates_tests {
     }
 
     #[test]
-    fn what_is_no_date_with_a_time_is_not_read() {
+    fn other_texts_are_not_dates() {
         for text in [
             "",
             "12:00:01",
@@ -615,14 +607,14 @@ mod dates_tests {
     }
 
     #[test]
-    fn of_two_times_none_is_ignored() {
+    fn two_whole_times_are_ambiguous() {
         for header in ["t,time", "time_ms,stamp", "time_s,stamp_ns", "t,ms,us", "sec,nsec,usec", "time_ms,sec,nsec"] {
-            assert!(found(header).is_err_and(|said| said.contains("both give the time")), "{header}");
+            assert!(found(header).is_err_and(|problem| problem.contains("both give the time")), "{header}");
         }
     }
 
     #[test]
-    fn other_columns_are_no_times() {
+    fn other_columns_are_not_times() {
         for (header, expected) in [
             ("x,y", None),
             ("sec,x", None),

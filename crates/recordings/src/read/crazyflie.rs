@@ -1,21 +1,21 @@
-//! Crazyflie polynomials: a CSV a vehicle, a row a piece of its curve.
+//! Reads Crazyflie polynomials: one CSV file per vehicle, one row per piece of its curve.
 //!
 //! ```text
 //! duration,x^0,x^1,...,x^7,y^0,...,y^7,z^0,...,z^7,yaw^0,...,yaw^7
 //! ```
 //!
-//! A piece begins where the one before it ends, and its coefficients are of the time since its own begin. A folder
-//! holds a file for each vehicle, or a folder for each vehicle whose files follow each other. Files come in the order of
-//! the numbers in their names.
+//! A piece starts at the end of the previous one; its coefficients apply to the time since its own start. A folder
+//! holds one file per vehicle, or one folder per vehicle whose files are flown in sequence. Files are sorted by the
+//! numbers in their names.
 
 use nalgebra::Vector3;
 
-use super::csv::Text;
+use super::csv::TextTable;
 use super::curves::{Curves, piece};
 use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use super::table::{Cells as _, number};
 use tautline_core::track::Item;
@@ -32,36 +32,36 @@ pub(super) const READER: Reader = Reader {
         head.line.is_some_and(begins)
     },
     open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-    takes: &[Takes::Starts, Takes::Axes],
+    supports: &[FormatOption::Starts, FormatOption::Axes],
     packing: Packing::Archive,
 };
 
-/// Highest power that is read.
+/// Highest supported power.
 const HIGHEST_POWER: usize = 15;
 
-/// Opens polynomials of these vehicles, each of which flies its files one after the other; `left_out` says what else there
-/// is.
+/// Opens the polynomials of these vehicles; the files of a vehicle are flown in sequence. `left_out` is the note on
+/// other files.
 pub(super) fn open(
     vehicles: Vec<(String, Vec<Source>)>,
     left_out: Option<String>,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
     let mut notes: Vec<String> = left_out.into_iter().collect();
-    let (several, mut said_to_follow) = (vehicles.len() > 1, false);
+    let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
     let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
-        let problem = format!("it has no vehicle {}, whose start is given", quoted(name));
-        return refuse("recording/unknown-vehicle", problem, "name vehicles in --start as their files are called");
+        let problem = format!("--start names the unknown vehicle {}", quoted(name));
+        return refuse("recording/unknown-vehicle", problem, "use the names of the files without their extension");
     }
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
         for file in &files {
-            let appended = curve.append(file).map_err(|fault| fault.of(&file.shown()));
+            let appended = curve.append(file).map_err(|fault| fault.of(&file.display_path()));
             appended.map_err(|fault| if several { fault.among_others() } else { fault })?;
         }
-        if files.len() > 1 && !said_to_follow {
-            notes.push(format!("`{name}` and others fly the files of their folders one after the other"));
-            said_to_follow = true;
+        if files.len() > 1 && !has_sequence_note {
+            notes.push(format!("`{name}` and others fly the files of their folders in sequence"));
+            has_sequence_note = true;
         }
         let start = options.starts.get(&name).copied().unwrap_or_default();
         for item in &mut curve.items {
@@ -76,13 +76,13 @@ pub(super) fn open(
         _ => None,
     };
     if curves.windows(2).any(|pair| first(&pair[0].1) == first(&pair[1].1)) {
-        let said = "curves begin at one place: where they are relative, say where each starts with --start NAME=X,Y,Z";
-        notes.push(said.to_owned());
+        let note = "curves start at one position: if they are relative, set each origin with --start NAME=X,Y,Z";
+        notes.push(note.to_owned());
     }
     Ok(Curves::recording(curves, notes))
 }
 
-/// Columns of the duration, and of x, y and z of each power.
+/// Columns of the duration, and of x, y and z for each power.
 struct Columns {
     duration: usize,
     powers: Vec<[usize; 3]>,
@@ -94,15 +94,15 @@ impl Columns {
             let found = header.iter().position(|known| known.eq_ignore_ascii_case(name));
             found.ok_or_else(|| {
                 let remedy = "the header of a polynomial file is duration,x^0,...,x^7,y^0,...,z^0,...";
-                Fault::coded("recording/missing-column", format!("there is no column `{name}`"), remedy)
+                Fault::coded("recording/missing-column", format!("no column has the name `{name}`"), remedy)
             })
         };
         let mut highest = 0;
         for name in header {
             let Some(("x" | "y" | "z" | "X" | "Y" | "Z", power)) = name.split_once('^') else { continue };
             let power = power.parse::<usize>().ok().filter(|&power| power <= HIGHEST_POWER).ok_or_else(|| {
-                let problem = format!("column `{name}` is of a power that is not a number up to {HIGHEST_POWER}");
-                Fault::coded("recording/degree", problem, "pieces of Crazyflie trajectories are of degree 7")
+                let problem = format!("the power of column `{name}` is not a number up to {HIGHEST_POWER}");
+                Fault::coded("recording/degree", problem, "use pieces of degree 7, as Crazyflie trajectories have")
             })?;
             highest = highest.max(power);
         }
@@ -113,10 +113,10 @@ impl Columns {
     }
 }
 
-/// The curve of a vehicle as far as it has been read.
+/// Curve of a vehicle, as read so far.
 struct Curve {
     vehicle: usize,
-    /// Where the next piece begins \[s\].
+    /// Start of the next piece \[s\].
     time_s: f64,
     scale: f64,
     items: Vec<Item>,
@@ -124,22 +124,22 @@ struct Curve {
 
 impl Curve {
     fn append(&mut self, file: &Source) -> Result<(), ReadError> {
-        let mut table = Text::open(file, Format::CRAZYFLIE)?;
-        let columns = Columns::of(table.header()).map_err(|fault| fault.at(Text::place(table.row())))?;
+        let mut table = TextTable::open(file, Format::CRAZYFLIE)?;
+        let columns = Columns::of(table.header()).map_err(|fault| fault.at(TextTable::place(table.row())))?;
         let before = self.items.len();
         while table.advance()? {
-            self.piece(&table, &columns).map_err(|fault| fault.at(Text::place(table.row())))?;
+            self.piece(&table, &columns).map_err(|fault| fault.at(TextTable::place(table.row())))?;
         }
         if self.items.len() == before { Err(Fault::header_only().into()) } else { Ok(()) }
     }
 
-    fn piece(&mut self, table: &Text, columns: &Columns) -> Result<(), Fault> {
+    fn piece(&mut self, table: &TextTable, columns: &Columns) -> Result<(), Fault> {
         let number = |column: usize| number(table, column)?.ok_or_else(|| Fault::empty_cell(&table.header()[column]));
         let duration_s = number(columns.duration)?;
         let to_s = self.time_s + duration_s;
         if duration_s <= 0.0 || to_s <= self.time_s {
-            let problem = format!("the piece lasts {duration_s} s");
-            return refuse("recording/duration", problem, "take pieces without a duration out");
+            let problem = format!("the duration of the piece must be positive, got {duration_s} s");
+            return refuse("recording/duration", problem, "remove the piece");
         }
         let mut coefficients = Vec::with_capacity(columns.powers.len());
         for &[x, y, z] in &columns.powers {

@@ -1,7 +1,7 @@
-//! Tables in text: CSV with a header, and columns of plain numbers.
+//! Reads tables in text: CSV with a header, and columns of plain numbers.
 //!
-//! Lines are found and split here: the reader of `csv` takes as much memory as a line is long, without a limit, reads on
-//! over the end of a line where a quote is left open, and knows no fields between any number of blanks.
+//! Lines are found and split here. The reader of the `csv` crate allocates whole lines without a limit, continues over
+//! line ends after an open quote, and does not split at runs of blanks.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -11,15 +11,15 @@ use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
-use super::layout::{Body, Layout};
+use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 use super::table::Cells;
 use super::{clock, heading, table};
 
-/// A table in CSV, or text without a row.
+/// CSV table, or text without a row.
 pub(super) const CSV: Reader = Reader {
     name: "csv",
     title: "a table in CSV",
@@ -28,11 +28,11 @@ pub(super) const CSV: Reader = Reader {
     magic: &[],
     sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
     open: |source, options| open(source, Format::CSV, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
-/// Numbers between blanks: any other text.
+/// Numbers separated by blanks; accepts any other text.
 pub(super) const TEXT: Reader = Reader {
     name: "text",
     title: "a table in plain text",
@@ -41,19 +41,19 @@ pub(super) const TEXT: Reader = Reader {
     magic: &[],
     sniff: |head| head.text.is_some(),
     open: |source, options| open(source, Format::TEXT, options),
-    takes: &[
-        Takes::TimeUnit,
-        Takes::Rows,
-        Takes::Dimensions,
-        Takes::Columns,
-        Takes::Origin,
-        Takes::Axes,
-        Takes::OneVehicle,
+    supports: &[
+        FormatOption::TimeUnit,
+        FormatOption::Rows,
+        FormatOption::Dimensions,
+        FormatOption::Columns,
+        FormatOption::Origin,
+        FormatOption::Axes,
+        FormatOption::OneVehicle,
     ],
     packing: Packing::Any,
 };
 
-/// The table that a text of numbers may be; by its first bytes alone it is [`TEXT`].
+/// TrajNet table; never recognised by its first bytes, but by [`trajnet`] in a [`TEXT`] file.
 pub(super) const TRAJNET: Reader = Reader {
     name: "trajnet",
     title: "a table of TrajNet",
@@ -62,11 +62,11 @@ pub(super) const TRAJNET: Reader = Reader {
     magic: &[],
     sniff: |_| false,
     open: |source, options| open(source, Format::TRAJNET, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
-/// Whether a line is one of CSV and not of numbers between blanks or brackets.
+/// Returns whether a line is CSV rather than numbers between blanks or brackets.
 fn has_separators(line: &[u8]) -> bool {
     let has = |byte| memchr::memchr(byte, line).is_some();
     let is_number = |bytes: &[u8]| str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok());
@@ -75,41 +75,41 @@ fn has_separators(line: &[u8]) -> bool {
     (has(b',') && !has_tuples) || has(b';') || (has(b'\t') && !begins_with_a_number)
 }
 
-/// What stands between two fields.
+/// Separator of fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Separator {
-    /// One of this byte.
+    /// One byte.
     Byte(u8),
-    /// Any number of these.
+    /// Any number of these bytes.
     Any(&'static [u8]),
 }
 
 const BLANKS: Separator = Separator::Any(b" \t");
 
-/// The columns of a table of `TrajNet`, which has no header.
+/// Columns of a `TrajNet` table, which has no header.
 const TRAJNET_COLUMNS: [&str; 4] = ["frame", "id", "x", "y"];
 
-/// Between the numbers of `t (x,y) (x,y)`.
+/// Separators of `t (x,y) (x,y)`.
 const TUPLES: Separator = Separator::Any(b" \t(),");
 
-/// A table in text.
-#[expect(clippy::struct_excessive_bools, reason = "each says something else of the lines")]
-pub(super) struct Text {
+/// Table in text.
+#[expect(clippy::struct_excessive_bools, reason = "independent properties of the lines")]
+pub(super) struct TextTable {
     source: Source,
     lines: Lines,
     separator: Separator,
     has_header: bool,
-    /// Whether a row below the header holds units.
+    /// Whether the row below the header holds units.
     has_units: bool,
-    /// The numbers of the first line below the header, where all are numbers.
+    /// Numbers of the first line, in a table without a header.
     first: Vec<f64>,
-    /// Whether names say what the numbers are.
+    /// Whether the columns have names.
     named: bool,
-    /// Whether a line that begins with `#` is a comment: below a header the first field may be a name that does.
+    /// Whether lines that begin with `#` are comments: below a header the first field may be such a name.
     comments: bool,
     header: Vec<String>,
     fields: Fields,
-    /// Fields that are looked at; all have to be there where no number says how many.
+    /// Number of fields to split; `None` splits and requires all.
     wanted: Option<usize>,
     /// Text and value of the last time.
     time: (Vec<u8>, Stamp),
@@ -117,14 +117,14 @@ pub(super) struct Text {
 
 /// Opens a table.
 fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut text = Text::open(source, format)?;
+    let mut text = TextTable::open(source, format)?;
     if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            Likeness::Certain => text = Text::open(source, Format::TRAJNET)?,
+            Likeness::Certain => text = TextTable::open(source, Format::TRAJNET)?,
             Likeness::Possible => {
-                let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two numbers are \
-                               whole";
-                let remedy = "give --format trajnet, or --dimensions 3 for a time and a position";
+                let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
+                               numbers are whole";
+                let remedy = "use --format trajnet, or --dimensions 3 for a time and a position";
                 return refuse("recording/ambiguous-layout", problem, remedy);
             }
             Likeness::None => {}
@@ -139,24 +139,22 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     };
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
-        _ if options.dimensions.is_some() => refuse(
-            "recording/contradicts-option",
-            "its header says which numbers are a vehicle's",
-            "leave --dimensions away",
-        ),
-        // What stands above numbers may be a remark.
+        _ if options.dimensions.is_some() => {
+            refuse("recording/contradicts-option", "its header defines the numbers of a vehicle", "omit --dimensions")
+        }
+        // A line above numbers may be a comment instead of a header.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
     };
-    let layout = layout.map_err(|fault| fault.at(Text::place(header_row)))?;
+    let layout = layout.map_err(|fault| fault.at(TextTable::place(header_row)))?;
     table::open(source, text, layout, None, 0, options)
 }
 
-impl Text {
-    /// Opens a table and reads its header, or the first line where there is none above plain numbers.
+impl TextTable {
+    /// Opens a table and reads its header, or the first line of a table without one.
     pub(super) fn open(source: &Source, format: Format) -> Result<Self, ReadError> {
         let mut lines = Lines::new(source)?;
-        // The last comment above the first line may be its header.
+        // The last comment above the first line may be the header.
         let mut comment = Vec::new();
         while next_line(&mut lines, false)? && lines.line().starts_with(b"#") {
             let hashes = lines.line().iter().take_while(|&&byte| byte == b'#').count();
@@ -189,7 +187,7 @@ impl Text {
             let remedy = "save it with the line ends of Unix or Windows";
             return refuse(
                 "recording/line-ends",
-                "its lines end with carriage returns alone, as those of old Macintoshes",
+                "its lines end with carriage returns only, as on old Macintoshes",
                 remedy,
             );
         }
@@ -208,8 +206,7 @@ impl Text {
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
         if format == Format::TRAJNET && !(numeric && self.header.len() == TRAJNET_COLUMNS.len()) {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
-            let remedy =
-                "a table of TrajNet has frame, vehicle, x and y in each line, and no header; leave --format away";
+            let remedy = "a TrajNet table has frame, vehicle, x and y in each line, and no header; omit --format";
             return refuse("recording/wrong-format", problem, remedy);
         }
         if numeric {
@@ -226,14 +223,14 @@ impl Text {
             self.header = (1..=self.header.len()).map(|number| number.to_string()).collect();
             self.named = false;
         } else {
-            let remedy = "put a header above: t,id,x,y,z with a row for each vehicle and time, or t,x1,y1,z1,x2,... with \
-                          a row for each time";
-            return refuse("recording/no-header", "the first line holds numbers and no names of columns", remedy);
+            let remedy = "add a header: t,id,x,y,z for one row per vehicle and time, or t,x1,y1,z1,x2,... for one \
+                          row per time";
+            return refuse("recording/no-header", "the first line holds numbers, not column names", remedy);
         }
         Ok(())
     }
 
-    /// Takes a row of units below the header for what it says: each into the name of its column.
+    /// Reads a row of units below the header, if there is one, into the column names.
     fn take_units(&mut self) -> Result<(), ReadError> {
         let found = clock::time_columns(&self.header, &ReadOptions::default()).ok().flatten();
         let Some((time, _)) = found.filter(|_| self.has_header) else { return Ok(()) };
@@ -252,7 +249,7 @@ impl Text {
         Ok(())
     }
 
-    /// What each vehicle has where its numbers are in brackets.
+    /// Returns the dimensions of a table with bracketed tuples.
     fn tuples(&self) -> Option<Dimensions> {
         let (_, tuple) =
             str::from_utf8(self.lines.line()).ok().filter(|_| self.separator == TUPLES)?.split_once('(')?;
@@ -263,14 +260,14 @@ impl Text {
         }
     }
 
-    /// Splits the current line.
+    /// Splits the current line into fields.
     #[inline]
     fn split(&mut self) -> Result<(), Fault> {
         let line = self.lines.line();
         self.fields.split(line, self.separator, self.wanted.unwrap_or(usize::MAX))?;
         let (expected, found) = (self.wanted.unwrap_or(self.header.len()), self.fields.ends.len());
         let too_many = self.wanted.is_none() && found > expected;
-        // A separator behind the last field is no field.
+        // A separator after the last field does not start another one.
         if found < expected || (too_many && !(found == expected + 1 && self.fields.bytes(line, expected).is_empty())) {
             return Err(self.field_count(found));
         }
@@ -281,15 +278,15 @@ impl Text {
     fn field_count(&self, found: usize) -> Fault {
         let expected = self.header.len();
         let remedy = if found > expected && self.separator == Separator::Byte(b',') {
-            "every line needs a field for each column; where decimals are written with commas, write them with points"
+            "every line needs one field per column; write decimals with points, not commas"
         } else {
-            "every line needs a field for each column; leave cells empty where a vehicle was not seen"
+            "every line needs one field per column; leave cells empty if a vehicle was not seen"
         };
-        Fault::coded("recording/field-count", format!("it has {found} fields where {expected} are expected"), remedy)
+        Fault::coded("recording/field-count", format!("it has {found} fields, expected {expected}"), remedy)
     }
 }
 
-impl Cells for Text {
+impl Cells for TextTable {
     fn header(&self) -> &[String] {
         &self.header
     }
@@ -346,7 +343,7 @@ impl Cells for Text {
     }
 }
 
-/// Goes to the next line that is not blank, nor a comment where there may be `comments`.
+/// Advances to the next line that is not blank and, if `comments` is set, not a comment.
 #[inline]
 fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     loop {
@@ -361,7 +358,7 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// Likeness of a table of plain numbers to the format of `TrajNet`.
+/// Likeness of a table of plain numbers to the `TrajNet` format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Likeness {
     /// The numbers cannot be a frame and a vehicle.
@@ -372,7 +369,7 @@ enum Likeness {
     Certain,
 }
 
-/// Compares a table without a header with `TrajNet`: whole numbers of a frame and a vehicle, and two more numbers.
+/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers.
 fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
@@ -398,14 +395,14 @@ fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError>
     Ok(likeness)
 }
 
-/// The fields of a line of names.
+/// Splits a line of names.
 fn names(line: &[u8], separator: Separator) -> Result<Vec<String>, Fault> {
     let mut fields = Fields::default();
     fields.split(line, separator, usize::MAX)?;
     (0..fields.ends.len()).map(|index| Ok(fields.text(line, index)?.trim().to_owned())).collect()
 }
 
-/// The separator that a line most likely uses.
+/// Returns the most likely separator of a line.
 fn separator(line: &[u8], format: Format) -> Separator {
     let count = |byte| memchr::memchr_iter(byte, line).count();
     let (comma, semicolon, tab) = (count(b','), count(b';'), count(b'\t'));
@@ -420,7 +417,7 @@ fn separator(line: &[u8], format: Format) -> Separator {
     }
 }
 
-/// The first of some numbers between blanks, where one of them has a decimal comma and so none a comma behind it.
+/// Returns the first number with a decimal comma in a line of numbers between blanks.
 fn decimal_comma(line: &[u8]) -> Option<String> {
     let words: Vec<_> = str::from_utf8(line).ok()?.split_whitespace().collect();
     let number = |word: &&str| word.replacen(',', ".", 1).parse::<f64>().is_ok();
@@ -428,12 +425,12 @@ fn decimal_comma(line: &[u8]) -> Option<String> {
     (words.len() > 1 && words.iter().all(number)).then(|| (*comma).to_owned())
 }
 
-/// The fields of a line.
+/// Fields of a line.
 #[derive(Debug, Default)]
 struct Fields {
-    /// Begin and end of each field, in the line or in `unquoted`.
+    /// Start and end of each field, in the line or in `unquoted`.
     ends: Vec<(usize, usize)>,
-    /// The line without its quotes, where it has some.
+    /// The line without its quotes, if it has any.
     unquoted: Option<Vec<u8>>,
 }
 
@@ -449,7 +446,7 @@ impl Fields {
         str::from_utf8(self.bytes(line, index)).map_err(|_| Fault::NotUtf8)
     }
 
-    /// Splits a line into fields, the first `limit` of them.
+    /// Splits a line into its first `limit` fields.
     #[inline]
     fn split(&mut self, line: &[u8], separator: Separator, limit: usize) -> Result<(), Fault> {
         self.ends.clear();
@@ -457,7 +454,7 @@ impl Fields {
         match separator {
             Separator::Byte(byte) => {
                 let mut start = 0;
-                // Fields are a few bytes long: looking at each byte is faster than searching.
+                // Fields are a few bytes long, so that a byte loop is faster than a search.
                 for (end, &found) in line.iter().enumerate() {
                     if found == byte {
                         self.ends.push((start, end));
@@ -485,7 +482,7 @@ impl Fields {
         Ok(())
     }
 
-    /// Splits a line that has quotes.
+    /// Splits a line with quotes.
     #[cold]
     fn split_quoted(&mut self, line: &[u8], separator: u8) -> Result<(), Fault> {
         let mut reader = csv_core::ReaderBuilder::new().delimiter(separator).build();
@@ -506,23 +503,23 @@ impl Fields {
     }
 }
 
-/// How far the norm of a quaternion may be from 1.
+/// Largest deviation of the norm of a unit quaternion from 1.
 const NORM: f64 = 0.01;
 
-/// The columns of a vehicle whose x is in this one.
-fn body(x: usize, dimensions: Dimensions) -> Body {
+/// Returns the columns of a vehicle whose x is in column `x`.
+fn body(x: usize, dimensions: Dimensions) -> VehicleColumns {
     let (axes, count) = dimensions.counts();
     let from = |first: usize| [0, 1, 2].map(|axis| (axis < axes).then_some(first + axis));
-    Body { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
+    VehicleColumns { position: from(x), velocity: (count > axes).then(|| from(x + axes)), radius: None }
 }
 
-/// The columns of a table whose first row holds these numbers: time and then the numbers of each vehicle, or a table of
-/// the vehicle `alone`, as TUM and KITTI write them.
+/// Returns the layout of a table without a header by its first row. The columns are time and the numbers of each
+/// vehicle, or those of a TUM or KITTI table of the vehicle `alone`.
 pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Result<Layout, Fault> {
     let count = first.len();
     let fits = |dimensions: &Dimensions| count > 1 && (count - 1).is_multiple_of(dimensions.counts().1);
-    let table = |time, names, bodies: Vec<Body>, words: &str| {
-        let note = format!("there is no header: the numbers are taken as {words}");
+    let table = |time, names, bodies: Vec<VehicleColumns>, words: &str| {
+        let note = format!("there is no header: the numbers are read as {words}");
         Layout {
             time,
             names,
@@ -534,40 +531,40 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         }
     };
     let one = |time, position: [usize; 3], words| {
-        let body = Body { position: position.map(Some), velocity: None, radius: None };
+        let body = VehicleColumns { position: position.map(Some), velocity: None, radius: None };
         table(time, vec![alone.to_owned()], vec![body], words)
     };
     if let &[_, _, _, _, x, y, z, w] = first
         && ((x * x + y * y + z * z + w * w).sqrt() - 1.0).abs() < NORM
     {
-        return Ok(one(Some(0), [1, 2, 3], "time, position and attitude of one vehicle, as TUM writes them"));
+        return Ok(one(Some(0), [1, 2, 3], "time, position and attitude of one vehicle (TUM)"));
     }
     let known: Vec<_> = Dimensions::ALL.into_iter().filter(fits).collect();
     let dimensions = match (options.dimensions, &known[..]) {
         (Some(given), _) if fits(&given) => given,
         (None, &[only]) if count == 1 + only.counts().1 => only,
         (None, [_, ..]) => {
-            let problem = format!("it has {count} numbers, and nothing says how many of them are one vehicle's");
+            let problem = format!("the number of columns per vehicle is ambiguous for {count} columns");
             let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
             let remedy = format!(
-                "say it with --dimensions {}: x and y, x, y and z, and +2 or +3 with their velocities",
+                "use --dimensions {}: x and y, x, y and z, and +2 or +3 for their velocities",
                 ways.join(" or ")
             );
             return refuse("recording/ambiguous-layout", problem, remedy);
         }
         (None, []) if count == 12 => {
             if options.times_per_second.is_none() {
-                return Err(Fault::frames("it has twelve numbers, as KITTI writes poses, and no time"));
+                return Err(Fault::frames("it has twelve numbers per line, as KITTI poses, and no time"));
             }
-            return Ok(one(None, [3, 7, 11], "a pose of one vehicle in each line, as KITTI writes them"));
+            return Ok(one(None, [3, 7, 11], "a pose of one vehicle in each line (KITTI)"));
         }
         (given, _) => {
             let each = given.map_or(3, |given| given.counts().1);
-            let problem = format!("the line has {count} numbers where time and {each} for each vehicle are expected");
+            let problem = format!("the line has {count} numbers, expected time and {each} for each vehicle");
             return refuse(
                 "recording/field-count",
                 problem,
-                "write t x y z x y z ..., a line for each time, or give other --dimensions",
+                "write t x y z x y z ..., one line per time, or set --dimensions",
             );
         }
     };
@@ -576,7 +573,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
     let names: Vec<_> = (1..=bodies.len()).map(|number| number.to_string()).collect();
     let words = format!(
         "time and {}{} of each of {} vehicles",
-        if axes == 2 { "x, y (there is no height)" } else { "x, y, z" },
+        if axes == 2 { "x, y (no height)" } else { "x, y, z" },
         if each > axes { " and velocity" } else { "" },
         names.len()
     );

@@ -1,4 +1,4 @@
-//! Recordings that hold curves: all pieces are in memory.
+//! Recordings of curves, with all pieces in memory.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use super::error::{Fault, Place, ReadError};
 use super::order::{BATCH, Recording};
 use tautline_core::track::{Item, Metadata, Piece, Tracks};
 
-/// Jump between two pieces of a curve from which on the user is told \[m\]. Files round to micrometres.
+/// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 
 /// Pieces of curves in order of time.
@@ -20,12 +20,12 @@ pub(super) struct Curves {
 }
 
 impl Curves {
-    /// The recording of these vehicles: each with its items, in order of time.
+    /// Returns the recording of these vehicles, each with its items in order of time.
     pub(super) fn recording(vehicles: Vec<(String, Vec<Item>)>, mut notes: Vec<String>) -> Recording {
         notes.extend(largest_jump(&vehicles));
         let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
         let mut items: Vec<_> = items.into_iter().flatten().collect();
-        // Stable: at the same time, in the order of the vehicles.
+        // The sort is stable: items with the same time stay in the order of the vehicles.
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         Box::new(Self { vehicles, items: items.into_iter(), metadata: Metadata::in_seconds(notes) })
     }
@@ -49,7 +49,7 @@ impl Tracks for Curves {
     }
 }
 
-/// Reads the JSON of `a_show`; `remedy` helps where it is malformed.
+/// Parses JSON; `a_show` names the expected content and `remedy` the remedy for malformed JSON.
 pub(super) fn from_json<T: DeserializeOwned>(bytes: &[u8], a_show: &str, remedy: &str) -> Result<T, ReadError> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     serde_json::from_slice(text).map_err(|error| {
@@ -62,13 +62,14 @@ pub(super) fn from_json<T: DeserializeOwned>(bytes: &[u8], a_show: &str, remedy:
     })
 }
 
-/// Names that tell all vehicles apart: those given, or numbers where two are the same.
+/// Returns distinct names: those given, or numbers if two are equal.
 pub(super) fn distinct(names: Vec<String>) -> Vec<String> {
     let different: BTreeSet<_> = names.iter().collect();
     if different.len() == names.len() { names } else { (1..=names.len()).map(|number| number.to_string()).collect() }
 }
 
-/// A curve with these coefficients, scaled to metres; none where they leave the range of numbers.
+/// Returns a piece with these coefficients, scaled to metres; `None` if a number is not finite or the interval is
+/// empty.
 pub(super) fn piece(
     vehicle: usize,
     from_s: f64,
@@ -101,5 +102,5 @@ fn largest_jump(vehicles: &[(String, Vec<Item>)]) -> Option<String> {
         })
     });
     let (jump_m, name, time_s) = jumps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|jump| jump.0 > JUMP_M)?;
-    Some(format!("the curve of `{name}` jumps by {jump_m:.4} m at {time_s} s, which is the largest jump of all"))
+    Some(format!("the largest jump of a curve is {jump_m:.4} m, of `{name}` at {time_s} s"))
 }

@@ -1,7 +1,7 @@
-//! Places on the Earth in metres east, north and up of an origin, on the ellipsoid of WGS 84.
+//! Converts places on the Earth to metres east, north and up of an origin, on the ellipsoid of WGS 84.
 //!
-//! The way is exact and not that of a flat map: to coordinates around the centre of the Earth, and from there into the
-//! frame of the origin. A double resolves 1 nm at that distance, and so do the places.
+//! The conversion is exact, not a flat-map approximation: geodetic to Earth-centred coordinates, then to the frame of
+//! the origin. A double resolves 1 nm at the distance of the Earth's radius.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,26 +14,26 @@ use super::order::Row;
 use super::table::{Cells, number, vector};
 use tautline_core::track::EarthOrigin;
 
-/// Half the equator's diameter \[m\].
+/// Semi-major axis a \[m\].
 const EQUATOR_M: f64 = 6_378_137.0;
 
-/// How much shorter the axis is.
+/// Flattening f = (a - b) / a.
 const FLATTENING: f64 = 1.0 / 298.257_223_563;
 
 /// Latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
 pub(super) type Geodetic = Vector3<f64>;
 
-/// The frame of an origin.
+/// Local frame of an origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Local {
+pub(super) struct LocalFrame {
     origin: Geodetic,
     centre_m: Vector3<f64>,
     /// Rows: east, north, up.
     axes: Matrix3<f64>,
 }
 
-impl Local {
-    /// The frame that is there.
+impl LocalFrame {
+    /// Returns the frame of this origin.
     pub(super) fn at(origin: Geodetic) -> Result<Self, Fault> {
         let centre_m = centred(origin)?;
         let [(north_sine, north_cosine), (east_sine, east_cosine)] = angles(origin);
@@ -51,7 +51,7 @@ impl Local {
         Ok(Self { origin, centre_m, axes })
     }
 
-    /// The frame where the user says, or else at this first place.
+    /// Returns the frame of the user's origin, or of this first place.
     pub(super) fn first(place: Geodetic, options: &ReadOptions) -> Result<Self, Fault> {
         if let Some(origin) = options.origin {
             return Self::at(origin.into());
@@ -60,79 +60,78 @@ impl Local {
         if !options.is_joined {
             return Ok(local);
         }
-        // Another file would begin somewhere else.
-        let problem = "nothing says what its places on the Earth are measured from, the same for all files";
-        let remedy = format!("say it with --origin, such as --origin {}", local.origin());
+        // Other files would have other first places.
+        let problem = "several files need one origin for their places on the Earth";
+        let remedy = format!("set it with --origin, such as --origin {}", local.origin());
         refuse("recording/no-origin", problem, remedy)
     }
 
-    /// A place that is given east, north and up of another origin \[m\].
-    pub(super) fn place_from(&self, other: &Self, place: Vector3<f64>) -> Vector3<f64> {
+    /// Converts a position relative to another origin \[m\] to this frame.
+    pub(super) fn position_from(&self, other: &Self, place: Vector3<f64>) -> Vector3<f64> {
         if self == other {
             return place;
         }
         self.axes * (other.axes.transpose() * place + (other.centre_m - self.centre_m))
     }
 
-    /// A direction that is given east, north and up of another origin.
-    pub(super) fn turn_from(&self, other: &Self, direction: Vector3<f64>) -> Vector3<f64> {
+    /// Converts a direction from the frame of another origin to this frame.
+    pub(super) fn direction_from(&self, other: &Self, direction: Vector3<f64>) -> Vector3<f64> {
         if self == other { direction } else { self.axes * (other.axes.transpose() * direction) }
     }
 
-    /// Whether a place is its origin.
+    /// Returns whether a place is the origin.
     pub(super) fn is_at(&self, place: Geodetic) -> bool {
         self.origin == place
     }
 
-    /// A place, east, north and up of the origin \[m\].
+    /// Converts a place to east, north and up of the origin \[m\].
     pub(super) fn place(&self, place: Geodetic) -> Result<Vector3<f64>, Fault> {
         Ok(self.axes * (centred(place)? - self.centre_m))
     }
 
-    /// The origin, as the user would say it.
+    /// Formats the origin as in `--origin`.
     pub(super) fn origin(&self) -> String {
         let [latitude, longitude, height] = self.origin.into();
         format!("{latitude:?},{longitude:?},{height:?}")
     }
 
-    /// The origin, which is `given` or inferred.
+    /// Returns the origin with a flag whether it was inferred.
     pub(super) fn measured_from(&self, given: Option<[f64; 3]>) -> EarthOrigin {
         EarthOrigin { place: self.origin(), is_inferred: given.is_none() }
     }
 
-    /// What a person should know.
+    /// Returns the note for the user.
     pub(super) fn note(&self) -> String {
         let origin = self.origin();
-        format!(
-            "places on the Earth are in metres east, north and up of {origin} on WGS 84 (--origin {origin} says so)"
-        )
+        format!("positions are metres east, north and up of {origin} on WGS 84 (confirm with --origin {origin})")
     }
 }
 
-/// Whether a receiver that had no fix wrote this: latitude and longitude are both exactly 0.
+/// Returns whether a place is the output of a receiver without a fix: latitude and longitude are exactly 0.
 pub(super) fn is_no_fix(place: &Geodetic) -> bool {
     place.x == 0.0 && place.y == 0.0
 }
 
-/// Note on `count` rows or messages of the vehicles `of` that hold no fix.
+/// Returns the note on `count` omitted rows or messages without a fix; `of` names the vehicles.
 pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
-    let is = if count == 1 { "place is no fix and was" } else { "places are no fixes and were" };
-    (count > 0).then(|| format!("{count} {is} left out{of}: latitude and longitude are both exactly 0"))
+    let positions = if count == 1 { "position" } else { "positions" };
+    (count > 0)
+        .then(|| format!("{count} {positions}{of} omitted for lack of a fix: latitude and longitude are exactly 0"))
 }
 
-/// Sine and cosine of latitude and of longitude.
+/// Returns sine and cosine of latitude and of longitude.
 fn angles(place: Geodetic) -> [(f64, f64); 2] {
     [place.x, place.y].map(|degrees| libm::sincos(degrees.to_radians()))
 }
 
-/// A place in the frame of the Earth's centre \[m\].
+/// Converts a place to the Earth-centred frame \[m\].
 fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
     let range = |what: &str, value: f64, most: f64| -> Result<(), Fault> {
         if value.abs() <= most {
             return Ok(());
         }
-        let problem = format!("{} is no {what}: it is not within {most} degrees", quoted(&format!("{value:?}")));
-        let remedy = "write degrees with decimals; whole numbers of 1e-7 degrees are to be divided by 1e7";
+        let problem = format!("{what} {} is outside of +-{most} degrees", quoted(&format!("{value:?}")));
+        let remedy = "write decimal degrees; divide integers of 1e-7 degrees by 1e7";
         refuse("recording/not-on-earth", problem, remedy)
     };
     range("latitude", place.x, 90.0)?;
@@ -144,19 +143,16 @@ fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
     Ok(Vector3::new(from_axis_m * east_cosine, from_axis_m * east_sine, (squash * curvature_m + place.z) * sine))
 }
 
-/// The frame of places on the Earth, where a table gives such: where the user says, or at the first place of the table.
+/// Returns the frame of a table with places on the Earth: of the user's origin, or of the first place of the table.
 pub(super) fn origin<C: Cells>(
     cells: &mut C,
     layout: &Layout,
     options: &ReadOptions,
-) -> Result<Option<Local>, ReadError> {
+) -> Result<Option<LocalFrame>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
-        let needless = Fault::coded(
-            "recording/unused-option",
-            "it has no columns of latitude and longitude",
-            "leave --origin away",
-        );
+        let needless =
+            Fault::coded("recording/unused-option", "it has no columns of latitude and longitude", "omit --origin");
         return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
     }
     axes::refuse_known(options, "a table of latitudes and longitudes")?;
@@ -169,22 +165,21 @@ pub(super) fn origin<C: Cells>(
         };
         let at_row = |fault: Fault| fault.at(C::place(cells.row()));
         if let Some(place) = place.map_err(at_row)? {
-            return Ok(Some(Local::first(place, options).map_err(at_row)?));
+            return Ok(Some(LocalFrame::first(place, options).map_err(at_row)?));
         }
     }
     if reference.is_some() {
-        let problem = "the place that its positions are measured from is not known in any row (`ref_lat`, `ref_lon`)";
+        let problem = "no row has the origin of its positions (`ref_lat`, `ref_lon`)";
         return refuse("recording/no-fix", problem, GLOBAL);
     }
     if unfixed {
-        let problem = "no row has a fix: every latitude and longitude is exactly 0";
-        return refuse("recording/no-fix", problem, "record again once the receiver has a fix, or give another file");
+        let problem = "no row has a fix: all latitudes and longitudes are exactly 0";
+        return refuse("recording/no-fix", problem, "record again with a fix, or give another file");
     }
     Ok(None)
 }
 
-/// The place that the positions of a row are measured from; none where it is not known: empty, NaN, or where latitude and
-/// longitude are 0.
+/// Returns the origin of the positions in a row; `None` if a cell is empty or NaN, or latitude and longitude are 0.
 fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geodetic>, Fault> {
     let mut place = Vector3::zeros();
     for (slot, column) in place.iter_mut().zip(columns) {
@@ -199,7 +194,7 @@ fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geode
     Ok(Some(place).filter(|place| !is_no_fix(place)))
 }
 
-/// The first place on the Earth of a row; none where it has none. Sets `unfixed` where it has no fix.
+/// Returns the first place on the Earth in a row, if there is one. Sets `unfixed` for a place without a fix.
 fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
     for body in &layout.bodies {
         match vector(cells, &body.position, &layout.metres)? {
@@ -211,14 +206,14 @@ fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option
     Ok(None)
 }
 
-/// Brings a position that is measured from a place in some columns into the frame `local`; `false` where it is not known, as
-/// other columns may say by a 0. The frame of the place is kept in `there`.
-pub(super) fn bring(
+/// Converts a position with an origin in its row to the frame `local`; returns `false` if the origin is unknown or a
+/// validity column is 0. `row_frame` caches the frame of the origin.
+pub(super) fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
     (columns, valid): ([usize; 3], &[usize]),
-    local: Option<Local>,
-    there: &mut Option<Local>,
+    local: Option<LocalFrame>,
+    row_frame: &mut Option<LocalFrame>,
 ) -> Result<bool, Fault> {
     for &column in valid {
         if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
@@ -226,12 +221,12 @@ pub(super) fn bring(
         }
     }
     let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
-    let there = match there.filter(|there| there.is_at(place)) {
-        Some(there) => there,
-        None => *there.insert(Local::at(place)?),
+    let row_frame = match row_frame.filter(|row_frame| row_frame.is_at(place)) {
+        Some(row_frame) => row_frame,
+        None => *row_frame.insert(LocalFrame::at(place)?),
     };
-    row.position = local.place_from(&there, row.position);
-    row.velocity = row.velocity.map(|velocity| local.turn_from(&there, velocity));
+    row.position = local.position_from(&row_frame, row.position);
+    row.velocity = row.velocity.map(|velocity| local.direction_from(&row_frame, velocity));
     Ok(true)
 }
 
@@ -241,13 +236,13 @@ mod tests {
 
     use super::*;
 
-    /// Half the shorter diameter \[m\].
+    /// Semi-minor axis b \[m\].
     const POLE_M: f64 = EQUATOR_M * (1.0 - FLATTENING);
 
-    /// Two units in the last place of a coordinate around the Earth's centre.
+    /// Two units in the last place of an Earth-centred coordinate.
     const ROUNDING_M: f64 = 2e-9;
 
-    /// The same by the reduced latitude, and with the system's own functions.
+    /// Computes Earth-centred coordinates by the reduced latitude, with the system's functions.
     fn by_reduced_latitude(place: Geodetic) -> Vector3<f64> {
         let (latitude, longitude) = (place.x.to_radians(), place.y.to_radians());
         let reduced = (POLE_M * latitude.sin()).atan2(EQUATOR_M * latitude.cos());
@@ -256,7 +251,7 @@ mod tests {
         vector![from_axis * longitude.cos(), from_axis * longitude.sin(), along]
     }
 
-    /// The way back, by iteration.
+    /// Inverts the conversion by iteration.
     fn geodetic(centred: Vector3<f64>) -> Geodetic {
         let squash = (1.0 - FLATTENING) * (1.0 - FLATTENING);
         let from_axis = centred.x.hypot(centred.y);
@@ -281,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn places_agree_with_an_independent_formula_and_with_the_way_back() {
+    fn conversion_agrees_with_independent_formula_and_inverse() {
         for place in places() {
             let found = centred(place).expect("a place");
             assert!((found - by_reduced_latitude(place)).norm() < 2.0 * ROUNDING_M, "{place}");
@@ -291,10 +286,10 @@ mod tests {
     }
 
     #[test]
-    fn the_frame_of_an_origin_turns_and_shifts_alone() {
+    fn local_frame_is_a_rotation_and_a_shift() {
         let all: Vec<_> = places().collect();
         for origin in &all {
-            let local = Local::at(*origin).expect("a place");
+            let local = LocalFrame::at(*origin).expect("a place");
             assert_eq!(local.place(*origin).expect("a place"), Vector3::zeros());
             assert!((local.axes * local.axes.transpose() - Matrix3::identity()).norm() < 1e-15);
             assert!((local.axes.determinant() - 1.0).abs() < 1e-15);
@@ -304,20 +299,20 @@ mod tests {
     }
 
     #[test]
-    fn places_around_another_origin_are_the_places_that_they_are() {
-        let (here, there) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
-        let [here, there] = [here, there].map(|place| Local::at(place).expect("a place"));
+    fn positions_keep_their_place_when_the_origin_changes() {
+        let (here, other) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
+        let [here, other] = [here, other].map(|place| LocalFrame::at(place).expect("a place"));
         let place = vector![47.011, 8.019, 470.0];
-        let moved = here.place_from(&there, there.place(place).expect("a place"));
+        let moved = here.position_from(&other, other.place(place).expect("a place"));
         assert!((moved - here.place(place).expect("a place")).norm() < 4.0 * ROUNDING_M, "{moved}");
-        let step = here.place_from(&there, vector![1.0, 2.0, 3.0]) - here.place_from(&there, Vector3::zeros());
-        assert!((here.turn_from(&there, vector![1.0, 2.0, 3.0]) - step).norm() < ROUNDING_M);
+        let step = here.position_from(&other, vector![1.0, 2.0, 3.0]) - here.position_from(&other, Vector3::zeros());
+        assert!((here.direction_from(&other, vector![1.0, 2.0, 3.0]) - step).norm() < ROUNDING_M);
     }
 
     #[test]
-    fn a_second_of_arc_is_as_long_as_the_radii_of_curvature_say() {
+    fn arc_seconds_match_the_radii_of_curvature() {
         let origin = vector![47.0, 8.0, 0.0];
-        let local = Local::at(origin).expect("a place");
+        let local = LocalFrame::at(origin).expect("a place");
         let second = 1.0 / 3600.0;
         let squared = FLATTENING * (2.0 - FLATTENING);
         let sine = 47.0_f64.to_radians().sin();
@@ -331,20 +326,20 @@ mod tests {
     }
 
     #[test]
-    fn the_antimeridian_and_the_poles_are_places_like_any_other() {
-        let local = Local::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
+    fn antimeridian_and_poles_need_no_special_case() {
+        let local = LocalFrame::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
         let over = local.place(vector![0.0, -179.999_99, 0.0]).expect("a place");
         assert!((over.x - 2.0e-5_f64.to_radians() * EQUATOR_M).abs() < 1e-6, "{over}");
-        let pole = Local::at(vector![90.0, 0.0, 0.0]).expect("a place");
+        let pole = LocalFrame::at(vector![90.0, 0.0, 0.0]).expect("a place");
         let turned = pole.place(vector![90.0, 123.0, 0.0]).expect("a place");
         assert!(turned.norm() < ROUNDING_M, "every longitude is the pole: {turned}");
     }
 
     #[test]
-    fn what_is_no_place_is_refused() {
+    fn places_off_the_earth_are_refused() {
         for place in [vector![90.1, 0.0, 0.0], vector![473_977_420.0, 0.0, 0.0], vector![f64::NAN, 0.0, 0.0]] {
-            assert!(Local::at(place).is_err(), "{place}");
+            assert!(LocalFrame::at(place).is_err(), "{place}");
         }
-        assert!(Local::at(vector![0.0, 360.1, 0.0]).is_err());
+        assert!(LocalFrame::at(vector![0.0, 360.1, 0.0]).is_err());
     }
 }

@@ -1,68 +1,67 @@
-//! Why a recording cannot be read: the file, the place in it, the fault and the remedy.
+//! Errors of readers: file, place, fault and remedy.
 
 use std::path::Path;
 use std::{fmt, io};
 
 use super::readers::Format;
 
-/// Longest value that a message repeats \[characters\].
+/// Longest quoted value in a message \[characters\].
 const LONGEST_QUOTE: usize = 60;
 
-/// What helps where a position is not finite.
-pub(super) const UNSEEN: &str =
-    "take the row out, or leave the cells empty: a vehicle that was not seen has no position";
+/// Remedy for a position that is not finite.
+pub(super) const UNSEEN: &str = "remove the row, or leave the cells empty: a vehicle that was not seen has no position";
 
-const NOTHING_RECORDED: &str = "nothing was recorded: record again, or give another file";
+const NOTHING_RECORDED: &str = "record again, or give another file";
 
-/// A recording cannot be read.
+/// Error of reading a recording.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}{}: {fault}", self.comma_place())]
 pub struct ReadError {
-    /// The file; empty until it is named.
+    /// The file; empty until it is set by [`ReadError::of`].
     pub file: String,
-    /// Where in the file, if in a certain place.
+    /// Place in the file, if known.
     pub place: Option<Place>,
-    /// What is wrong.
+    /// The fault.
     #[source]
     pub fault: Fault,
 }
 
 impl ReadError {
-    /// Something is wrong with a file as a whole.
+    /// Returns an error of a file as a whole.
     #[must_use]
     pub fn new(file: &Path, fault: Fault) -> Self {
         Self::from(fault).of(file)
     }
 
-    /// The same in this file, unless it is known to be in another.
+    /// Sets the file, unless it is already set.
     pub(super) fn of(self, file: &Path) -> Self {
         if self.file.is_empty() { Self { file: file.display().to_string(), ..self } } else { self }
     }
 
-    /// The same of one of several files, which may be none of the recording.
+    /// Adds the remedy for one of several files, which may not belong to the recording.
     pub(super) fn among_others(mut self) -> Self {
         if let Fault::Content { remedy, .. } = &mut self.fault {
-            remedy.push_str("; or take the file away, if it is none of the recording");
+            remedy.push_str("; or remove the file if it does not belong to the recording");
         }
         self
     }
 
-    /// What helps, as a sentence without a full stop.
+    /// Returns the remedy, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {
         match self.fault {
-            Fault::UnknownFormat => format!("formats that can be read are {}; --format names one", Format::names()),
+            Fault::UnknownFormat => format!("set --format to one of {}", Format::names()),
             ref fault => fault.help().to_owned(),
         }
     }
 
-    /// The stable name of the problem, such as `recording/unknown-format`.
+    /// Returns the stable code of the problem, such as `recording/unknown-format`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         self.fault.code()
     }
 
-    /// Whether the machine failed and not the input.
+    /// Returns whether the operating system failed, not the input.
     #[must_use]
     pub fn is_machine(&self) -> bool {
         use io::ErrorKind as Kind;
@@ -84,16 +83,16 @@ impl<F: Into<Fault>> From<F> for ReadError {
     }
 }
 
-/// A place in a recording.
+/// Place in a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A line of a text file, from 1.
+    /// Line of a text file, from 1.
     Line(u64),
-    /// A row of a table, from 1.
+    /// Row of a table, from 1.
     Row(u64),
-    /// A byte of the file, from 0.
+    /// Byte of the file, from 0.
     Byte(u64),
-    /// A part with a name: an array with its indices, a message of a topic, an entry of an archive.
+    /// Named part: an array element, a message of a topic, an entry of an archive.
     Part(String),
 }
 
@@ -108,54 +107,54 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong with a recording.
+/// Fault of a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The system refuses to read.
+    /// Error of the operating system.
     #[error("{0}")]
     System(#[source] io::Error),
-    /// There are no bytes.
+    /// The file has no bytes.
     #[error("it is empty")]
     Empty,
-    /// The content is of no known format.
-    #[error("its content is of no format that is known")]
+    /// The content has no known format.
+    #[error("unknown format")]
     UnknownFormat,
-    /// The content is not of the format that was asked for.
-    #[error("it is not {}: it does not begin as one does", .0.title)]
+    /// The content does not have the requested format.
+    #[error("it is not {}: it begins with other bytes", .0.title)]
     WrongFormat(Format),
-    /// A line is longer than any recording needs.
+    /// A line exceeds the limit \[bytes\].
     #[error("the line is longer than {0} bytes")]
     LineTooLong(usize),
-    /// Text is not in UTF-8.
+    /// The text is not UTF-8.
     #[error("the text is not in UTF-8")]
     NotUtf8,
-    /// The file breaks off; what is missing.
-    #[error("it breaks off: {0}")]
+    /// The file is truncated; the missing part.
+    #[error("it is truncated: {0}")]
     Truncated(String),
     /// The file was not closed, so that its end may be missing.
-    #[error("it breaks off: it was not closed, so that its end may be missing")]
+    #[error("it is truncated: it was not closed, so that its end may be missing")]
     Unfinished,
-    /// Packed data grow beyond all measure; how far.
+    /// Compressed data exceed the growth limit; the sizes.
     #[error("{0}")]
     Bomb(String),
-    /// The content contradicts its format; how.
+    /// The content contradicts its format; the reason.
     #[error("it is damaged: {0}")]
     Damaged(String),
-    /// The content is of its format, but cannot be read as motion.
+    /// The content has the format, but is not valid motion.
     #[error("{problem}")]
     Content {
-        /// The stable name of the problem, such as `recording/time-backwards`.
+        /// Stable code of the problem, such as `recording/time-backwards`.
         code: &'static str,
-        /// What is wrong.
+        /// The problem.
         problem: String,
-        /// What helps.
+        /// The remedy.
         remedy: String,
     },
 }
 
 impl From<io::Error> for Fault {
-    /// What reading went wrong with, as a fault of the content where it is one.
+    /// Converts an error of reading; kinds that decoders use become faults of the content.
     fn from(error: io::Error) -> Self {
         use io::ErrorKind as Kind;
         match error.kind() {
@@ -180,46 +179,41 @@ impl Fault {
         Self::Damaged(reason.to_string())
     }
 
-    /// There is a header and nothing below it.
+    /// Returns the fault of a table without rows.
     pub(super) fn header_only() -> Self {
         Self::coded("recording/empty", "it has a header and no rows", NOTHING_RECORDED)
     }
 
-    /// A number is infinite or not a number.
+    /// Returns the fault of a number that is infinite or NaN.
     pub(super) fn not_finite(column: &str, value: &str, remedy: &str) -> Self {
         let problem = format!("column `{column}` holds {}, which is not finite", quoted(value));
         Self::coded("recording/not-finite", problem, remedy)
     }
 
-    /// A cell is empty that must not be.
+    /// Returns the fault of an empty cell where a value is required.
     pub(super) fn empty_cell(column: &str) -> Self {
-        let remedy = "fill it, or leave all cells of the position empty where the vehicle was not seen";
+        let remedy = "fill it, or leave all cells of the position empty if the vehicle was not seen";
         Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
     }
 
-    /// Time runs backwards where it must not.
+    /// Returns the fault of decreasing time.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
-        let remedy = "look whether two recordings were joined or the clock was set; where the rows are of several \
-                      vehicles, name the column that tells them apart with --column id=NAME; where the lines are only \
-                      out of order, sort the lines by time, or have them sorted with --sort";
+        let remedy = "check whether the clock was set; if rows belong to several vehicles, name their column with \
+                      --column id=NAME; if rows are only out of order, use --sort";
         Self::coded("recording/time-backwards", problem, remedy)
     }
 
-    /// Times are numbers of frames, and the duration of a frame is not given.
+    /// Returns the fault of times that count frames of unknown duration.
     pub(super) fn frames(problem: impl Into<String>) -> Self {
-        let remedy = "say how many there are in a second with --fps, such as --fps 30, or how many seconds each lasts \
-                      with --time-scale";
+        let remedy = "set the frame rate with --fps, such as --fps 30, or the duration of a frame in seconds with \
+                      --time-scale";
         Self::coded("recording/frames", problem, remedy)
     }
 
-    /// Numbers that are finite in the file are not in metres and seconds.
+    /// Returns the fault of a value that overflows in metres or seconds.
     pub(super) fn out_of_range() -> Self {
-        Self::coded(
-            "recording/overflow",
-            "its numbers leave the range of numbers",
-            "look at --scale and at the numbers themselves",
-        )
+        Self::coded("recording/overflow", "a value exceeds the range of numbers", "check --scale and the values")
     }
 
     fn code(&self) -> &'static str {
@@ -241,23 +235,23 @@ impl Fault {
 
     fn help(&self) -> &str {
         match self {
-            Self::System(error) if error.kind() == io::ErrorKind::NotFound => "look at the spelling of the path",
-            Self::System(_) => "look at the permissions of the file and at the disk",
+            Self::System(error) if error.kind() == io::ErrorKind::NotFound => "check the path",
+            Self::System(_) => "check the permissions of the file, and the disk",
             Self::Empty => NOTHING_RECORDED,
-            Self::UnknownFormat => "name the format with --format",
-            Self::WrongFormat(_) => "leave --format away to have the content recognised, or name another format",
-            Self::LineTooLong(_) => "look whether the lines end as they should; a recording has a line for each time",
+            Self::UnknownFormat => "set --format",
+            Self::WrongFormat(_) => "omit --format to recognise the content, or set another format",
+            Self::LineTooLong(_) => "check the line ends; a recording has one line per time",
             Self::NotUtf8 => "save it as UTF-8",
             Self::Truncated(_) => "copy or record it again",
-            Self::Unfinished => "copy or record it again, or accept what it holds with --allow-unfinished",
-            Self::Bomb(_) => "unpack it yourself if it is what you expect, and give the unpacked file",
-            Self::Damaged(_) => "copy or record it again, or name the format with --format",
+            Self::Unfinished => "copy or record it again, or accept the complete part with --allow-unfinished",
+            Self::Bomb(_) => "if the size is expected, unpack it and give the unpacked file",
+            Self::Damaged(_) => "copy or record it again, or set --format",
             Self::Content { remedy, .. } => remedy,
         }
     }
 }
 
-/// Fails with a fault of the content.
+/// Returns a fault of the content as an error.
 pub(super) fn refuse<T, E: From<Fault>>(
     code: &'static str,
     problem: impl Into<String>,
@@ -266,17 +260,17 @@ pub(super) fn refuse<T, E: From<Fault>>(
     Err(Fault::coded(code, problem, remedy).into())
 }
 
-/// A value between backticks, shortened, and without what would steer a terminal.
+/// Quotes a value with backticks, shortened and without control characters.
 pub(super) fn quoted(value: &str) -> String {
-    let harmless = |c: char| if c.is_control() { '\u{fffd}' } else { c };
-    let mut shown: String = value.chars().take(LONGEST_QUOTE).map(harmless).collect();
+    let printable = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let mut shown: String = value.chars().take(LONGEST_QUOTE).map(printable).collect();
     if value.chars().nth(LONGEST_QUOTE).is_some() {
         shown.push('…');
     }
     format!("`{shown}`")
 }
 
-/// The first of some names that are not empty.
+/// Lists the first `shown` names that are not empty, and the number of further ones.
 pub(super) fn list(names: &[String], shown: usize) -> String {
     let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
     match names.len() {

@@ -1,4 +1,4 @@
-//! Folders and archives that hold a file for each vehicle, and several files joined to one recording.
+//! Folders and archives with one file per vehicle, and joining of several files to one recording.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -12,36 +12,36 @@ use super::readers::is_prose;
 use super::source::{Archive, Source};
 use tautline_core::track::{Clock, Item, Metadata, Tracks};
 
-/// Longest number in a file's name that is put in order by its value \[digits\].
+/// Longest number in a file name that is sorted by value \[digits\].
 const LONGEST_NUMBER: usize = 20;
 
-/// Ends of the names of tables.
+/// Extensions of tables.
 const TABLES: [&str; 12] =
     ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz", "jsonl", "ndjson", "ulg", "ulog"];
 
-/// Ends of the names of texts, be they tables or not.
+/// Extensions of texts that may be tables or prose.
 const TEXTS: [&str; 2] = ["txt", "dat"];
 
-/// Names of texts that are no tables, whatever numbers they hold.
+/// Names of texts that are never tables.
 const NOTES: [&str; 6] = ["readme", "license", "licence", "copying", "changelog", "authors"];
 
-/// Ends of the names of recordings that are given alone, and of archives.
+/// Extensions of recordings that are opened separately, and of archives.
 const ALONE: [&str; 9] = ["mcap", "skyc", "zip", "tar", "tgz", "7z", "rar", "bag", "db3"];
 
-/// Most files or folders that are named.
+/// Largest number of files or folders listed in a message.
 const LISTED: usize = 5;
 
-/// The tables of a folder or of an archive, and those of the folders in it by the names of these; in natural order.
+/// Tables of a folder or archive, and tables of its subfolders by the subfolder's name; in natural order.
 #[derive(Default)]
 pub(super) struct Folder {
     pub(super) files: Vec<Source>,
     pub(super) folders: Vec<(String, Vec<Source>)>,
-    /// Names of what is no table, or is deeper.
+    /// Names of files that are not tables, and of deeper folders.
     pub(super) left_out: Vec<String>,
 }
 
 impl Folder {
-    /// Looks into a folder.
+    /// Lists a folder.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
         let Entries { files, folders, mut left_out } = entries(path)?;
         if !files.is_empty() {
@@ -52,7 +52,7 @@ impl Folder {
         Ok(Self { files, folders: folders.collect::<Result<_, ReadError>>()?, left_out }.sorted())
     }
 
-    /// Looks into an archive. One folder around everything is no folder.
+    /// Lists an archive. A single folder around all files is skipped.
     pub(super) fn of_archive(path: &Path) -> Result<Self, ReadError> {
         let mut folder = Self::default();
         let names = Archive::open(path)?.names();
@@ -78,30 +78,30 @@ impl Folder {
         Ok(folder.sorted())
     }
 
-    /// A file of it, by which all others are read.
+    /// Returns one of its files, whose format applies to all.
     pub(super) fn first(&mut self) -> Option<&mut Source> {
         self.files.first_mut().or_else(|| self.folders.first_mut()?.1.first_mut())
     }
 
-    /// What a person should know about what was not read.
+    /// Returns the note on files that are not read.
     pub(super) fn note(&self) -> Option<String> {
-        (!self.left_out.is_empty()).then(|| format!("not read, being no tables: {}", listed(&self.left_out)))
+        (!self.left_out.is_empty()).then(|| format!("not read, as they are not tables: {}", listed(&self.left_out)))
     }
 
-    /// That there is no table: in `what`.
+    /// Returns the fault of a folder or archive (`what`) without tables.
     pub(super) fn without_tables(&self, what: &str, remedy: &str) -> Fault {
         let holds =
-            if self.left_out.is_empty() { String::new() } else { format!(": it holds {}", listed(&self.left_out)) };
+            if self.left_out.is_empty() { String::new() } else { format!("; it contains {}", listed(&self.left_out)) };
         let alone = self.left_out.iter().find(|name| ALONE.contains(&&*extension(Path::new(name))));
         let remedy = match alone {
             Some(name) if what == ARCHIVE => format!("unpack it, and give {name}"),
-            Some(name) => format!("give {name}, which lies in it"),
+            Some(name) => format!("give {name} inside it"),
             None => remedy.to_owned(),
         };
         Fault::coded("recording/folder", format!("there is no table in the {what}{holds}"), remedy)
     }
 
-    /// That tables lie in folders, which would be several recordings.
+    /// Returns the fault of tables in several folders, which would be several recordings.
     pub(super) fn of_folders(&self) -> Fault {
         let counted = |(name, files): &(String, Vec<_>)| match files.len() {
             1 => format!("{name}/ (1 table)"),
@@ -109,19 +109,19 @@ impl Folder {
         };
         let folders: Vec<_> = self.folders.iter().map(counted).collect();
         let file = self.folders.first().and_then(|(_, files)| files.first());
-        let folder = file.and_then(|file| Some(file.shown().parent()?.to_owned())).unwrap_or_default();
+        let folder = file.and_then(|file| Some(file.display_path().parent()?.to_owned())).unwrap_or_default();
         let remedy = match (file, self.folders.first()) {
             (Some(Source { entry: Some(_), .. }), Some((name, _))) => {
-                format!("unpack it, and give a folder of it: {name}")
+                format!("unpack it, and give one of its folders: {name}")
             }
             _ => format!("give one of them: {}", folder.display()),
         };
-        let beside = if self.files.is_empty() { "" } else { "some of " };
-        let problem = format!("{beside}its tables lie in folders: {}", listed(&folders));
+        let part = if self.files.is_empty() { "" } else { "some of " };
+        let problem = format!("{part}its tables are in folders: {}", listed(&folders));
         Fault::coded(
             "recording/folder",
             problem,
-            format!("{remedy}; the tables of one recording lie side by side, one for each vehicle"),
+            format!("{remedy}; the tables of one recording must be in one folder, one per vehicle"),
         )
     }
 
@@ -130,7 +130,7 @@ impl Folder {
         self.folders.retain(|(_, files)| !files.is_empty());
         self.folders.sort_by_cached_key(|(name, _)| (natural(name), name.clone()));
         for files in self.folders.iter_mut().map(|(_, files)| files).chain([&mut self.files]) {
-            files.sort_by_cached_key(|file| (natural(&file.stem()), file.shown()));
+            files.sort_by_cached_key(|file| (natural(&file.stem()), file.display_path()));
         }
         self
     }
@@ -140,10 +140,10 @@ impl Folder {
     }
 }
 
-/// What archives are called in errors.
+/// Word for archives in errors.
 pub(super) const ARCHIVE: &str = "archive";
 
-/// The first of some names, and how many more there are.
+/// Lists the first few names and the number of further ones.
 fn listed(names: &[String]) -> String {
     let (first, more) = names.split_at(LISTED.min(names.len()));
     let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
@@ -158,24 +158,24 @@ fn is_table(path: &Path) -> bool {
     !is_hidden(path) && TABLES.contains(&&*extension(path))
 }
 
-/// Whether a file by the name of a table is a text that says something about others.
+/// Returns whether a file with the extension of a table is prose.
 fn is_note(source: &Source) -> bool {
     let is_named = NOTES.contains(&&*source.stem().to_lowercase());
-    TEXTS.contains(&&*extension(&source.shown())) && (is_named || is_prose(source))
+    TEXTS.contains(&&*extension(&source.display_path())) && (is_named || is_prose(source))
 }
 
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// What is in a folder.
+/// Entries of a folder.
 struct Entries {
     files: Vec<Source>,
     folders: Vec<Source>,
     left_out: Vec<String>,
 }
 
-/// Tables and folders of a folder.
+/// Lists the tables and subfolders of a folder.
 fn entries(folder: &Path) -> Result<Entries, ReadError> {
     let error = |source| ReadError::new(folder, Fault::System(source));
     let (mut files, mut folders, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
@@ -194,7 +194,7 @@ fn entries(folder: &Path) -> Result<Entries, ReadError> {
     Ok(Entries { files, folders, left_out })
 }
 
-/// A key that puts `cf9` before `cf10`: all numbers are as long.
+/// Returns a sort key that orders `cf9` before `cf10`: numbers are padded to one length.
 fn natural(name: &str) -> String {
     let mut key = String::new();
     for part in name.as_bytes().chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit()) {
@@ -206,30 +206,30 @@ fn natural(name: &str) -> String {
     key
 }
 
-/// Clocks that begin further apart than this are not the same \[ns\]: 30 days.
+/// Largest difference of the epochs of joined files \[ns\]: 30 days.
 const APART_NS: i64 = 30 * 86_400 * 1_000_000_000;
 
-/// A file of a vehicle.
-struct Part {
+/// File of one vehicle.
+struct JoinedFile {
     path: PathBuf,
     tracks: Recording,
-    /// Where its clock begins after that of the recording \[s\].
+    /// Offset of its clock from the clock of the recording \[s\].
     shift_s: f64,
-    /// Items that were read and not given out.
+    /// Items read but not yet returned.
     waiting: std::iter::Peekable<std::vec::IntoIter<Item>>,
-    /// When the last of them begins \[s\]; infinite behind the end of the file.
+    /// Start of the last of them \[s\]; infinite at the end of the file.
     until_s: f64,
 }
 
-/// Vehicles from several files, in order of time. A block of each file is in memory.
+/// Vehicles of several files, merged in order of time. One block of each file is in memory.
 struct Joined {
     vehicles: Vec<String>,
-    parts: Vec<Part>,
-    /// Planar where some file has no height: then the heights of the others are not used.
+    parts: Vec<JoinedFile>,
+    /// Planar if a file has no heights; then the heights of the other files are ignored.
     metadata: Metadata,
 }
 
-/// One recording out of several with a vehicle each, which is called as its file; `left_out` says what else there is.
+/// Joins files with one vehicle each, named after the file, to one recording; `left_out` is the note on other files.
 pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -> Result<Recording, ReadError> {
     let stem = |path: &PathBuf| Source::file(path).stem();
     let (vehicles, parts): (Vec<_>, Vec<_>) =
@@ -238,8 +238,8 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     let mut known = BTreeMap::new();
     for (name, path) in vehicles.iter().zip(&paths) {
         if let Some(first) = known.insert(spelling(name), path) {
-            let problem = format!("the vehicle of {} is called {} too", first.display(), quoted(name));
-            let remedy = "vehicles are called as their files: give each file another name";
+            let problem = format!("the vehicle of {} has the same name {}", first.display(), quoted(name));
+            let remedy = "rename one of the files: vehicles are named after their files";
             return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
         }
     }
@@ -251,17 +251,13 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let guessed = clock.inferred || clocks[0].inferred;
         let problem = if clock.unit != clocks[0].unit && guessed {
             let (unit, other) = (clock.unit, clocks[0].unit);
-            format!(
-                "times of {} would be taken as {unit} and those of {} as {other}",
-                quoted(name),
-                quoted(&vehicles[0])
-            )
+            format!("the times of {} are read as {unit}, those of {} as {other}", quoted(name), quoted(&vehicles[0]))
         } else if clock.epoch_ns.saturating_sub(first.epoch_ns) > APART_NS {
             format!("the clock of {} begins more than a month after that of another file", quoted(name))
         } else {
             continue;
         };
-        let remedy = "say the unit with --time-unit, and write all times by one clock";
+        let remedy = "set the unit with --time-unit, and record all files with one clock";
         return Err(ReadError::new(path, Fault::coded("recording/several-clocks", problem, remedy)));
     }
     let clock = Clock {
@@ -270,7 +266,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         epoch_ns: first.epoch_ns,
         unit: clocks[0].unit,
     };
-    let mut notes = vec![format!("a file is a vehicle: {}", vehicles.join(", "))];
+    let mut notes = vec![format!("each file is one vehicle: {}", vehicles.join(", "))];
     notes.extend(left_out);
     let without: Vec<_> = vehicles
         .iter()
@@ -288,7 +284,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
-        joined.push(Part { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
+        joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).cloned();
@@ -298,7 +294,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
 
 /// Refuses two files whose rows name the same vehicle, and a file whose rows name the vehicle of another file.
 ///
-/// A name that all files share is not taken for the name of a vehicle.
+/// A name shared by all files is not the name of a vehicle.
 fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String]) -> Result<(), ReadError> {
     let own = recordings.iter().map(|tracks| match tracks.vehicles() {
         [only] => Some(only.as_str()),
@@ -315,22 +311,22 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
     if known.len() < 2 {
         return Ok(());
     }
-    // Files that are called by each other's names; numbers of files and of vehicles may begin elsewhere.
+    // Check for exchanged file names. Numbers of files and vehicles may start at different values.
     let files: BTreeSet<_> = called.iter().map(|name| spelling(name)).collect();
     let others = own.iter().zip(paths).zip(called).filter_map(|((name, path), file)| Some(((*name)?, path, file)));
     let mut others = others.filter(|(name, _, file)| spelling(name) != spelling(file));
     if let Some((name, path, _)) = others.next().filter(|_| known.keys().eq(&files)) {
-        let problem = format!("the rows name vehicle {}, which is the name of another file", quoted(name));
+        let problem = format!("the rows name vehicle {}, but another file has this name", quoted(name));
         let remedy = "name each file after its vehicle, or remove the column with the name";
         return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
     }
     let Some((name, first, path)) = twice else { return Ok(()) };
-    let problem = format!("its rows are of the vehicle {}, and so are those of {}", quoted(name), first.display());
-    let remedy = "put all rows of a vehicle into one file, or take the column out that names it";
+    let problem = format!("its rows name the vehicle {}, as do those of {}", quoted(name), first.display());
+    let remedy = "put all rows of a vehicle into one file, or remove the vehicle column";
     Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)))
 }
 
-/// Refuses files in different frames: on the Earth and in plain metres, or with and without directions of the axes.
+/// Refuses files in different frames: Earth or metric coordinates, with or without directions of the axes.
 fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadError> {
     let frame = |tracks: &Recording| {
         let on_earth = tracks.earth_origin().is_some();
@@ -338,14 +334,14 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     };
     let words = |(on_earth, has_directions): (bool, bool)| match (on_earth, has_directions) {
         (true, _) => "are latitudes and longitudes",
-        (false, true) => "are east, north and up by the names of its columns",
+        (false, true) => "are east, north and up by column names",
         (false, false) => "are x, y and z without a direction",
     };
     let Some((first, path)) = recordings.first().zip(paths.first()) else { return Ok(()) };
     let other = recordings.iter().zip(paths).find(|(tracks, _)| frame(tracks) != frame(first));
     other.map_or(Ok(()), |(tracks, other)| {
         let [its, those] = [tracks, first].map(|tracks| words(frame(tracks)));
-        let problem = format!("its positions {its}, and those of {} {those}", path.display());
+        let problem = format!("its positions {its}, but those of {} {those}", path.display());
         Err(ReadError::new(
             other,
             Fault::coded("recording/several-frames", problem, "use one frame and the same column names in all files"),
@@ -353,7 +349,7 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     })
 }
 
-/// Appends notes that are not there yet.
+/// Appends notes that are not yet present.
 fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
     for note in of_part {
         if !notes.contains(note) {
@@ -362,8 +358,8 @@ fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
     }
 }
 
-impl Part {
-    /// Reads the next items where none are waiting.
+impl JoinedFile {
+    /// Reads the next items if none are waiting.
     fn fill(&mut self, vehicle: usize, is_planar: bool) -> Result<(), ReadError> {
         if self.until_s == f64::INFINITY || self.waiting.peek().is_some() {
             return Ok(());
@@ -383,10 +379,10 @@ impl Part {
                     }
                     continue;
                 }
-                Item::Sample(_) => "it holds several vehicles: a column of it names those of its rows",
-                Item::Piece(_) => "it holds a curve, and the first of its files samples",
+                Item::Sample(_) => "it holds several vehicles, named by one of its columns",
+                Item::Piece(_) => "it holds a curve, but the first file holds samples",
             };
-            let remedy = "files that are joined hold the samples of one vehicle each: split it, or take the column out";
+            let remedy = "split it, or remove the vehicle column: joined files hold the samples of one vehicle each";
             return Err(ReadError::new(&self.path, Fault::coded("recording/several-vehicles", problem, remedy)));
         }
         self.until_s = items.last().map_or(self.until_s, Item::time_s);
@@ -407,14 +403,14 @@ impl Tracks for Joined {
         for (vehicle, part) in self.parts.iter_mut().enumerate() {
             part.fill(vehicle, self.metadata.is_planar)?;
         }
-        // Unread items of any part are not earlier than this.
+        // No unread item of any file is earlier than this.
         let until_s = self.parts.iter().map(|part| part.until_s).fold(f64::INFINITY, f64::min);
         for part in &mut self.parts {
             items.extend(std::iter::from_fn(|| part.waiting.next_if(|item| item.time_s() <= until_s)));
         }
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         if items.len() == before {
-            // Some of what a person should know shows at the end.
+            // Some notes appear only at the end.
             for part in &self.parts {
                 note_new(&mut self.metadata.notes, part.tracks.notes());
             }
@@ -432,7 +428,7 @@ mod tests {
     use super::natural;
 
     #[test]
-    fn names_are_ordered_by_their_numbers() {
+    fn names_are_sorted_by_their_numbers() {
         let mut names = ["cf10", "cf9", "a2_10", "a2_9", "cf1"];
         names.sort_by_cached_key(|name| natural(name));
         assert_eq!(names, ["a2_9", "a2_10", "cf1", "cf9", "cf10"]);

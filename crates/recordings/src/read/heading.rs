@@ -1,11 +1,11 @@
-//! Names of columns: a quantity, perhaps of one vehicle, perhaps with a unit; and the units.
+//! Parses column names: a quantity, optionally with a vehicle and a unit.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted, refuse};
 
-/// A list of words with blanks between them.
+/// List of words, separated by blanks.
 #[derive(Clone, Copy)]
 pub(super) struct Words(pub(super) &'static str);
 
@@ -19,41 +19,41 @@ impl Words {
     }
 }
 
-/// What a column gives: its place among [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). Axes follow each
-/// other.
+/// Quantity of a column: an index into [`ColumnNames::ROLES`](super::options::ColumnNames::ROLES). The axes of a vector
+/// have consecutive indices.
 pub(super) type Role = usize;
 pub(super) const TIME: Role = 0;
 pub(super) const ID: Role = 1;
 pub(super) const POSITION: Role = 2;
 pub(super) const VELOCITY: Role = 5;
 pub(super) const RADIUS: Role = 8;
-/// Latitude, longitude and height.
+/// Latitude; longitude and height follow.
 pub(super) const EARTH: Role = 9;
 
 pub(super) fn is_velocity(role: Role) -> bool {
     (VELOCITY..RADIUS).contains(&role)
 }
 
-/// Whether a column gives a latitude or a longitude.
+/// Returns whether a column gives a latitude or a longitude.
 pub(super) fn is_angle(role: Role) -> bool {
     (EARTH..EARTH + 2).contains(&role)
 }
 
 const HEIGHT: Role = EARTH + 2;
-/// A height that counts downwards: no role of its own, but one of a heading.
+/// Height that counts downwards: occurs only in headings, not as a role of the user.
 const DEPTH: Role = EARTH + 3;
 
-/// What latitude and longitude are called.
+/// Names of latitude and longitude.
 const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long", "longitude"]];
 
-/// What may stand in front of these.
+/// Prefixes of these names.
 const EARTH_STARTS: [&str; 4] = ["", "gps_", "gnss_", "global_"];
 
-/// What heights and depths are called.
+/// Names of heights and depths.
 const HEIGHT_NAMES: Words = Words("alt altitude height hgt elevation elev ele agl msl amsl asl hae up");
 const DEPTH_NAMES: [&str; 2] = ["depth", "down"];
 
-/// What may stand in front of these, and behind them: how the height is measured, and from where.
+/// Prefixes and suffixes of these names: reference and method of the measurement.
 const HEIGHT_STARTS: Words = Words(
     "gps gnss global geo geometric geodetic ellipsoidal wgs84 baro barometric barometer pressure rel relative \
      abs absolute local pos position est estimated true raw filtered",
@@ -61,34 +61,34 @@ const HEIGHT_STARTS: Words = Words(
 const HEIGHT_ENDS: Words =
     Words("agl msl amsl asl hae rel relative above_ground above_ground_level above_sea_level above_takeoff");
 
-/// Words that name a quantity with axes, and no vehicle.
-const QUANTITIES: Words = Words(
-    "vel velocity speed acc accel acceleration gyro gyr gyroscope imu mag magnetometer magnetic omega angular \
-     linear rate rates angvel angle angles attitude orientation quat quaternion rot rotation euler rpy twist \
-     wrench force torque moment thrust wind gravity bias noise std sigma var cov covariance err error sp \
-     setpoint ref reference des desired cmd command jerk",
-);
+/// Names of other quantities with axes, which are not vehicles.
+const QUANTITIES: Words = Words(concat!(
+    "vel velocity speed acc accel acceleration gyro gyr gyroscope imu mag magnetometer magnetic ",
+    "omega angular linear rate rates angvel angle angles attitude orientation quat quaternion rot ",
+    "rotation euler rpy twist wrench force torque moment thrust wind gravity bias noise std sigma ",
+    "var cov covariance err error sp setpoint ref reference des desired cmd command jerk",
+));
 
-/// Letters of quantities with axes, which may be vehicles too.
+/// Letters of quantities with axes, which may also be vehicles.
 pub(super) const LETTERS: [&str; 8] = ["a", "f", "g", "j", "q", "u", "v", "w"];
 
-/// What the name of a column says.
+/// Parsed name of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Heading<'a> {
-    /// The vehicle; empty where the name is that of a quantity alone.
+    /// Vehicle; empty if the name is a quantity alone.
     pub(super) vehicle: &'a str,
     pub(super) role: Role,
     pub(super) unit: Option<&'a str>,
-    /// Whether it may as well be a quantity, as `a_x` is an acceleration or the place of `a`.
+    /// Whether the name may also be another quantity: `a_x` is an acceleration or the position of `a`.
     pub(super) ambiguous: bool,
 }
 
 impl<'a> Heading<'a> {
-    /// What a name says, where it is that of a quantity.
+    /// Parses a name; `None` if it is not a known quantity.
     pub(super) fn of(name: &'a str) -> Option<Self> {
         let (stem, unit) = bracketed(name);
         match unit {
-            // Some number vehicles as arrays do: x[0].
+            // A bracketed number is a vehicle: x[0].
             Some(number) if is_number(number) => {
                 Some(Self { vehicle: number, ..Self::new("", quantity(&stem.to_lowercase())?) })
             }
@@ -128,10 +128,10 @@ impl<'a> Heading<'a> {
             Some((separator, Self::new(&name[..at], quantity(&name[at + 1..].to_lowercase())?)))
         })?;
         let ambiguous = LETTERS.contains(&heading.vehicle) && separator == '_';
-        (ambiguous || !says_a_quantity(heading.vehicle)).then_some(Self { ambiguous, ..heading })
+        (ambiguous || !is_quantity_name(heading.vehicle)).then_some(Self { ambiguous, ..heading })
     }
 
-    /// Whether the vehicle is a number.
+    /// Returns whether the vehicle is a number.
     pub(super) fn is_numbered(&self) -> bool {
         is_number(self.vehicle)
     }
@@ -141,7 +141,7 @@ fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// The quantity of a plain name in lower case like `x`, `pos_x`, `vy` or `radius`.
+/// Returns the quantity of a plain lower-case name such as `x`, `pos_x`, `vy` or `radius`.
 fn quantity(name: &str) -> Option<Role> {
     if name == "radius" {
         return Some(RADIUS);
@@ -159,7 +159,8 @@ fn quantity(name: &str) -> Option<Role> {
         .or_else(|| height(&name.replace([' ', '-'], "_")))
 }
 
-/// Whether a name in lower case is that of a height, such as `geoaltitude`, `rel_alt`, `height_above_ground`, or of a depth.
+/// Returns the role of a lower-case name of a height, such as `geoaltitude`, `rel_alt`, `height_above_ground`, or of a
+/// depth.
 fn height(name: &str) -> Option<Role> {
     let role = |name: &str| {
         if HEIGHT_NAMES.contains(name) { Some(HEIGHT) } else { DEPTH_NAMES.contains(&name).then_some(DEPTH) }
@@ -172,16 +173,16 @@ fn height(name: &str) -> Option<Role> {
     behind(name).or_else(|| ends.find_map(behind))
 }
 
-/// Whether the last word of a name is that of a quantity with axes, as in `cf1_gyro` and `../orientation`.
-pub(super) fn says_a_quantity(name: &str) -> bool {
+/// Returns whether the last word of a name is a quantity with axes, as in `cf1_gyro` and `../orientation`.
+pub(super) fn is_quantity_name(name: &str) -> bool {
     let name = name.to_lowercase();
     let words = name.split(|c: char| !c.is_alphanumeric());
     let mut words = words.map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
     words.rfind(|word| !word.is_empty()).is_some_and(|word| QUANTITIES.contains(word))
 }
 
-/// Whether a column that is not read cannot be what tells the vehicles of the rows apart: attitudes, rates, sensors.
-pub(super) fn tells_no_vehicle(name: &str) -> bool {
+/// Returns whether an unused column cannot identify vehicles: attitudes, rates, sensors.
+pub(super) fn is_not_vehicle_column(name: &str) -> bool {
     let stem = bracketed(name).0.to_lowercase();
     let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
     let known = ["", "roll", "pitch", "yaw", "heading", "speed", "battery", "voltage", "thrust", "frame"];
@@ -190,15 +191,16 @@ pub(super) fn tells_no_vehicle(name: &str) -> bool {
         || ["a", "w", "yaw^"].iter().any(|start| is(start, &["x", "y", "z"]))
         || stem
             .rsplit_once(['.', '/', '_'])
-            .is_some_and(|(start, _)| LETTERS.contains(&start) || says_a_quantity(start))
+            .is_some_and(|(start, _)| LETTERS.contains(&start) || is_quantity_name(start))
 }
 
-/// Whether the values of a column of this name could be those of vehicles.
-pub(super) fn may_name(name: &str) -> bool {
-    !is_clock(name) && !tells_no_vehicle(name) && Heading::of(name).is_none()
+/// Returns whether the values of a column with this name could identify vehicles.
+pub(super) fn may_identify_vehicles(name: &str) -> bool {
+    !is_clock(name) && !is_not_vehicle_column(name) && Heading::of(name).is_none()
 }
 
-/// Whether a column would be read as one of a table that names the vehicle of each row: no other may be called so.
+/// Returns whether a table reader would use a column with this name in a long table. Other columns must avoid such
+/// names.
 #[must_use]
 pub fn is_read(name: &str) -> bool {
     let is_own = |heading: Heading<'_>| {
@@ -207,7 +209,7 @@ pub fn is_read(name: &str) -> bool {
     is_clock(name) || is_id(name) || Heading::of(name).is_some_and(is_own)
 }
 
-/// The name of a column of time in lower case without its unit, and the unit.
+/// Splits the name of a time column into the lower-case name without its unit, and the unit.
 pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();
     let (stem, unit) = bracketed(&name);
@@ -220,7 +222,7 @@ pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     (stem.to_owned(), unit.map(str::to_owned))
 }
 
-/// Whether a column says when, in whatever way.
+/// Returns whether a column gives a time, frame number or duration.
 pub(super) fn is_clock(name: &str) -> bool {
     is_time(name) || is_frame(name) || name.eq_ignore_ascii_case("duration")
 }
@@ -231,7 +233,7 @@ pub(super) fn is_time(name: &str) -> bool {
     NAMES.contains(&time_and_unit(name).0.as_str())
 }
 
-/// Whether a column counts pictures or steps.
+/// Returns whether a column counts frames or steps.
 pub(super) fn is_frame(name: &str) -> bool {
     let name = time_and_unit(name).0.replace(['_', ' ', '-', '.'], "");
     let counted = name.trim_end_matches('s');
@@ -242,22 +244,23 @@ pub(super) fn is_frame(name: &str) -> bool {
     matches!(counted, "frame" | "step" | "timestep" | "tick" | "iteration" | "picture")
 }
 
-/// The unit that the name of a column of time says.
-pub(super) fn said_unit(name: &str) -> Option<String> {
+/// Returns the unit in the name of a time column.
+pub(super) fn unit_of_time_name(name: &str) -> Option<String> {
     time_and_unit(name).1
 }
 
-/// Words that name the vehicle of a row, with `id`, `name`, `no` or the like behind them or without.
-const VEHICLES: Words = Words(
-    "vehicle drone uav uas quad quadrotor copter agent robot rover aircraft plane airplane ship vessel boat \
-     usv auv car truck object obj track target body rigidbody model entity actor person pedestrian ped player \
-     unit node tag device callsign flight tail registration icao icao24 hex hexident mmsi imo childframe sys",
-);
+/// Words for vehicles in the names of vehicle columns, with or without a suffix of [`VEHICLE_ENDS`].
+const VEHICLES: Words = Words(concat!(
+    "vehicle drone uav uas quad quadrotor copter agent robot rover aircraft plane airplane ship ",
+    "vessel boat usv auv car truck object obj track target body rigidbody model entity actor person ",
+    "pedestrian ped player unit node tag device callsign flight tail registration icao icao24 hex ",
+    "hexident mmsi imo childframe sys",
+));
 
-/// What may stand behind these.
+/// Suffixes of these words.
 const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num", "index", "code"];
 
-/// Whether a column names the vehicle of a row.
+/// Returns whether a column names the vehicle of a row.
 pub(super) fn is_id(name: &str) -> bool {
     let name = joined(name);
     let is = |stem: &str| VEHICLES.contains(stem);
@@ -267,8 +270,9 @@ pub(super) fn is_id(name: &str) -> bool {
         || behind.into_iter().any(is)
 }
 
-/// How surely a column is a name and not another quantity of a vehicle, 0 for the surest: `id`, then `track_id`, then `name`.
-/// `None` for words that may be a quantity, such as `track`, or a number of a place in a list, such as `object_index`.
+/// Returns how likely a column is a name and not another quantity, 0 for the most likely: `id`, then `track_id`, then
+/// `name`. Returns `None` for words that may be a quantity, such as `track`, or an index in a list, such as
+/// `object_index`.
 pub(super) fn rank_of_name(name: &str) -> Option<u8> {
     match joined(name).as_str() {
         "id" | "uid" | "uuid" => Some(0),
@@ -277,13 +281,13 @@ pub(super) fn rank_of_name(name: &str) -> Option<u8> {
     }
 }
 
-/// A name in lower case without its unit, as one word.
+/// Returns a name in lower case without unit and separators.
 fn joined(name: &str) -> String {
     bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
 }
 
-/// Names of columns with the units that a row below them says. A name that says the same keeps it, and so does one that is
-/// nothing but the unit of a part of a time.
+/// Adds the units of a row of units to the column names. A name keeps an equal unit of its own, and so does a name that
+/// consists of the unit of a part of a time.
 pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String>, Fault> {
     let with_unit = |(name, unit): (&String, &&str)| -> Result<String, Fault> {
         let is_time = is_time(name);
@@ -292,23 +296,30 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
         if is_part || matches!(*unit, "" | "-" | "1") {
             return Ok(name.clone());
         }
-        let said = if is_time {
-            said_unit(name)
+        let own_unit = if is_time {
+            unit_of_time_name(name)
         } else {
             let ending = || endings(name).next().map(|(_, unit, _)| unit);
             bracketed(name).1.or_else(ending).map(str::to_owned)
         };
-        let Some(said) = said else { return Ok(format!("{name} [{unit}]")) };
+        let Some(own_unit) = own_unit else { return Ok(format!("{name} [{unit}]")) };
         let is_same =
-            |velocity: bool| size_of(&said, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
+            |velocity: bool| size_of(&own_unit, velocity).is_some_and(|size| size_of(unit, velocity) == Some(size));
         let time = |unit: &str| TimeUnit::from_name(&unit.to_lowercase());
-        if said.eq_ignore_ascii_case(unit) || is_same(false) || is_same(true) || (is_time && time(&said) == time(unit))
+        if own_unit.eq_ignore_ascii_case(unit)
+            || is_same(false)
+            || is_same(true)
+            || (is_time && time(&own_unit) == time(unit))
         {
             return Ok(name.clone());
         }
-        let problem =
-            format!("column {} says the unit {}, and the row of units {}", quoted(name), quoted(&said), quoted(unit));
-        refuse("recording/unit-conflict", problem, "take one of the two units out")
+        let problem = format!(
+            "column {} has the unit {}, but the row of units {}",
+            quoted(name),
+            quoted(&own_unit),
+            quoted(unit)
+        );
+        refuse("recording/unit-conflict", problem, "remove one of the two units")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());
@@ -329,11 +340,11 @@ const LENGTHS_M: [(&[&str], f64); 10] = [
     (&["nmi"], 1852.0),
 ];
 
-/// Names of times by which a length is divided, and their size \[s\].
+/// Names of times in units of velocity, and their size \[s\].
 const TIMES_S: [(&[&str], f64); 4] =
     [(&["s", "sec", "second"], 1.0), (&["ms"], 0.001), (&["min", "minute"], 60.0), (&["h", "hr", "hour"], 3600.0)];
 
-/// Units that an unbracketed end may say, as in `vx_m_s` and `x_mm`.
+/// Units without brackets at the end of a name, as in `vx_m_s` and `x_mm`.
 const VELOCITY_ENDS: [&str; 6] = ["m_s", "cm_s", "mm_s", "km_s", "km_h", "ft_s"];
 const LENGTH_ENDS: [&str; 6] = ["m", "dm", "cm", "mm", "km", "ft"];
 
@@ -341,7 +352,7 @@ fn size(names: &[(&[&str], f64)], name: &str) -> Option<f64> {
     names.iter().find(|(known, _)| known.contains(&name)).map(|(_, size)| *size)
 }
 
-/// The size of a unit of length \[m\], or of velocity \[m/s\]; none where it is neither.
+/// Returns the size of a unit of length \[m\] or velocity \[m/s\]; `None` for an unknown unit.
 pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
     let unit = unit.trim().to_lowercase();
     if !velocity {
@@ -357,7 +368,7 @@ pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
     Some(size(&LENGTHS_M, length.trim())? / size(&TIMES_S, time.trim())?)
 }
 
-/// The size of a unit of latitude and longitude \[degrees\]; none where it is none.
+/// Returns the size of a unit of latitude and longitude \[degrees\]; `None` for an unknown unit.
 pub(super) fn degrees(unit: &str) -> Option<f64> {
     match unit.trim().to_lowercase().as_str() {
         "deg" | "degree" | "degrees" | "°" => Some(1.0),
@@ -367,7 +378,7 @@ pub(super) fn degrees(unit: &str) -> Option<f64> {
     }
 }
 
-/// The name of a column without the unit at its end, and the unit: `x [mm]`, `x (ft)`.
+/// Splits a name into the part before a bracketed unit and the unit: `x [mm]`, `x (ft)`.
 pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
     let name = name.trim();
     let within = |open, close| name.strip_suffix(close)?.rsplit_once(open);
@@ -377,7 +388,7 @@ pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// The ways to take a unit off the end of a name without brackets, and whether it is one of velocity.
+/// Returns all splits of a name into a part and a unit without brackets, and whether the unit is one of velocity.
 pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
     let units = VELOCITY_ENDS.map(|unit| (unit, true)).into_iter().chain(LENGTH_ENDS.map(|unit| (unit, false)));
     units.filter_map(|(unit, velocity)| {
@@ -386,18 +397,18 @@ pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
     })
 }
 
-/// Columns of a table that are read because their names are those of heights or depths.
+/// Columns of a table that are recognised as heights or depths by their names.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Heights {
     named: BTreeSet<usize>,
-    /// Those that count downwards.
+    /// Columns that count downwards.
     downward: BTreeSet<usize>,
 }
 
 impl Heights {
-    /// Gives headings of heights and depths the role of the third axis of positions, whose first axis is `place`, where their
-    /// vehicle has the other two axes and no third of its own. All others are dropped. `found` are the columns that the user
-    /// names.
+    /// Assigns height and depth columns to the third position axis, if their vehicle has the other two axes and no
+    /// third column. `place` is the role of the first axis. All other height headings are dropped. `found` holds the
+    /// columns named by the user.
     pub(super) fn place(
         place: Role,
         header: &[String],
@@ -405,7 +416,7 @@ impl Heights {
         headings: &mut Vec<(usize, Heading<'_>)>,
     ) -> Self {
         let (third, mut heights) = (place + 2, Self::default());
-        // The user may call the third axis by either name; `z` means the numbers as they are.
+        // The user may name the third axis `z` or `alt`; `z` is read without a change of sign.
         let [z, alt] = [POSITION + 2, HEIGHT].map(|role| found.remove(&(String::new(), role)));
         let given = if third == HEIGHT { alt.or(z) } else { z.or(alt) };
         found.extend(given.map(|column| ((String::new(), third), column)));
@@ -435,12 +446,12 @@ impl Heights {
         self.downward.extend(is_depth.then_some(column));
     }
 
-    /// Columns that count downwards.
+    /// Returns the columns that count downwards.
     pub(super) fn downward(&self) -> impl Iterator<Item = usize> {
         self.downward.iter().copied()
     }
 
-    /// Which of these columns are read as heights because of their names, and whether the sign is turned.
+    /// Returns those of the given columns that are read as heights by name, and whether the sign is inverted.
     pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> Vec<(usize, bool)> {
         let columns: BTreeSet<_> = columns.filter(|column| self.named.contains(column)).collect();
         columns.into_iter().map(|column| (column, self.downward.contains(&column))).collect()

@@ -1,5 +1,4 @@
-//! Names of vehicles, and columns that could name the vehicles of the rows of a table, by their headings and by their
-//! values.
+//! Names of vehicles, and detection of columns that identify vehicles, by header and by values.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -9,18 +8,18 @@ use super::error::{Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
 
-/// Distinct values of a column beyond which it names no vehicles.
+/// Number of distinct values above which a column does not name vehicles.
 const MOST_VALUES: usize = 1000;
 
-/// Positions between two others of the same value from which on positions tell whether a column names vehicles.
+/// Minimum number of compared positions for a decision by smoothness.
 const ENOUGH: u64 = 8;
 
-/// Part of the distance of positions from the straight line between their neighbours that is left where rows of several
-/// vehicles are told apart.
+/// Largest ratio of the deviations from straight lines between neighbours, within equal values to all rows, for which
+/// the values separate vehicles.
 const APART: f64 = 0.5;
 
-/// Key of the name of a vehicle: names that are the same number have one key, and so have names that differ only in upper and
-/// lower case, in zeros before a number, or in marks and blanks that no two digits enclose.
+/// Returns the comparison key of a vehicle name. Names of the same number have one key. So have names that differ only
+/// in case, in zeros before a number, or in marks and blanks that are not between two digits.
 pub(super) fn spelling(name: &str) -> String {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let unsigned = name.strip_prefix('+').unwrap_or(name);
@@ -32,7 +31,7 @@ pub(super) fn spelling(name: &str) -> String {
     }
     let letters: Vec<char> = name.trim().chars().collect();
     let is_digit = |k: usize| letters.get(k).is_some_and(char::is_ascii_digit);
-    // Whether zeros count here: behind a digit of the same number, and behind its point.
+    // Whether zeros count here: after a digit of the same number, and after its decimal point.
     let (mut key, mut in_number) = (String::new(), false);
     for (k, &letter) in letters.iter().enumerate() {
         let is_kept = if letter == '0' {
@@ -48,30 +47,30 @@ pub(super) fn spelling(name: &str) -> String {
     if key.is_empty() { name.trim().to_lowercase() } else { key }
 }
 
-/// That two names are those of one vehicle, or nearly.
-fn alike(first: &str, second: &str) -> Fault {
+/// Returns the fault of two names with the same key.
+fn same_spelling_fault(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
     Fault::coded(
         "recording/vehicle-twice",
         problem,
-        "write one name for one vehicle, and names for two that differ in more than that",
+        "use one name per vehicle, and names that differ in more than spelling",
     )
 }
 
-/// Names in the order of their indices, and the way back.
+/// Vehicle names by index, and their indices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Names {
     in_order: Vec<String>,
     indices: HashMap<Box<str>, usize>,
-    /// Indices by what names are but for their spelling.
+    /// Indices by [`spelling`].
     spellings: HashMap<String, usize>,
 }
 
 impl Names {
-    /// Names in this order.
+    /// Returns these names in their order.
     ///
     /// # Errors
-    /// Where two differ only in how they are spelled.
+    /// If two names differ only in spelling.
     pub(super) fn from_list(names: Vec<String>) -> Result<Self, Fault> {
         let mut all = Self::default();
         for name in names {
@@ -80,23 +79,23 @@ impl Names {
         Ok(all)
     }
 
-    /// `1`, `2`, ... up to `count`.
+    /// Returns the names `1`, `2`, ... up to `count`.
     pub(super) fn numbered(count: usize) -> Self {
         Self::ordered((1..=count).map(|number| number.to_string()).collect())
     }
 
-    /// Names that are known to differ.
+    /// Returns names that are known to differ.
     fn ordered(names: Vec<String>) -> Self {
         let spellings = names.iter().enumerate().map(|(index, name)| (spelling(name), index)).collect();
         let indices = names.iter().enumerate().map(|(index, name)| (name.as_str().into(), index)).collect();
         Self { in_order: names, indices, spellings }
     }
 
-    /// Adds a name and gives its index.
+    /// Adds a name and returns its index.
     fn add(&mut self, name: String) -> Result<usize, Fault> {
         let index = self.in_order.len();
         if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            return Err(alike(&self.in_order[first], &name));
+            return Err(same_spelling_fault(&self.in_order[first], &name));
         }
         self.spellings.insert(spelling(&name), index);
         self.indices.insert(name.as_str().into(), index);
@@ -108,11 +107,11 @@ impl Names {
         &self.in_order
     }
 
-    /// The index of a name, which is new if need be. Looked for first right after the vehicle before, or at the first
-    /// after the last: most files go round.
+    /// Returns the index of a name, adding a new one. Tries first the vehicle after `before`, cyclically: most files
+    /// list vehicles in turn.
     ///
     /// # Errors
-    /// Where a new name differs from another only in how it is spelled.
+    /// If a new name differs from another only in spelling.
     #[inline]
     pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
         let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
@@ -125,7 +124,7 @@ impl Names {
         self.add(name.to_owned())
     }
 
-    /// Puts the names in order of value where all are numbers. Indices given before lose their meaning.
+    /// Sorts the names by value if all are numbers. Invalidates earlier indices.
     pub(super) fn settle(&mut self) {
         let numbers: Option<Vec<u64>> = self.in_order.iter().map(|name| name.parse().ok()).collect();
         let Some(numbers) = numbers else { return };
@@ -135,22 +134,22 @@ impl Names {
     }
 }
 
-/// A second column that could name the vehicles of the rows, beside the one that does.
+/// Alternative vehicle column of a table, compared with the one in use.
 #[derive(Clone, Debug)]
-pub(super) struct Rival {
+pub(super) struct AlternativeId {
     pub(super) column: usize,
-    /// Its value for each vehicle, and the vehicle of each of its values.
+    /// Its value for each vehicle, and the vehicle of each value.
     of: Vec<Option<Box<str>>>,
     vehicles: BTreeMap<Box<str>, usize>,
     contradicts: bool,
 }
 
-impl Rival {
+impl AlternativeId {
     pub(super) fn new(column: usize) -> Self {
         Self { column, of: Vec::new(), vehicles: BTreeMap::new(), contradicts: false }
     }
 
-    /// Takes its value in a row of a vehicle.
+    /// Records the value in a row of a vehicle.
     pub(super) fn see(&mut self, vehicle: usize, value: &str) {
         if value.is_empty() || (self.contradicts && self.vehicles.len() > 1) {
             return;
@@ -168,49 +167,50 @@ impl Rival {
         }
     }
 
-    /// Whether it tells vehicles apart otherwise than the column that was read: a value that is the same everywhere tells none.
+    /// Returns whether it distinguishes vehicles differently from the column in use. A constant column distinguishes
+    /// none.
     pub(super) fn is_one(&self) -> bool {
         self.contradicts && self.vehicles.len() > 1
     }
 }
 
-/// A column that is not read, over the rows of one vehicle: its values may be those of several vehicles.
+/// Unused column, examined over the rows of one vehicle: its values may distinguish several vehicles.
 #[derive(Clone, Debug)]
-pub(super) struct Suspect {
+pub(super) struct SuspectColumn {
     pub(super) column: usize,
     values: HashMap<Box<str>, Value>,
     last: Option<Box<str>>,
-    /// The last two rows, whatever their value.
+    /// Last two rows, of any value.
     track: Track,
     rows: u64,
     changes: u64,
-    /// Changes to a value that was there before.
+    /// Number of changes to an earlier value.
     returns: u64,
-    /// Times that go back, and those at which the value changes.
+    /// Number of steps back in time, and of those with a change of the value.
     backwards: [u64; 2],
-    /// Positions that were compared with those of the rows around them, and how far they are off in all: among rows of the same
-    /// value, and among all.
+    /// Number of positions compared with their neighbours, and the sum of their deviations: among rows of the same
+    /// value, and among all rows.
     compared: u64,
     off: [f64; 2],
-    /// Whether a value is a number with decimals, which measures something or else numbers vehicles in an odd way.
+    /// Whether a value has decimals: a measurement, or an unusual vehicle number.
     has_decimals: bool,
     /// Whether it cannot name vehicles.
     cleared: bool,
 }
 
-/// Rows of one value.
+/// Statistics of one value.
 #[derive(Clone, Copy, Debug, Default)]
 struct Value {
     rows: u64,
     track: Track,
 }
 
-/// The last two rows of several, each with its time.
+/// Last two rows, each with its time.
 #[derive(Clone, Copy, Debug, Default)]
 struct Track([Option<(f64, Vector3<f64>)>; 2]);
 
 impl Track {
-    /// Takes the next row, and gives how far the one before is off the straight line between its neighbours.
+    /// Adds a row; returns the deviation of the row before from the straight line between its neighbours.
     fn push(&mut self, time: f64, position: Vector3<f64>) -> Option<f64> {
         let [first, middle] = self.0;
         self.0 = [middle, Some((time, position))];
@@ -220,7 +220,7 @@ impl Track {
     }
 }
 
-impl Suspect {
+impl SuspectColumn {
     pub(super) fn new(column: usize) -> Self {
         Self {
             column,
@@ -242,7 +242,7 @@ impl Suspect {
         self.cleared
     }
 
-    /// Takes its value in the next row.
+    /// Records the value in the next row.
     pub(super) fn see(&mut self, value: &str, time: f64, position: Vector3<f64>) {
         self.has_decimals |= value.parse::<f64>().is_ok_and(|number| number.fract() != 0.0 || !number.is_finite());
         if self.values.len() > MOST_VALUES {
@@ -275,9 +275,9 @@ impl Suspect {
         }
     }
 
-    /// Whether its values are those of several vehicles: few values that come again while time goes on, and words that change
-    /// from row to row, or rows of one value that are on a smoother path than all rows. Only the path decides about numbers with
-    /// decimals, and in a table that `names_others`.
+    /// Returns whether the values distinguish vehicles. Candidates are few values that recur as time increases. They
+    /// must alternate as words, or their rows must form smoother paths than all rows. For numbers with decimals, and if
+    /// `names_others` is set, only the paths decide.
     fn names_vehicles(&self, names_others: bool) -> bool {
         let values = self.values.len() as u64;
         if self.cleared || values < 2 || 2 * values > self.rows + 1 {
@@ -289,23 +289,23 @@ impl Suspect {
         if names_others || self.has_decimals {
             return self.returns > 0 && self.compared >= ENOUGH && is_smoother;
         }
-        // Measured text, such as a mode, seldom changes.
+        // Measured text, such as a flight mode, rarely changes.
         let is_text = self.values.keys().all(|value| value.parse::<f64>().is_err());
-        let is_told = if is_text || self.compared < ENOUGH { alternates || is_smoother } else { is_smoother };
-        is_sequence || (self.returns > 0 && is_told)
+        let is_distinctive = if is_text || self.compared < ENOUGH { alternates || is_smoother } else { is_smoother };
+        is_sequence || (self.returns > 0 && is_distinctive)
     }
 
-    /// Returns the fault of rows in which this column, `called` so, names several vehicles. `named` holds the name that another
-    /// column gives all of these rows, and what that column is called.
+    /// Returns the fault of rows in which the column `called` seems to name several vehicles. `named` holds the vehicle
+    /// name of all these rows, and the name of the column that gives it.
     pub(super) fn fault(&self, called: &str, named: Option<(&str, &str)>) -> Option<Fault> {
         if !self.names_vehicles(named.is_some()) {
             return None;
         }
         let count = self.values.len();
         let (whose, otherwise) = match named {
-            None => ("its rows".to_owned(), "where all rows are of one vehicle, say so with --one-vehicle".to_owned()),
+            None => ("its rows".to_owned(), "if all rows are of one vehicle, use --one-vehicle".to_owned()),
             Some((name, id)) => {
-                let otherwise = format!("where column {id} does name the vehicles, say so with --column id={id}");
+                let otherwise = format!("if column {id} does name the vehicles, confirm it with --column id={id}");
                 (format!("the rows of vehicle {}", quoted(name)), otherwise)
             }
         };
@@ -324,19 +324,19 @@ const SEPARATORS: [char; 6] = ['.', '/', '_', '-', ':', ' '];
 /// Names of the first two axes of a position.
 const AXES: [[&str; 2]; 4] = [["x", "y"], ["east", "north"], ["lat", "lon"], ["e", "n"]];
 
-/// Names of arrays that hold a position.
+/// Names of position arrays.
 const ARRAYS: [&str; 7] = ["p", "pos", "position", "xyz", "location", "coord", "coords"];
 
-/// Columns of a wide table that say which vehicle a group of columns is of.
+/// Columns of a wide table with the vehicle names of its column groups.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Slots {
-    /// The column with the name of the vehicle, for each group; empty if there are no such columns.
+    /// Column with the name of the vehicle, for each group; empty without such columns.
     pub(super) ids: Vec<usize>,
-    /// Columns of one quantity, such as `a.track` and `b.track`, whose values may be names too.
+    /// Columns of one quantity, such as `a.track` and `b.track`, whose values may also be vehicle names.
     pub(super) watched: Vec<Vec<usize>>,
 }
 
-/// Returns what the columns that are not read say of the `vehicles` of a wide table.
+/// Finds name columns among the unused columns of a wide table with these `vehicles`.
 ///
 /// # Errors
 /// - A column gives the time of one vehicle.
@@ -354,7 +354,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
         for (vehicle, rest) in found {
             if rest.split(['.', '/']).any(heading::is_time) {
                 let (called, vehicle) = (quoted(&header[column]), quoted(&vehicles[vehicle]));
-                let problem = format!("column {called} gives a time of vehicle {vehicle} alone");
+                let problem = format!("column {called} gives the time of vehicle {vehicle} only");
                 let remedy =
                     "write one row for each vehicle and time, or remove the column if it repeats the time of the row";
                 return refuse("recording/several-clocks", problem, remedy);
@@ -387,7 +387,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     Ok(Slots { watched: quantities.into_values().filter(is_watched).collect(), ids })
 }
 
-/// Values of one quantity of all vehicles in the last row.
+/// Values of one quantity of all vehicles, compared from row to row.
 #[derive(Clone, Debug)]
 pub(super) struct SwapMonitor {
     pub(super) columns: Vec<usize>,
@@ -399,7 +399,7 @@ impl SwapMonitor {
         Self { columns, last: Vec::new() }
     }
 
-    /// Refuses different values that change places from one row to the next: the columns may name vehicles.
+    /// Refuses distinct values that are permuted from one row to the next: the columns may name vehicles.
     pub(super) fn see(&mut self, now: Vec<String>, header: &[String]) -> Result<(), Fault> {
         let sorted = |values: &[String]| {
             let mut values = values.to_vec();
@@ -412,9 +412,10 @@ impl SwapMonitor {
                 values.windows(2).all(|two| two[0] != two[1]) && values.iter().all(|value| !value.is_empty());
             if are_names && values == sorted(&self.last) {
                 let called = quoted(&header[self.columns[0]]);
-                let problem =
-                    format!("the values of column {called} and of its like change places, as names of vehicles do");
-                let remedy = "name these columns like `a.id`, or remove them if their values are no names";
+                let problem = format!(
+                    "the values of column {called} and its counterparts are exchanged, as names of vehicles are"
+                );
+                let remedy = "name these columns like `a.id`, or remove them if their values are not names";
                 return refuse("recording/ambiguous-vehicle", problem, remedy);
             }
         }
@@ -423,8 +424,9 @@ impl SwapMonitor {
     }
 }
 
-/// Returns the vehicles that `column` is of, with the rest of `column`: the name of the vehicle is a prefix, a suffix or a bracketed
-/// part, or begins with the path of the column as that of no other vehicle does (`drones.0.id` beside `drones.0.pose`).
+/// Returns the vehicles of `column`, each with the rest of its name. The name of the vehicle is a prefix, a suffix or a
+/// bracketed part. Alternatively only this vehicle shares a path prefix with the column (`drones.0.id` beside
+/// `drones.0.pose`).
 fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)> {
     let (stem, unit) = heading::bracketed(column);
     let rest = |vehicle: &String| {
@@ -455,7 +457,7 @@ fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)
     path_of_one.into_iter().filter(|_| vehicles.len() > 1).collect()
 }
 
-/// Returns two names that differ only in the axis, unless the rest of the names is a quantity with axes.
+/// Returns two names that differ only in the axis, unless the rest of the names is another quantity with axes.
 fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     let lower = |name: &str| {
         let (stem, unit) = heading::bracketed(name);
@@ -468,7 +470,7 @@ fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     let is_position = |rest: &str, [first, _]: [&str; 2]| {
         let letters: String = rest.chars().filter(char::is_ascii_alphabetic).collect();
         let is_bare = letters.is_empty();
-        is_bare || (first != "e" && !heading::LETTERS.contains(&&*letters) && !heading::says_a_quantity(rest))
+        is_bare || (first != "e" && !heading::LETTERS.contains(&&*letters) && !heading::is_quantity_name(rest))
     };
     let array = known.iter().find_map(|(name, original)| {
         let stem = name.strip_suffix("[0]")?;
@@ -494,7 +496,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_differ_only_in_how_they_are_written_have_one_key() {
+    fn equivalent_spellings_have_one_key() {
         for (name, other) in [
             ("1", "1.0"),
             ("1", "+1"),

@@ -1,12 +1,12 @@
-//! Columns of a table by their roles, as the header gives them.
+//! Assigns the columns of a table to roles by its header.
 //!
-//! A *long* table has a row for each vehicle and time, a *wide* one a row for each time. Names are compared without
-//! regard to case. A unit that a name says is honoured, and one that is not known is refused.
+//! A *long* table has one row per vehicle and time, a *wide* table one row per time. Names are compared without regard
+//! to case. Units in names are applied, and unknown units are refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::axes::Convention;
-use super::clock::{Rest, TimeUnit};
+use super::clock::{SubunitColumn, TimeUnit};
 use super::error::{Fault, list, quoted, refuse};
 use super::heading::{EARTH, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
 use super::identity::Slots;
@@ -14,46 +14,47 @@ use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
 use super::{axes, clock, heading, identity};
 
-/// Names of places that are no vehicles.
+/// Names of places that are not vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
 
-/// The columns of a table.
+/// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Layout {
-    /// The column of time; none where the number of the row is the time.
+    /// Column of the time; `None` if the row number is the time.
     pub(super) time: Option<usize>,
-    /// The column of the rest of the time below a unit of the first.
-    pub(super) rest: Option<Rest>,
-    /// The unit in the name of the column of time.
+    /// Column of the remainder of the time, in a smaller unit.
+    pub(super) rest: Option<SubunitColumn>,
+    /// Unit in the name of the time column.
     pub(super) unit: Option<TimeUnit>,
-    /// The column of the vehicle in a long table.
+    /// Column of the vehicle in a long table.
     pub(super) id: Option<usize>,
-    /// Whether the user says that this column is the one.
+    /// Whether the user names the column `id`.
     pub(super) is_id_given: bool,
-    /// Other columns of a long table that could name the vehicles, by their names.
-    pub(super) rivals: Vec<usize>,
-    /// Columns that are not read, whose values could name vehicles where there seems to be a single one.
+    /// Other columns of a long table whose names could be those of a vehicle column.
+    pub(super) alternative_ids: Vec<usize>,
+    /// Unused columns whose values could identify vehicles in a table that seems to hold only one.
     pub(super) suspects: Vec<usize>,
-    /// The vehicles of a wide table by name; none of a long one.
+    /// Names of the vehicles of a wide table; empty for a long one.
     pub(super) names: Vec<String>,
-    /// The columns of each vehicle of a wide table, or of every row of a long one.
-    pub(super) bodies: Vec<Body>,
-    /// Columns that say which vehicle each of these is, where a wide table has such.
+    /// Columns of each vehicle of a wide table, or of every row of a long one.
+    pub(super) bodies: Vec<VehicleColumns>,
+    /// Columns with the vehicle names of a wide table, if any.
     pub(super) slots: Slots,
-    /// What the numbers of each column are multiplied by: the size of the unit that its name says \[m or m/s\], or 1.
+    /// Factor of each column: the size of the unit in its name \[m or m/s\], or 1.
     pub(super) metres: Vec<f64>,
-    /// Whether positions are latitude and longitude \[degrees\] and height \[m\].
+    /// Whether positions are latitude, longitude \[degrees\] and height \[m\].
     pub(super) on_earth: bool,
-    /// Frames and programs that the names of the columns tell.
+    /// Frames and programs recognised by the column names.
     pub(super) convention: Convention,
-    /// Whether some vehicle has no column of its height: then no vehicle has one.
+    /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
     /// Notes for the user about the columns.
     pub(super) notes: Vec<String>,
 }
 
 impl Layout {
-    /// Returns the layout of a table with this header. A table whose rows name no vehicle is of the vehicle `alone`.
+    /// Returns the layout of a table with this header. `alone` is the name of the vehicle in a table without vehicle
+    /// names.
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions() {
@@ -70,18 +71,18 @@ impl Layout {
             None => clock::unit_of_time(&header[time], options)?
                 .or(convention.counts_from_boot.then_some(TimeUnit::Microseconds)),
         };
-        let (id, rivals) = naming_columns(header, time, columns.get("", ID));
+        let (id, alternative_ids) = naming_columns(header, time, columns.get("", ID));
         let is_id_given = columns.get("", ID).is_some();
 
         let is_taken = |column| column == time || id == Some(column) || rest.is_some_and(|rest| rest.column == column);
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
-        // Metres go before degrees where a table has both.
+        // A table with both metres and degrees is read in metres.
         let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         columns.place = if on_earth { EARTH } else { POSITION };
-        let elsewhere = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
+        let in_other_frame = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
         headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
         columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
         let given: BTreeSet<_> = columns.found.keys().map(|(_, role)| *role).collect();
@@ -91,7 +92,7 @@ impl Layout {
             }
         }
         let one = columns.get("", columns.place).is_some();
-        // A table that repeats its columns has more vehicles than its rows name.
+        // Repeated columns are an error: the table has more vehicles than its rows name.
         let repeated = headings.iter().filter(|(_, heading)| heading.is_numbered() && (one || id.is_some()));
         for (column, heading) in repeated {
             if columns.get("", heading.role).is_some() {
@@ -109,21 +110,21 @@ impl Layout {
             };
             let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
             let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
-            let lost = elsewhere.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
+            let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
             lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
         }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
         let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
         let is_planar = !flat.is_empty();
-        let bodies = if is_planar { bodies.into_iter().map(Body::flattened).collect() } else { bodies };
+        let bodies = if is_planar { bodies.into_iter().map(VehicleColumns::flattened).collect() } else { bodies };
         let mut layout = Self {
             time: Some(time),
             rest,
             unit,
             id,
             is_id_given,
-            rivals,
+            alternative_ids,
             names,
             bodies,
             on_earth,
@@ -141,7 +142,7 @@ impl Layout {
         layout.notes.extend(convention.note.clone());
         if is_planar {
             let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
-            layout.notes.push(format!("there is no column for the height{of}: {PLANAR}"));
+            layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
         }
         layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
         layout.convention = convention;
@@ -155,14 +156,14 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Refuses a header in which some columns of positions give the direction of their axis and others do not.
+    /// Refuses a header in which only some position columns give the direction of their axis.
     fn refuse_other_frames(&self, header: &[String], heights: &Heights, convention: &Convention) -> Result<(), Fault> {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
         let of_heights: BTreeSet<_> =
             heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
-        let of = |body: &Body| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
+        let of = |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
         let positions = self.bodies.iter().flat_map(of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
             .filter(|column| !of_heights.contains(column))
@@ -174,42 +175,39 @@ impl Layout {
                 refuse(
                     "recording/several-frames",
                     problem,
-                    "name the axes of all positions in the same way, as in `x_ned` or `north`",
+                    "name the axes of all positions alike, as in `x_ned` or `north`",
                 )
             }
             _ => Ok(()),
         }
     }
 
-    /// Refuses what the columns do not say of the vehicles, and notes what a person should know. `one`: the columns of a position
-    /// name no vehicle.
+    /// Refuses columns that leave the vehicles ambiguous, and adds notes. `one`: the position columns name no vehicle.
     fn check(&mut self, header: &[String], options: &ReadOptions, one: bool) -> Result<(), Fault> {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
-            let problem = format!("its positions are in metres, and --scale {} says another unit", options.metres());
-            return refuse("recording/contradicts-option", problem, "leave --scale away");
+            let problem = format!("its positions are in metres, but --scale is {}", options.metres());
+            return refuse("recording/contradicts-option", problem, "omit --scale");
         }
         let several = self
             .id
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return refuse(
-                "recording/contradicts-option",
-                format!("{namer} names the vehicles"),
-                "leave --one-vehicle away",
-            );
+            return refuse("recording/contradicts-option", format!("{namer} names the vehicles"), "omit --one-vehicle");
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
-        // The user names the column of the vehicle, or says that all rows are of one vehicle.
+        // Skipped if the user names the vehicle column or declares a single vehicle.
         if (self.id.is_some() || one) && !options.one_vehicle && !self.is_id_given {
-            let may_name =
-                |column: &usize| heading::may_name(&header[*column]) && !clock::is_part_of_time(&header[*column]);
-            let suspects = unused.clone().filter(|column| may_name(column) && !self.rivals.contains(column));
+            let may_identify_vehicles = |column: &usize| {
+                heading::may_identify_vehicles(&header[*column]) && !clock::is_part_of_time(&header[*column])
+            };
+            let suspects =
+                unused.clone().filter(|column| may_identify_vehicles(column) && !self.alternative_ids.contains(column));
             self.suspects = suspects.collect();
         }
-        // Pandas writes `x.1` for a second column `x`.
+        // Pandas renames a second column `x` to `x.1`.
         let repeats = |&column: &usize| {
             let (stem, number) = header[column].rsplit_once('.')?;
             let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
@@ -221,15 +219,15 @@ impl Layout {
             return refuse(
                 "recording/ambiguous-column",
                 problem,
-                "give the columns of each vehicle a name of their own, or take these out",
+                "rename the columns of each vehicle, or remove these columns",
             );
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
-        let is_told = is_one_vehicle || convention.is_one_vehicle;
-        if self.id.is_none() && one && !is_told && !unused.iter().all(|name| heading::tells_no_vehicle(name)) {
+        let is_decided = is_one_vehicle || convention.is_one_vehicle;
+        if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::is_not_vehicle_column(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { code, problem, remedy } => {
-                    let remedy = format!("{remedy}; where all rows are of one vehicle, say so with --one-vehicle");
+                    let remedy = format!("{remedy}; if all rows are of one vehicle, use --one-vehicle");
                     Fault::coded(code, problem, remedy)
                 }
                 fault => fault,
@@ -237,50 +235,50 @@ impl Layout {
         }
         if let Some((time, rest)) = self.time.zip(self.rest) {
             let (whole, rest) = (quoted(&header[time]), quoted(&header[rest.column]));
-            self.notes.push(format!("a time is {whole} and, below a unit of that, {rest}"));
+            self.notes.push(format!("times are the sum of {whole} and the remainder {rest}"));
         }
         if !unused.is_empty() {
             self.notes.push(format!("columns not used: {}", unused.join(", ")));
         }
         if !self.names.is_empty() && self.slots.ids.is_empty() && !is_one_vehicle {
-            self.notes.push(format!("vehicles, going by the names of columns: {}", list(&self.names, 50)));
+            self.notes.push(format!("vehicles by column names: {}", list(&self.names, 50)));
         }
         Ok(())
     }
 
-    /// The columns that are read or looked at, each once, in rising order.
+    /// Returns the columns that are read or examined, each once, in ascending order.
     pub(super) fn columns_to_see(&self) -> Vec<usize> {
         let columns: BTreeSet<_> = self
             .columns()
             .into_iter()
-            .chain(self.rivals.iter().copied())
+            .chain(self.alternative_ids.iter().copied())
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .collect();
         columns.into_iter().collect()
     }
 
-    /// The columns that are read, each once, in rising order.
+    /// Returns the columns that are read, each once, in ascending order.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let of = |body: &Body| {
+        let of = |body: &VehicleColumns| {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
-        let beside = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
+        let others = self.convention.reference.into_iter().flatten().chain(self.convention.valid.iter().copied());
         let columns: BTreeSet<_> = self
             .bodies
             .iter()
             .flat_map(of)
-            .chain(self.of_time())
+            .chain(self.time_columns())
             .chain(self.id)
-            .chain(beside)
+            .chain(others)
             .chain(self.slots.ids.iter().copied())
             .collect();
         columns.into_iter().collect()
     }
 
-    /// The columns of the time.
-    pub(super) fn of_time(&self) -> impl Iterator<Item = usize> {
+    /// Returns the columns of the time.
+    pub(super) fn time_columns(&self) -> impl Iterator<Item = usize> {
         self.time.into_iter().chain(self.rest.map(|rest| rest.column))
     }
 }
@@ -310,24 +308,24 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
     )
 }
 
-/// The column that names the vehicles, and others that could; none where the user says which one it is.
+/// Returns the vehicle column and other possible ones; a column given by the user has no alternatives.
 fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Option<usize>, Vec<usize>) {
     let is_one = |&column: &usize| column != time && heading::is_id(&header[column]);
     let mut named = (0..header.len()).filter(is_one);
     if given.is_some() { (given, Vec::new()) } else { (named.next(), named.collect()) }
 }
 
-/// The columns of a position, and of what else is known of a vehicle.
+/// Columns of the position, velocity and radius of a vehicle.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Body {
-    /// x, y and z, if there is one; or latitude, longitude and height.
+pub(super) struct VehicleColumns {
+    /// x, y and optionally z; or latitude, longitude and height.
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
 }
 
-impl Body {
-    /// The same without a height.
+impl VehicleColumns {
+    /// Removes the height.
     pub(super) fn flattened(mut self) -> Self {
         self.position[2] = None;
         self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
@@ -350,11 +348,11 @@ const WORDS: [&str; 12] = [
     "the height",
 ];
 
-/// The fault that there is no column of a role.
+/// Returns the fault of a missing column for a role.
 pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
-    let problem = format!("there is no column for {}{of}; its columns are {}", WORDS[role], list(header, 12));
+    let problem = format!("no column gives {}{of}; its columns are {}", WORDS[role], list(header, 12));
     let option = ColumnNames::ROLES[role];
-    let remedy = format!("name the column with --column {option}=NAME, or put it into the header");
+    let remedy = format!("name the column with --column {option}=NAME, or rename it");
     Fault::coded(code_of_missing(role), problem, remedy)
 }
 
@@ -367,19 +365,19 @@ fn code_of_missing(role: Role) -> &'static str {
     }
 }
 
-/// Columns found so far: of a vehicle by its name, or of all vehicles under no name.
+/// Columns found so far, by vehicle name and role; the name is empty for columns of all vehicles.
 pub(super) struct Columns<'a> {
     pub(super) header: &'a [String],
     pub(super) found: BTreeMap<(String, Role), usize>,
-    /// The unit that the name of a column says.
+    /// Unit in the name of a column.
     pub(super) units: BTreeMap<usize, &'a str>,
     pub(super) heights: Heights,
-    /// The role of the first axis of positions.
+    /// Role of the first position axis.
     pub(super) place: Role,
 }
 
 impl<'a> Columns<'a> {
-    /// Returns the columns that the user names.
+    /// Returns the columns named by the user.
     pub(super) fn given(header: &'a [String], options: &'a ReadOptions) -> Result<Self, Fault> {
         let (heights, place) = (Heights::default(), POSITION);
         let mut columns = Self { header, found: BTreeMap::new(), units: BTreeMap::new(), heights, place };
@@ -387,7 +385,7 @@ impl<'a> Columns<'a> {
             let column = header.iter().position(|column| column == name);
             let column = column.ok_or_else(|| missing(header, role, &format!(" with the name `{name}`")))?;
             columns.found.insert((String::new(), role), column);
-            // An unknown unit in the name of a column that the user gives is ignored.
+            // An unknown unit in the name of a given column is ignored.
             let ending = || heading::endings(name).find(|(_, _, velocity)| *velocity == is_velocity(role));
             let unit = heading::bracketed(name).1.or_else(|| ending().map(|(_, unit, _)| unit));
             let unit = unit.filter(|unit| is_angle(role) || heading::size_of(unit, is_velocity(role)).is_some());
@@ -400,24 +398,28 @@ impl<'a> Columns<'a> {
         self.found.get(&(vehicle.to_owned(), role)).copied()
     }
 
-    /// What a person should know of columns that are read because their names are those of heights, which are up whatever
-    /// the user says of the other axes.
-    pub(super) fn heights_used(&self, bodies: &[Body], options: &ReadOptions) -> Result<Option<String>, Fault> {
+    /// Returns the note on height columns recognised by name. Such heights point up, whatever the mapping of the other
+    /// axes.
+    pub(super) fn heights_used(
+        &self,
+        bodies: &[VehicleColumns],
+        options: &ReadOptions,
+    ) -> Result<Option<String>, Fault> {
         let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
         let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
         if self.place != EARTH {
             axes::refuse_turned_height(options, &self.header[first])?;
         }
         let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
-        let turned = if is_turned { ", with the sign turned" } else { "" };
+        let turned = if is_turned { ", with opposite sign" } else { "" };
         let scale = options.metres();
         let unit = match self.units.get(&first) {
-            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m as --scale says"),
-            None if self.place == EARTH => ", in metres: the name says no unit (--scale gives another)".to_owned(),
+            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m (--scale)"),
+            None if self.place == EARTH => ", in metres: the name has no unit (--scale sets another)".to_owned(),
             _ => String::new(),
         };
         let columns = if used.len() > 1 { "columns" } else { "column" };
-        Ok(Some(format!("heights are those of {columns} {}{turned}{unit}", list(&names, 12))))
+        Ok(Some(format!("heights are read from {columns} {}{turned}{unit}", list(&names, 12))))
     }
 
     pub(super) fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
@@ -426,25 +428,25 @@ impl<'a> Columns<'a> {
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
         let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
-        refuse("recording/ambiguous-column", problem, "name the one that is meant with --column, or take the other out")
+        refuse("recording/ambiguous-column", problem, "name one of them with --column, or remove the other")
     }
 
-    /// Finds the vehicles of a wide table, and gives their names in order of appearance.
+    /// Finds the vehicles of a wide table; returns their names in order of appearance.
     pub(super) fn claim_wide(&mut self, headings: &[(usize, Heading<'a>)]) -> Result<Vec<String>, Fault> {
         let named: Vec<_> = headings.iter().filter(|(_, heading)| !heading.vehicle.is_empty()).collect();
         let vehicles: BTreeSet<_> = named.iter().map(|(_, heading)| heading.vehicle).collect();
-        // Where all vehicles are called by letters, `a` is one of them; beside none or numbers `a_x` is an acceleration.
+        // If all vehicles are named by letters, `a` is one of them. Otherwise `a_x` is an acceleration.
         let sure = |heading: &Heading<'_>| !heading.ambiguous && !heading.is_numbered();
         let letters = named.iter().any(|(_, heading)| sure(heading));
         let words = named.iter().find(|(_, heading)| sure(heading) && heading.vehicle.len() > 1);
         let odd = named.iter().find(|(_, heading)| heading.ambiguous);
         if let (Some((odd, _)), Some((word, _))) = (odd, words) {
             let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
-            let problem = format!("column {odd} may be of a vehicle, as {word} is, or of a quantity of another one");
-            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or take it out");
+            let problem = format!("column {odd} may belong to a vehicle, like {word}, or be another quantity");
+            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or remove it");
         }
         let mut names: Vec<String> = Vec::new();
-        // `cf1_v_x` is a velocity where there is a `cf1_x`.
+        // `cf1_v_x` is a velocity if there is a `cf1_x`.
         let of_another = |vehicle: &str| {
             let split = vehicle.rsplit_once(['.', '/', '_']).filter(|(_, letter)| heading::LETTERS.contains(letter));
             split.is_some_and(|(other, _)| vehicles.contains(other))
@@ -464,9 +466,9 @@ impl<'a> Columns<'a> {
         Ok(names)
     }
 
-    /// The columns of a vehicle: at least x and y of its position, and its velocity along each axis of its position where
-    /// it has one along some axis.
-    pub(super) fn body(&self, vehicle: &str) -> Result<Body, Fault> {
+    /// Returns the columns of a vehicle. Requires x and y of the position; a velocity must have the same axes as the
+    /// position.
+    pub(super) fn body(&self, vehicle: &str) -> Result<VehicleColumns, Fault> {
         let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
         let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
         let (position, velocity) = (axes(self.place), axes(VELOCITY));
@@ -479,11 +481,11 @@ impl<'a> Columns<'a> {
             };
             return Err(missing(self.header, lacks + axis, &of));
         }
-        Ok(Body { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
+        Ok(VehicleColumns { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }
 
-    /// What the numbers of each column are multiplied by, going by the units that names say: all names or none, and
-    /// nothing beside them.
+    /// Returns the factor of each column by the unit in its name. If one length unit is not metres, all names need a
+    /// unit and `--scale` is refused.
     pub(super) fn metres(&self, used: &[usize], scale: f64) -> Result<Vec<f64>, Fault> {
         let mut metres = vec![1.0; self.header.len()];
         let (mut other, mut silent) = (None, None);
@@ -494,12 +496,8 @@ impl<'a> Columns<'a> {
             if is_angle(role) {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
-                    let problem = format!("column {name} says a unit of angle that is not known, {}", quoted(unit));
-                    Fault::coded(
-                        "recording/unknown-unit",
-                        problem,
-                        "write it in degrees, and name the column without a unit",
-                    )
+                    let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
+                    Fault::coded("recording/unknown-unit", problem, "write degrees, without a unit in the column name")
                 })?;
                 continue;
             }
@@ -509,9 +507,9 @@ impl<'a> Columns<'a> {
             };
             let what = if is_velocity(role) { "velocity" } else { "length" };
             let size = heading::size_of(unit, is_velocity(role)).ok_or_else(|| {
-                let problem = format!("column {name} says a unit of {what} that is not known, {}", quoted(unit));
+                let problem = format!("column {name} has an unknown unit of {what}, {}", quoted(unit));
                 let remedy =
-                    "write it in m, cm, mm, km, ft or in, or name the column with --column and its unit with --scale";
+                    "use m, cm, mm, km, ft or in, or name the column with --column and set its unit with --scale";
                 Fault::coded("recording/unknown-unit", problem, remedy)
             })?;
             metres[column] = size;
@@ -534,19 +532,19 @@ impl<'a> Columns<'a> {
             return Ok(metres);
         };
         if let Some(silent) = silent {
-            let problem = format!("column {other} says its unit, and column {silent} none");
+            let problem = format!("column {other} has a unit in its name, but column {silent} has none");
             return refuse(
                 "recording/unit-conflict",
                 problem,
-                "write the unit of each column into its name, as in `x [mm]`",
+                "put a unit into the name of each column, as in `x [mm]`",
             );
         }
         if scale != 1.0 {
-            let problem = format!("column {other} says its unit, and --scale {scale} another");
+            let problem = format!("column {other} has a unit in its name, which contradicts --scale {scale}");
             return refuse(
                 "recording/contradicts-option",
                 problem,
-                "leave --scale away, or take the units out of the header",
+                "omit --scale, or remove the units from the header",
             );
         }
         Ok(metres)
@@ -567,22 +565,22 @@ mod tests {
     }
 
     #[test]
-    fn a_long_header_is_read_in_any_order() {
+    fn long_header_is_read_in_any_order() {
         let layout = layout("z,Y [m],id,x,time_ms,vx,vy,vz,battery").expect("a layout");
-        let body = Body { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
+        let body = VehicleColumns { position: at([3, 1, 0]), velocity: Some(at([5, 6, 7])), radius: None };
         assert_eq!((layout.time, layout.unit), (Some(4), Some(TimeUnit::Milliseconds)));
         assert_eq!((layout.id, layout.bodies), (Some(2), vec![body]));
         assert_eq!(layout.notes, ["columns not used: battery"]);
     }
 
     #[test]
-    fn what_moves_in_a_plane_needs_no_velocity_along_z() {
+    fn planar_motion_needs_no_velocity_along_z() {
         let body = layout("t,id,x,y,vx,vy").expect("a layout").bodies.remove(0);
         assert_eq!((body.position[2], body.velocity), (None, Some([Some(4), Some(5), None])));
     }
 
     #[test]
-    fn wide_headers_are_read_by_number_and_by_name() {
+    fn wide_header_is_read_by_number_and_by_name() {
         for (header, vehicles) in [
             ("t,x1,y1,z1,x2,y2,z2", ["1", "2"]),
             ("t (s),cf1.x,cf1.y,cf1.z,Leader.x,Leader.y,Leader.z", ["cf1", "Leader"]),
@@ -595,10 +593,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_or_double_is_named() {
+    fn missing_and_repeated_columns_are_named() {
         let fault = |header: &str| layout(header).expect_err("refused").to_string();
-        assert!(fault("id,x,y,z").contains("for time"));
-        assert!(fault("t,who,x,y,z").contains("for the vehicle"));
+        assert!(fault("id,x,y,z").contains("gives time"));
+        assert!(fault("t,who,x,y,z").contains("gives the vehicle"));
         assert!(fault("t,id,x,z").contains("along y"));
         assert!(fault("t,x1,y1,z1,x2,z2").contains("along y of vehicle `2`"));
         assert!(fault("t,id,x,y,z,vx,vy").contains("velocity along z"));

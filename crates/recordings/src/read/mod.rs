@@ -1,16 +1,16 @@
-//! Recordings of any origin as a stream of [`Item`](tautline_core::track::Item)s.
+//! Reads recordings of many formats as a stream of [`Item`](tautline_core::track::Item)s.
 //!
-//! [`open`] recognises the format by the content of the file and gives a [`Tracks`](tautline_core::track::Tracks): items in order of time, a clock, and
-//! what a person should know. A format is a file of this module that turns its content into rows or into pieces of curves;
-//! order, clocks and limits are the same for all.
+//! [`open`] recognises the format by the content of the file and returns a [`Tracks`](tautline_core::track::Tracks):
+//! items in order of time, a clock, and notes for the user. Each format has a module that converts its content to rows
+//! or pieces of curves. Order, clocks and limits are handled in common.
 //!
-//! Memory is bounded by what is read at a time, not by the file: a recording in order of time is streamed. One that is
-//! not is sorted, in memory, and says so in [`Tracks::notes`](tautline_core::track::Tracks::notes).
+//! Memory is bounded by the block being read, not by the file: a recording in order of time is streamed. An unordered
+//! recording is sorted in memory, with a note in [`Tracks::notes`](tautline_core::track::Tracks::notes).
 //!
-//! # What is refused
-//! Numbers that are not finite, a vehicle that is in two places at a time or goes back in time, two columns of time that are
-//! no parts of one, cells that are not numbers, files that break off. Every [`ReadError`] names the file, the place, the value and
-//! the remedy. Nothing is guessed silently: an inferred unit of time is said in the notes.
+//! # Errors
+//! Readers refuse numbers that are not finite, cells that are not numbers and truncated files. They refuse a vehicle
+//! with two positions at one time or with decreasing time, and two unrelated time columns. Each [`ReadError`] names the
+//! file, the place, the value and the remedy. Inferences such as the unit of time appear in the notes.
 
 mod axes;
 mod capture;
@@ -58,12 +58,12 @@ use mcap::bag;
 use readers::recognise;
 use source::Source;
 
-/// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with a file for each vehicle.
+/// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with one file per vehicle.
 ///
 /// # Errors
-/// [`ReadError`] when the file cannot be read, is of no known format, or is wrong where it was looked at so far.
+/// [`ReadError`] if the file cannot be read, has an unknown format, or its beginning is invalid.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let opened = match look(path) {
+    let opened = match folder_of(path) {
         _ if bag::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
@@ -72,14 +72,15 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
 }
 
-/// Opens several files as one recording, a vehicle in each, called as the file is; of a folder or an archive all its files.
+/// Opens several files as one recording, with one vehicle per file, named after the file. Folders and archives
+/// contribute all their files.
 ///
 /// # Errors
-/// Those of [`open`], and where a file holds several vehicles or clocks cannot be those of one recording.
+/// As [`open`], and if a file holds several vehicles or the clocks of the files do not match.
 pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut all = Folder::default();
     for &path in paths {
-        match look(path).map_err(|error| error.of(path))? {
+        match folder_of(path).map_err(|error| error.of(path))? {
             Some(folder) => {
                 all.files.extend(folder.files);
                 all.folders.extend(folder.folders);
@@ -92,23 +93,22 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
     opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
 }
 
-/// What a recording of ours, or one that was exported in MCAP, says of every vehicle beside its motion; none where it says
-/// nothing, and of any other recording.
+/// Opens the channels of a run recording or of an MCAP export; `None` without channels, and for any other recording.
 ///
 /// # Errors
-/// [`ReadError`] when it is damaged before its first instant.
+/// [`ReadError`] if the recording is damaged before its first instant.
 pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
     let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::MCAP);
     if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
 }
 
-/// Opens a recording of `tautline run` for what it holds beside positions; `None` for any other file.
+/// Opens a recording of `tautline run` with all its data; `None` for any other file.
 #[must_use]
 pub fn open_run(path: &Path) -> Option<McapRecording> {
     if path.is_file() { mcap::open_run(path) } else { None }
 }
 
-/// What several files that are one recording are called.
+/// Returns the name of several files that form one recording.
 #[must_use]
 pub fn called(paths: &[&Path]) -> String {
     const LISTED: usize = 3;
@@ -117,7 +117,7 @@ pub fn called(paths: &[&Path]) -> String {
     named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
-/// How close vehicles may come, where the recording says it itself as Skybrush shows do \[m\].
+/// Returns the minimum separation that the recording itself defines, as Skybrush shows do \[m\].
 #[must_use]
 pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
     let mut source = Source::file(path);
@@ -126,42 +126,43 @@ pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
     Some(limit * options.metres()).filter(|limit| limit.is_finite() && *limit > 0.0)
 }
 
-/// The files of a folder, or of an archive that is no recording itself.
-fn look(path: &Path) -> Result<Option<Folder>, ReadError> {
+/// Returns the files of a folder or archive; `None` if the path is itself a recording.
+fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
         if bag::is_bag(path) {
-            let remedy = "give it alone, without --join: its topics are its vehicles";
-            return refuse("recording/several-vehicles", "it is a ROS 2 bag, and no file of one vehicle", remedy);
+            let remedy = "open it without --join; its topics are the vehicles";
+            return refuse("recording/several-vehicles", "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
         let folder = Folder::open(path)?;
         let remedy =
-            "give a folder with a table or a polynomial file (.csv) for each vehicle, or one with a folder for each";
+            "give a folder with one table or polynomial file (.csv) per vehicle, or with one folder per vehicle";
         return if folder.is_empty() { Err(folder.without_tables("folder", remedy).into()) } else { Ok(Some(folder)) };
     }
     if !data.is_file() {
-        let problem = "it is a pipe or a device, and a recording is read more than once";
-        return refuse("recording/not-a-file", problem, "save it to a file first, and give the file");
+        let problem = "it is a pipe or a device, but a recording is read more than once";
+        return refuse("recording/not-a-file", problem, "save it to a file first");
     }
     if !readers::is_archive(path)? {
         return Ok(None);
     }
     let folder = Folder::of_archive(path)?;
-    let remedy = "give a .skyc or .npz file, or pack a table for each vehicle";
+    let remedy = "give a .skyc or .npz file, or pack one table per vehicle";
     if folder.is_empty() { Err(folder.without_tables(ARCHIVE, remedy).into()) } else { Ok(Some(folder)) }
 }
 
-/// Opens files of one vehicle each.
+/// Opens files with one vehicle each.
 fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, ReadError> {
     let several = folder.files.len() > 1;
-    let blamed = |error: ReadError, shown: &Path| {
+    let with_file = |error: ReadError, shown: &Path| {
         let error = error.of(shown);
         if several { error.among_others() } else { error }
     };
-    let format = folder.first().map(|first| recognise(first, options.format).map_err(|e| blamed(e, &first.shown())));
+    let format =
+        folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
     if format.transpose()? == Some(Format::CRAZYFLIE) {
-        options.refuse_needless(Format::CRAZYFLIE)?;
+        options.refuse_unsupported_options(Format::CRAZYFLIE)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
     }
@@ -170,8 +171,8 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     }
     let options = ReadOptions { is_joined: true, ..options.clone() };
     let open = |file: Source| {
-        let shown = file.shown();
-        Ok((shown.clone(), open_one(file, &options).map_err(|error| blamed(error, &shown))?))
+        let shown = file.display_path();
+        Ok((shown.clone(), open_one(file, &options).map_err(|error| with_file(error, &shown))?))
     };
     folder::join(folder.files.into_iter().map(open).collect::<Result<_, ReadError>>()?, left_out)
 }
@@ -181,13 +182,13 @@ fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
     if let Some(format) = options.format.filter(|format| *format != Format::MCAP) {
         return Err(Fault::WrongFormat(format).into());
     }
-    options.refuse_needless(Format::MCAP)?;
+    options.refuse_unsupported_options(Format::MCAP)?;
     bag::open(path, options)
 }
 
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
     let format = recognise(&mut source, options.format)?;
-    options.refuse_needless(format)?;
+    options.refuse_unsupported_options(format)?;
     (format.open)(&source, options)
 }

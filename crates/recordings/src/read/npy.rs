@@ -1,7 +1,8 @@
-//! Arrays in the `.npy` format of `NumPy`: a header in the words of a Python dictionary, then plain numbers.
+//! Reads arrays in the `.npy` format of `NumPy`: a header in Python dictionary syntax, then raw numbers.
 //!
-//! The header is read here because a file may lie about its lengths: memory grows only with bytes that are there, where
-//! `npyz` reserves up to 4 GiB that a header claims for itself, and costs a cold build 22 core-seconds and 17 crates.
+//! The header is parsed here because a file may declare wrong lengths: memory grows only with bytes that exist. The
+//! crate `npyz` allocates up to the 4 GiB that a header declares for itself, and costs 22 core-seconds and 17 crates in
+//! a cold build.
 
 use std::io;
 use std::io::Read;
@@ -12,63 +13,63 @@ use super::error::Fault;
 /// First bytes of an array.
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
-/// Longest header that is read \[bytes\].
+/// Largest accepted header \[bytes\].
 const HEADER_LIMIT_BYTES: usize = 64 * 1024;
 
-/// The `NaT` of `datetime64`.
+/// Value `NaT` of `datetime64`.
 const NOT_A_TIME: i64 = i64::MIN;
 
-/// How the elements of an array are written.
+/// Type of the elements of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Float,
     Signed,
-    /// Whole numbers without a sign, and truth values.
+    /// Unsigned integers and booleans.
     Unsigned,
-    /// Times as whole numbers of a unit.
+    /// Times as integers of a unit.
     Time(TimeUnit),
-    /// Text of four bytes a character.
+    /// Text with four bytes per character.
     Unicode,
-    /// Text of one byte a character.
+    /// Text with one byte per character.
     Bytes,
 }
 
-/// An element.
+/// Element of an array.
 enum Element {
     Whole(i64),
     Real(f64),
     Text(String),
 }
 
-/// An array being read, number by number in the order of the file.
+/// Array being read, element by element in the order of the file.
 pub(super) struct Array {
     bytes: Box<dyn Read>,
     kind: Kind,
-    /// Bytes of an element.
+    /// Size of an element \[bytes\].
     width: usize,
     big_endian: bool,
     pub(super) fortran_order: bool,
     pub(super) shape: Vec<usize>,
     element: Vec<u8>,
-    /// Elements that have not been read.
+    /// Number of unread elements.
     left: usize,
 }
 
 impl Array {
-    /// Reads the header.
+    /// Opens an array and reads its header.
     pub(super) fn open(mut bytes: Box<dyn Read>) -> Result<Self, Fault> {
         let mut head = [0; 8];
         read_exactly(&mut bytes, &mut head)?;
         let [magic @ .., major, _] = &head;
         if magic != MAGIC {
-            return Err(Fault::damaged("it does not begin as a NumPy array does"));
+            return Err(Fault::damaged("it does not begin as a NumPy array"));
         }
         let mut length = [0; 4];
         let digits = if *major == 1 { 2 } else { 4 };
         read_exactly(&mut bytes, &mut length[..digits])?;
         let length = u32::from_le_bytes(length) as usize;
         if length > HEADER_LIMIT_BYTES {
-            return Err(Fault::damaged(format!("its header claims {length} bytes")));
+            return Err(Fault::damaged(format!("its header declares {length} bytes")));
         }
         let mut header = vec![0; length];
         read_exactly(&mut bytes, &mut header)?;
@@ -91,12 +92,12 @@ impl Array {
         Ok(Self { bytes, kind, width, big_endian, fortran_order, shape, element: vec![0; width], left })
     }
 
-    /// How many elements there are.
+    /// Returns the number of elements.
     pub(super) fn count(&self) -> usize {
         self.shape.iter().product()
     }
 
-    /// The unit of an array of times.
+    /// Returns the unit of an array of times.
     pub(super) fn unit(&self) -> Option<TimeUnit> {
         if let Kind::Time(unit) = self.kind { Some(unit) } else { None }
     }
@@ -104,9 +105,9 @@ impl Array {
     fn next(&mut self) -> Result<Element, Fault> {
         read_exactly(&mut self.bytes, &mut self.element)?;
         self.left = self.left.saturating_sub(1);
-        // Behind the last element the checksum is compared.
+        // Reading past the last element verifies the checksum of the archive.
         if self.left == 0 && self.bytes.read(&mut [0])? > 0 {
-            return Err(Fault::damaged("the array is longer than it says"));
+            return Err(Fault::damaged("the array is longer than its header declares"));
         }
         if self.big_endian {
             self.element.reverse();
@@ -127,7 +128,7 @@ impl Array {
             Kind::Unicode => {
                 let chars =
                     self.element.chunks_exact(4).map(|c| char::from_u32(u32::from_le_bytes([c[0], c[1], c[2], c[3]])));
-                // The whole element was turned around, characters and all: turn the order of characters back.
+                // Reversing the whole element also reversed the order of characters.
                 let text: Option<String> = if self.big_endian { chars.rev().collect() } else { chars.collect() };
                 Element::Text(text.ok_or_else(|| Fault::damaged("a name is not text"))?)
             }
@@ -135,7 +136,7 @@ impl Array {
         })
     }
 
-    /// The next element as a number.
+    /// Returns the next element as a number.
     pub(super) fn next_number(&mut self) -> Result<f64, Fault> {
         match self.next()? {
             Element::Whole(whole) => Ok(whole as f64),
@@ -144,7 +145,7 @@ impl Array {
         }
     }
 
-    /// The next element as a time.
+    /// Returns the next element as a time.
     pub(super) fn next_stamp(&mut self) -> Result<Stamp, Fault> {
         match self.next()? {
             Element::Whole(whole) => Ok(Stamp::Whole(whole)),
@@ -153,7 +154,7 @@ impl Array {
         }
     }
 
-    /// The next element as text.
+    /// Returns the next element as text.
     pub(super) fn next_text(&mut self) -> Result<String, Fault> {
         match self.next()? {
             Element::Text(text) => Ok(text.trim_end_matches('\0').to_owned()),
@@ -165,7 +166,7 @@ impl Array {
 fn not(what: &str, found: &str) -> Fault {
     Fault::coded(
         "recording/element-type",
-        format!("its elements are no {what} but {found}"),
+        format!("its elements are {found}, expected {what}"),
         "save float64, int64 or text",
     )
 }
@@ -173,13 +174,13 @@ fn not(what: &str, found: &str) -> Fault {
 fn read_exactly(bytes: &mut impl Read, buffer: &mut [u8]) -> Result<(), Fault> {
     match bytes.read_exact(buffer) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-            Err(Fault::Truncated("the array is shorter than it says".to_owned()))
+            Err(Fault::Truncated("the array is shorter than its header declares".to_owned()))
         }
         other => Ok(other?),
     }
 }
 
-/// The value of a key of a Python dictionary without nested dictionaries.
+/// Returns the value of a key in a Python dictionary without nested dictionaries.
 fn value<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(&format!("'{key}'"))?;
     let rest = rest.trim_start().strip_prefix(':')?.trim_start();
@@ -187,7 +188,7 @@ fn value<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     rest.get(..end).map(str::trim)
 }
 
-/// Kind, width \[bytes\] and byte order of a type like `<f8`, `|b1`, `<M8[ns]` or `<U12`.
+/// Parses a type such as `<f8`, `|b1`, `<M8[ns]` or `<U12` into kind, size \[bytes\] and whether it is big-endian.
 fn kind(descr: &str) -> Option<(Kind, usize, bool)> {
     let mut letters = descr.chars();
     let (order, letter) = (letters.next()?, letters.next()?);
@@ -211,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn types_are_read_and_others_refused() {
+    fn known_types_are_parsed_and_others_refused() {
         assert_eq!(kind("<f8"), Some((Kind::Float, 8, false)));
         assert_eq!(kind(">i4"), Some((Kind::Signed, 4, true)));
         assert_eq!(kind("<M8[ns]"), Some((Kind::Time(TimeUnit::Nanoseconds), 8, false)));
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_are_read_in_any_order_of_their_keys() {
+    fn header_keys_are_found_in_any_order() {
         let header = "{'shape': (3, 2, 3), 'fortran_order': False, 'descr': '<f8', }";
         assert_eq!(value(header, "shape"), Some("(3, 2, 3)"));
         assert_eq!(value(header, "fortran_order"), Some("False"));

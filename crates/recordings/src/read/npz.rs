@@ -1,18 +1,18 @@
-//! NPZ archives of `NumPy` arrays.
+//! Reads NPZ archives of `NumPy` arrays.
 //!
 //! | array | shape | holds |
 //! | --- | --- | --- |
 //! | `t` | T | times, as numbers or `datetime64` |
 //! | `positions` | T x N x 3, or its axes in another order | positions; two axes instead of three are a plane |
-//! | `velocities` | as `positions` | velocities, if there are any |
-//! | `radii` | N, or `positions` without its axis of x, y, z | radii, if there are any; NaN where unknown |
-//! | `names` | N | names, if there are any, each another |
-//! | `seen` | the same | whether a vehicle was seen; where it was not, its position means nothing |
-//! | `axes` | 1 to 3 | what the axes count, if it is said: `time`, `vehicle`, and `axis` (or `xyz`) |
-//! | `epoch_ns` | 1 or no axis | what `t` counts from |
+//! | `velocities` | as `positions` | velocities, optional |
+//! | `radii` | N, or `positions` without its axis of x, y, z | radii, optional; NaN if unknown |
+//! | `names` | N | distinct names, optional |
+//! | `seen` | `positions` without its axis of x, y, z | whether a vehicle was seen; if not, its position is ignored |
+//! | `axes` | 1 to 3 | meaning of the axes, optional: `time`, `vehicle`, and `axis` (or `xyz`) |
+//! | `epoch_ns` | 1 or no axis | epoch of `t` \[ns\] |
 //!
-//! Where the lengths of the axes have several meanings (3 x 3 x 3, or T x 3 x 2), neither the user nor `axes` says which one
-//! holds, the archive is refused. Arrays in the usual order are streamed; others are in memory.
+//! If the shape is ambiguous (3 x 3 x 3, or T x 3 x 2), neither `--layout` nor `axes` decides, the archive is refused.
+//! Arrays in the usual order are streamed; others are read into memory.
 
 use std::collections::BTreeSet;
 
@@ -23,8 +23,8 @@ use super::error::{Fault, Place, ReadError, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{About, BATCH, Ordered, PLANAR, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Archive, Source};
 
 pub(super) const READER: Reader = Reader {
@@ -35,7 +35,14 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"PK\x03\x04", b"PK\x05\x06"],
     sniff: |head| head.begins_with_any(READER.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
     open: |source, options| open(&source.clone().seekable()?, options),
-    takes: &[Takes::TimeUnit, Takes::Rows, Takes::Columns, Takes::Layout, Takes::Axes, Takes::OneVehicle],
+    supports: &[
+        FormatOption::TimeUnit,
+        FormatOption::Rows,
+        FormatOption::Columns,
+        FormatOption::Layout,
+        FormatOption::Axes,
+        FormatOption::OneVehicle,
+    ],
     packing: Packing::Any,
 };
 
@@ -65,19 +72,21 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut times = Vec::new();
     for k in 0..stamps.count() {
         let stamp = stamps.next_stamp().and_then(|stamp| match stamp {
-            Stamp::Real(time) if !time.is_finite() => {
-                refuse("recording/not-finite", format!("it is {time}"), "times are finite: take the instant out")
-            }
+            Stamp::Real(time) if !time.is_finite() => refuse(
+                "recording/not-finite",
+                format!("the time is {time}"),
+                "remove the instant: times must be finite",
+            ),
             stamp => Ok(stamp),
         });
         times.push(stamp.map_err(|fault| fault.at(Place::Part(format!("{time}[{k}]"))))?);
     }
     let axes = arrays.optional("axes", |arrays| arrays.texts("axes"))?.unwrap_or_default();
-    let mut said = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
-    if said.is_empty() {
-        said.extend(options.usual_layout.iter().flatten());
+    let mut known_axes = options.layout.map_or_else(|| axes.iter().map_while(|name| axis(name)).collect(), Vec::from);
+    if known_axes.is_empty() {
+        known_axes.extend(options.usual_layout.iter().flatten());
     }
-    let table = arrays.table(&positions, times.len(), &said)?;
+    let table = arrays.table(&positions, times.len(), &known_axes)?;
     let velocities = arrays.optional("velocities", |arrays| arrays.like(&table, "velocities", true))?;
     let seen = arrays.optional("seen", |arrays| arrays.like(&table, "seen", false))?;
     let radii = arrays.optional("radii", |arrays| arrays.radii(&table))?;
@@ -92,15 +101,15 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
-    let mut about = About::new(source, options, unit, notes, none);
-    about.metadata.is_planar = is_planar;
+    let mut info = RecordingInfo::new(source, options, unit, notes, none);
+    info.metadata.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
-        about.epoch_ns = epoch;
+        info.epoch_ns = epoch;
     }
-    Ok(Box::new(Ordered::open(rows, about)?))
+    Ok(Box::new(Ordered::open(rows, info)?))
 }
 
-/// What an axis counts, by the name that an archive gives it.
+/// Returns the meaning of an axis by its name in the archive.
 fn axis(name: &str) -> Option<ArrayAxis> {
     match name {
         "time" => Some(ArrayAxis::Time),
@@ -110,11 +119,11 @@ fn axis(name: &str) -> Option<ArrayAxis> {
     }
 }
 
-/// The layout of an array of positions of this shape at so many times; `said` are its first axes, as far as they are known.
-/// Nothing else than a length tells which axis is which, so that it is one of a few lengths or is asked about.
-fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
+/// Returns the layout of an array of positions with this shape and number of times; `known_axes` holds the known leading
+/// axes. Only lengths distinguish the axes, so that several layouts may fit: then the array is refused.
+fn layout(shape: [usize; 3], times: usize, known_axes: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
     let fits = |layout: &ArrayLayout| {
-        layout.starts_with(said)
+        layout.starts_with(known_axes)
             && layout.iter().zip(shape).all(|(axis, length)| match axis {
                 ArrayAxis::Time => length == times,
                 ArrayAxis::Axis => matches!(length, 2 | 3),
@@ -122,29 +131,29 @@ fn layout(shape: [usize; 3], times: usize, said: &[ArrayAxis]) -> Result<ArrayLa
             })
     };
     let fitting: Vec<_> = ArrayAxis::LAYOUTS.into_iter().filter(fits).collect();
-    let problem = |what: &str| format!("it is of shape {shape:?}, and there are {times} times{what}");
+    let problem = |what: &str| format!("its shape is {shape:?}, and there are {times} times{what}");
     match fitting[..] {
-        // Where x, y, z are not last, an axis of two or three vehicles looks the same.
-        [only] if only[2] == ArrayAxis::Axis || !said.is_empty() => Ok(only),
+        // If the last axis is not x, y, z, an axis of two or three vehicles could be it.
+        [only] if only[2] == ArrayAxis::Axis || !known_axes.is_empty() => Ok(only),
         [] => {
-            let remedy = "save as many instants as times, and two or three axes: T x N x 3, or say what the axes are \
-                          with --layout, such as --layout time,vehicle,axis";
+            let remedy = "save T x N x 3 positions, with T the number of times, or name the axes with --layout, such \
+                          as --layout time,vehicle,axis";
             refuse("recording/array-shape", problem(""), remedy)
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
-            let remedy = format!("say what its axes are with --layout {}", ways.join(" or "));
-            refuse("recording/ambiguous-layout", problem(": its shape does not say which axis is which"), remedy)
+            let remedy = format!("name its axes with --layout {}", ways.join(" or "));
+            refuse("recording/ambiguous-layout", problem("; several layouts fit"), remedy)
         }
     }
 }
 
-/// The arrays of an archive.
+/// Arrays of an archive.
 struct Arrays {
     archive: Archive,
 }
 
-/// A fault of an array.
+/// Returns a function that adds the name of an array to a fault.
 fn in_array(name: &str) -> impl Fn(Fault) -> ReadError {
     move |fault| fault.at(Place::Part(format!("array `{name}`")))
 }
@@ -154,7 +163,8 @@ impl Arrays {
         self.archive.holds(&format!("{name}.npy"))
     }
 
-    /// The array that is called by one of these names, perhaps with a unit of time behind it. Of two neither is ignored.
+    /// Returns the array with one of these names, optionally with a unit of time as suffix. Two such arrays are
+    /// refused.
     fn only_of(&self, names: &[&str], option: &str) -> Result<Option<String>, Fault> {
         let units = TimeUnit::ALL.map(|unit| format!("_{}", unit.name()));
         let ends = std::iter::once("").chain(units.iter().map(String::as_str));
@@ -163,11 +173,7 @@ impl Arrays {
         match (found.next(), found.next()) {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                refuse(
-                    "recording/ambiguous-column",
-                    problem,
-                    format!("name the one that is meant with --column {option}=NAME"),
-                )
+                refuse("recording/ambiguous-column", problem, format!("name one of them with --column {option}=NAME"))
             }
             (first, _) => Ok(first),
         }
@@ -178,7 +184,7 @@ impl Arrays {
         let names: Vec<_> =
             names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
         let option = if usual == "t" { "t" } else { "x" };
-        let problem = format!("there is no array of {role}; its arrays are {}", names.join(", "));
+        let problem = format!("no array gives the {role}; its arrays are {}", names.join(", "));
         let remedy = format!("save it as `{usual}`, or name it with --column {option}=NAME");
         Fault::coded(code, problem, remedy)
     }
@@ -195,7 +201,7 @@ impl Arrays {
         if self.holds(name) { read(self).map(Some) } else { Ok(None) }
     }
 
-    /// Radii of all vehicles, instant by instant: the array has them once, or each time.
+    /// Returns the radii of all vehicles, instant by instant. The array holds them once or for each time.
     fn radii(&mut self, positions: &Table) -> Result<Numbers, ReadError> {
         let mut array = self.array("radii")?;
         if array.shape != [positions.vehicles()] {
@@ -205,14 +211,14 @@ impl Arrays {
         Ok(Box::new(radii.map_err(in_array("radii"))?.into_iter().cycle().map(Ok)))
     }
 
-    /// The numbers of an array laid out as the positions are, with their axis of x, y and z or without.
+    /// Returns the numbers of an array with the layout of the positions, with or without the axis of x, y and z.
     fn like(&mut self, positions: &Table, name: &str, with_axes: bool) -> Result<Numbers, ReadError> {
         let array = self.array(name)?;
         let axes = positions.layout.into_iter().zip(positions.shape);
         let axes: Vec<_> = axes.filter(|(axis, _)| with_axes || *axis != ArrayAxis::Axis).collect();
         let (order, expected): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
         if array.shape != expected {
-            let problem = format!("it is of shape {:?} where {expected:?} belongs to the positions", array.shape);
+            let problem = format!("its shape is {:?}, but the positions require {expected:?}", array.shape);
             return Err(in_array(name)(Fault::coded(
                 "recording/array-shape",
                 problem,
@@ -222,7 +228,7 @@ impl Arrays {
         numbers(array, &order).map_err(in_array(name))
     }
 
-    /// Names of as many vehicles.
+    /// Returns the names of the vehicles; their number must be `vehicles`.
     fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
         let names = self.texts("names")?;
         let different: BTreeSet<_> = names.iter().collect();
@@ -233,7 +239,7 @@ impl Arrays {
             count if count < vehicles => ("recording/vehicle-twice", "two vehicles have the same name".to_owned()),
             _ => return Ok(names),
         };
-        let remedy = "save a name of its own for each vehicle, or leave `names` out";
+        let remedy = "save a distinct name for each vehicle, or omit `names`";
         Err(in_array("names")(Fault::coded(code, problem, remedy)))
     }
 
@@ -246,27 +252,27 @@ impl Arrays {
         Ok(texts)
     }
 
-    /// An array of vectors with `times` instants.
-    fn table(&mut self, name: &str, times: usize, said: &[ArrayAxis]) -> Result<Table, ReadError> {
+    /// Returns an array of vectors with `times` instants.
+    fn table(&mut self, name: &str, times: usize, known_axes: &[ArrayAxis]) -> Result<Table, ReadError> {
         let array = self.array(name)?;
         let at = in_array(name);
         let &[first, second, third] = array.shape.as_slice() else {
-            let problem = format!("it is of shape {:?}", array.shape);
+            let problem = format!("its shape is {:?}, expected three axes", array.shape);
             return Err(at(Fault::coded("recording/array-shape", problem, "save positions as T x N x 3 or N x T x 3")));
         };
         if array.count() == 0 {
-            let problem = format!("it is of shape {:?}, which holds nothing", array.shape);
+            let problem = format!("its shape is {:?}, which has no elements", array.shape);
             return Err(at(Fault::coded("recording/empty", problem, "save at least one instant of one vehicle")));
         }
         let shape = [first, second, third];
-        let layout = layout(shape, times, said).map_err(&at)?;
+        let layout = layout(shape, times, known_axes).map_err(&at)?;
         Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(at)? })
     }
 }
 
 /// Positions of all vehicles, instant by instant.
 struct Table {
-    /// As the archive has it.
+    /// Shape in the archive.
     shape: [usize; 3],
     layout: ArrayLayout,
     numbers: Numbers,
@@ -286,10 +292,10 @@ impl Table {
     }
 }
 
-/// The numbers of an array of times and vehicles, instant by instant.
+/// Numbers of an array over times and vehicles, instant by instant.
 type Numbers = Box<dyn Iterator<Item = Result<f64, Fault>>>;
 
-/// The numbers of an array whose axes count these.
+/// Returns the numbers of an array with this order of axes, in the usual order.
 fn numbers(mut array: Array, order: &[ArrayAxis]) -> Result<Numbers, Fault> {
     const USUAL: ArrayLayout = ArrayAxis::LAYOUTS[0];
     if USUAL.starts_with(order) && !array.fortran_order {
@@ -325,7 +331,7 @@ fn next_vector(numbers: &mut Numbers, axes: usize) -> Result<Vector3<f64>, Fault
     Ok(vector)
 }
 
-/// The next radius; none where it is unknown.
+/// Returns the next radius; `None` if unknown.
 fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     let radius = next(numbers)?;
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
@@ -334,16 +340,16 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     refuse(
         "recording/radius",
         format!("the radius is {radius}"),
-        "radii are finite and 0 or more, or NaN where unknown",
+        "radii must be finite and not negative, or NaN if unknown",
     )
 }
 
-/// The rows of an archive.
+/// Rows of an archive.
 struct Instants {
     /// Name of the array of positions.
     name: String,
     times: Vec<Stamp>,
-    /// Number of the next instant.
+    /// Index of the next instant.
     at: usize,
     table: Table,
     velocities: Option<Numbers>,
@@ -363,16 +369,16 @@ impl Instants {
             return Ok(None);
         }
         if let Some(odd) = position.iter().find(|x| !x.is_finite()) {
-            let remedy = "save an array `seen` of T x N booleans that is false where a vehicle was not seen";
-            return refuse("recording/not-finite", format!("the position holds {odd}"), remedy);
+            let remedy = "save an array `seen` of T x N booleans that is false if a vehicle was not seen";
+            return refuse("recording/not-finite", format!("the position contains {odd}"), remedy);
         }
-        // A vehicle without a velocity has NaN among those with one.
+        // NaN marks vehicles without a velocity.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
             return refuse(
                 "recording/not-finite",
                 "the velocity is not finite",
-                "velocities are finite, or all NaN where unknown",
+                "velocities must be finite, or all NaN if unknown",
             );
         }
         let place = (self.at * self.table.vehicles() + vehicle) as u64;
@@ -391,7 +397,7 @@ impl Rows for Instants {
                 rows.extend(row);
             }
             if self.names.all().is_empty() {
-                // So many have really been read: the shape is no longer a claim.
+                // Reading an instant has confirmed the number of vehicles in the header.
                 self.names = Names::numbered(self.table.vehicles());
             }
             self.at += 1;

@@ -1,5 +1,5 @@
-//! Tables with an object of JSON in each line. Keys are columns; those of an object in an object stand behind its own and a
-//! dot, two or three numbers in a list are called x, y and z.
+//! Reads tables with one JSON object per line. Keys are columns. Keys of nested objects are joined with dots; lists of
+//! two or three numbers have the keys x, y and z.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -12,7 +12,7 @@ use super::error::{Fault, Place, ReadError, quoted};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
 use super::table;
 use super::table::Cells;
@@ -25,11 +25,11 @@ pub(super) const READER: Reader = Reader {
     magic: &[],
     sniff: |head| head.is_text(are_in),
     open,
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
-/// Most columns: more are lists of changing length.
+/// Largest number of columns; more indicate lists of changing length.
 const MOST_COLUMNS: usize = 100_000;
 
 /// Opens a table.
@@ -42,7 +42,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut uneven = objects.uneven.iter().filter(|_| !is_named);
     if let Some((list, line)) = uneven.find(|(list, _)| used.iter().any(|column| is_of(list, column))) {
         let problem = format!(
-            "the list {} has another length than in the first line, so its elements cannot be assigned to vehicles",
+            "the length of the list {} differs from the first line; its elements cannot be assigned to vehicles",
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
@@ -51,14 +51,14 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     table::open(source, objects, layout, None, 0, options)
 }
 
-/// Whether a text begins with a whole object in a line and another below it.
+/// Returns whether a text begins with a complete object in one line and another object below.
 pub(super) fn are_in(text: &[u8]) -> bool {
     let mut lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
     let is_object = |line: &[u8]| line.starts_with(b"{") && serde_json::from_slice::<IgnoredAny>(line).is_ok();
     lines.next().is_some_and(is_object) && lines.next().is_some_and(|line| line.starts_with(b"{"))
 }
 
-/// A value of an object.
+/// Value of a key.
 #[derive(Clone, Debug, Default, PartialEq)]
 enum Cell {
     #[default]
@@ -68,7 +68,7 @@ enum Cell {
     Text(String),
 }
 
-/// The objects of a file, line by line.
+/// Objects of a file, line by line.
 struct Objects {
     source: Source,
     lines: Lines,
@@ -78,12 +78,12 @@ struct Objects {
     flat: Vec<(String, Cell)>,
     /// Lists of objects in the line, and their lengths above 0.
     lists: Vec<(String, usize)>,
-    /// Lists of objects whose length changes, and the line of the first change.
+    /// Lists of objects with changing length, and the line of the first change.
     uneven: BTreeMap<String, u64>,
 }
 
 impl Objects {
-    /// Looks at all lines for their keys.
+    /// Opens a file and collects the keys of all lines.
     fn open(source: &Source) -> Result<Self, ReadError> {
         let mut objects = Self {
             source: source.clone(),
@@ -108,7 +108,7 @@ impl Objects {
                 }
                 if objects.header.len() == MOST_COLUMNS {
                     let problem = format!("its objects have more than {MOST_COLUMNS} different keys");
-                    let remedy = "write an object for each vehicle and time, with the same keys in all";
+                    let remedy = "write one object per vehicle and time, with the same keys in all";
                     return Err(
                         Fault::coded("recording/field-count", problem, remedy).at(Place::Line(objects.lines.number()))
                     );
@@ -120,7 +120,7 @@ impl Objects {
         if objects.header.is_empty() { Err(Fault::Empty.into()) } else { Ok(objects) }
     }
 
-    /// Goes to the next line that is not blank, and takes its object apart.
+    /// Moves to the next line that is not blank, and flattens its object.
     fn next_line(&mut self) -> Result<bool, ReadError> {
         self.flat.clear();
         self.lists.clear();
@@ -142,8 +142,8 @@ fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(Stri
     let refused = |what: String| {
         Fault::coded(
             "recording/malformed",
-            format!("it is no object of JSON: {what}"),
-            "write an object like {\"t\": 0, \"id\": \"a\", ...} in each line",
+            format!("it is not a JSON object: {what}"),
+            "write one object like {\"t\": 0, \"id\": \"a\", ...} per line",
         )
     };
     if !line.starts_with(b"{") {
@@ -156,7 +156,7 @@ fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(Stri
     json.end().map_err(|error| refused(error.to_string()))
 }
 
-/// What appends a value under its key, or those in it under theirs.
+/// Deserializer that appends values with their full keys.
 struct Flat<'a> {
     key: String,
     cells: &'a mut Vec<(String, Cell)>,
@@ -218,7 +218,7 @@ impl<'de> Visitor<'de> for Flat<'_> {
         let mut known = Vec::new();
         while let Some(key) = map.next_key::<String>()? {
             if known.contains(&key) {
-                return Err(A::Error::custom(format!("the key {} is there twice", quoted(&key))));
+                return Err(A::Error::custom(format!("the key {} occurs twice", quoted(&key))));
             }
             let whole = if self.key.is_empty() { key.clone() } else { format!("{}.{key}", self.key) };
             known.push(key);
@@ -300,7 +300,7 @@ impl Cells for Objects {
         }
     }
 
-    /// A double is written as the shortest decimal that it is: that was in the file.
+    /// Formats a double as its shortest decimal, which restores the text of the file.
     fn stamp(&mut self, column: usize) -> Option<Stamp> {
         match &self.cells[column] {
             Cell::Whole(whole) => Some(Stamp::Whole(*whole)),
@@ -316,7 +316,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_object_is_taken_apart() {
+    fn nested_object_is_flattened() {
         let mut flat = Vec::new();
         let line = br#"{"t": 1, "pose": {"position": [1, 2.5, -3], "q": [0, 0, 0, 1]}, "id": "a", "lost": null}"#;
         take_apart(line, &mut flat, &mut Vec::new()).expect("an object");

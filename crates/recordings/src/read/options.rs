@@ -1,4 +1,4 @@
-//! What the user says of a recording.
+//! Options of readers: facts about a recording that its file does not contain.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
@@ -6,9 +6,9 @@ use std::str::FromStr;
 use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted, refuse};
-use super::readers::{Format, Takes};
+use super::readers::{Format, FormatOption};
 
-/// What an axis of an array of positions counts.
+/// Meaning of an axis of an array of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArrayAxis {
     /// Instants.
@@ -19,11 +19,11 @@ pub enum ArrayAxis {
     Axis,
 }
 
-/// What the three axes of an array of positions count, in their order.
+/// Meaning of the three axes of an array of positions, in order.
 pub type ArrayLayout = [ArrayAxis; 3];
 
 impl ArrayAxis {
-    /// All layouts, the usual one first.
+    /// All layouts, the most common one first.
     pub const LAYOUTS: [ArrayLayout; 6] = [
         [Self::Time, Self::Vehicle, Self::Axis],
         [Self::Vehicle, Self::Time, Self::Axis],
@@ -33,7 +33,7 @@ impl ArrayAxis {
         [Self::Axis, Self::Vehicle, Self::Time],
     ];
 
-    /// What `--layout` calls it.
+    /// Returns the name of the axis for `--layout`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -43,47 +43,49 @@ impl ArrayAxis {
         }
     }
 
-    /// What `--layout` calls a layout, such as `time,vehicle,axis`.
+    /// Returns the name of a layout for `--layout`, such as `time,vehicle,axis`.
     #[must_use]
     pub fn layout_name(layout: ArrayLayout) -> String {
         layout.map(Self::name).join(",")
     }
 
-    /// The layout of such a name.
+    /// Returns the layout with this name.
     ///
     /// # Errors
-    /// The names of all layouts, where it is the name of none.
+    /// A message with the names of all layouts, if the name is unknown.
     pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
         let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
-        layout.ok_or_else(|| format!("`{name}` is none of {}", Self::LAYOUTS.map(Self::layout_name).join(" ")))
+        layout.ok_or_else(|| {
+            format!("unknown layout `{name}`; use one of {}", Self::LAYOUTS.map(Self::layout_name).join(" "))
+        })
     }
 }
 
-/// Metres per unit of length of a recording, for all axes or for each.
+/// Metres per unit of length of a recording, common to all axes or per axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// The part that all axes have in common.
+    /// Common factor of all axes.
     metres: f64,
-    /// What each axis is multiplied by beside it, with its sign.
+    /// Additional factor of each axis, with its sign.
     each: [f64; 3],
 }
 
 impl Default for Scale {
-    /// Lengths are in metres.
+    /// Returns the scale of lengths in metres.
     fn default() -> Self {
         Self::from(1.0)
     }
 }
 
 impl From<f64> for Scale {
-    /// The same for all axes, without a check: an option out of range is an error when a recording is opened.
+    /// Returns one factor for all axes, unchecked: [`ReadOptions::check`] refuses values out of range.
     fn from(metres: f64) -> Self {
         Self { metres, each: [1.0; 3] }
     }
 }
 
 impl From<[f64; 3]> for Scale {
-    /// One number for each axis, with signs. Axes of one length share it.
+    /// Returns one signed factor per axis. Axes with the same absolute value share the common factor.
     fn from(each: [f64; 3]) -> Self {
         let metres = each[0].abs();
         if metres > 0.0 && each.iter().all(|x| x.abs() == metres) {
@@ -96,21 +98,21 @@ impl From<[f64; 3]> for Scale {
 impl FromStr for Scale {
     type Err = String;
 
-    /// Reads a number, or three between commas, as `--scale` takes them.
+    /// Parses one number, or three numbers separated by commas, as in `--scale`.
     fn from_str(text: &str) -> Result<Self, String> {
         if let Ok(metres) = text.trim().parse::<f64>() {
             return Ok(metres.into());
         }
         let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
         match <[f64; 3]>::try_from(numbers.unwrap_or_default()) {
-            Ok(each) if each.contains(&0.0) => Err("a scale of 0 makes all places the same".to_owned()),
+            Ok(each) if each.contains(&0.0) => Err(format!("a scale must not be 0, got {text}")),
             Ok(each) if each.iter().all(|x| x.is_finite()) => Ok(each.into()),
-            _ => Err(format!("`{text}` is neither a number nor three, such as 1,1,-1")),
+            _ => Err(format!("`{text}` is not one number or three, such as 1,1,-1")),
         }
     }
 }
 
-/// The numbers of a vehicle at a time.
+/// Numbers per vehicle and time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimensions {
     /// x, y.
@@ -124,10 +126,10 @@ pub enum Dimensions {
 }
 
 impl Dimensions {
-    /// All that are known.
+    /// All variants.
     pub const ALL: [Self; 4] = [Self::Plane, Self::Space, Self::PlaneVelocity, Self::SpaceVelocity];
 
-    /// What `--dimensions` calls it: `2`, `3`, `2+2` or `3+3`.
+    /// Returns the name for `--dimensions`: `2`, `3`, `2+2` or `3+3`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -138,7 +140,7 @@ impl Dimensions {
         }
     }
 
-    /// Number of axes, and of numbers.
+    /// Returns the number of axes, and the number of numbers.
     pub(super) fn counts(self) -> (usize, usize) {
         match self {
             Self::Plane => (2, 2),
@@ -149,22 +151,22 @@ impl Dimensions {
     }
 }
 
-/// Which of several rows of a vehicle at one time is read.
+/// Choice among several rows of a vehicle at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Duplicates {
-    /// The first in the file.
+    /// First row in the file.
     First,
-    /// The last in the file.
+    /// Last row in the file.
     Last,
-    /// None: such a recording is refused, even where the rows say the same.
+    /// Refuse the recording, even if the rows are equal.
     Refuse,
 }
 
 impl Duplicates {
-    /// All that are known.
+    /// All variants.
     pub const ALL: [Self; 3] = [Self::First, Self::Last, Self::Refuse];
 
-    /// What `--duplicates` calls it.
+    /// Returns the name for `--duplicates`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -175,103 +177,102 @@ impl Duplicates {
     }
 }
 
-/// Names of columns, where they are not the usual ones: one for each of [`ColumnNames::ROLES`].
+/// Names of columns given by the user, one per role of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColumnNames([Option<String>; 12]);
 
 impl ColumnNames {
-    /// Roles that a column can have: time, vehicle, position \[m\], velocity \[m/s\] and radius \[m\] of the vehicle, or its
-    /// latitude and longitude \[degrees\] and height \[m\].
+    /// Roles of columns: time, vehicle, position \[m\], velocity \[m/s\], radius \[m\], and latitude, longitude
+    /// \[degrees\] and height \[m\].
     pub const ROLES: [&str; 12] = ["t", "id", "x", "y", "z", "vx", "vy", "vz", "radius", "lat", "lon", "alt"];
 
-    /// Gives the column of a role a name; `false` where there is no such role.
+    /// Sets the column name of a role; returns `false` for an unknown role.
     pub fn set(&mut self, role: &str, name: &str) -> bool {
         let slot = self.0.iter_mut().zip(Self::ROLES).find(|(_, known)| *known == role);
         slot.map(|(slot, _)| *slot = Some(name.to_owned())).is_some()
     }
 
-    /// The name given for a role.
+    /// Returns the name given for a role.
     pub(super) fn get(&self, role: &str) -> Option<&String> {
         self.0.iter().zip(Self::ROLES).find(|(_, known)| *known == role)?.0.as_ref()
     }
 
-    /// Places of roles, and the names given for them.
+    /// Returns the indices of roles with a given name, and the names.
     pub(super) fn given(&self) -> impl Iterator<Item = (usize, &String)> {
         self.0.iter().enumerate().filter_map(|(role, name)| Some((role, name.as_ref()?)))
     }
 }
 
-/// What the user knows about a recording that its file does not say.
+/// Options of a reader, given by the user.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct ReadOptions {
-    /// The format, instead of recognising it by the content.
+    /// Format; recognised by content if absent.
     pub format: Option<Format>,
-    /// The unit of time, instead of what the file says or its numbers suggest.
+    /// Unit of time; read from the file or inferred if absent.
     pub time_unit: Option<TimeUnit>,
-    /// How many units of time there are in a second, where they are those of no clock: frames, steps, minutes.
+    /// Number of time units per second for units without a name: frames, steps, minutes.
     pub times_per_second: Option<f64>,
-    /// Whether rows that go back in time are sorted; such a recording is refused otherwise.
+    /// Whether to sort rows with decreasing time, which are refused otherwise.
     pub sort: bool,
-    /// Which of several rows of a vehicle at one time is read. Where nothing is said, rows that say the same are read once
-    /// and others are refused.
+    /// Choice among several rows of a vehicle at one time. If absent, equal rows are read once and others are refused.
     pub duplicates: Option<Duplicates>,
-    /// Metres per unit of length of the file, by default 1; velocities and radii are scaled too.
+    /// Metres per unit of length, by default 1; also applies to velocities and radii.
     pub scale: Option<Scale>,
-    /// Which axes of the file become x, y and z; by default they stay as they are.
+    /// Mapping of the axes of the file to x, y and z, by default the identity.
     pub axes: Option<Axes>,
-    /// The numbers of a vehicle in a table without a header, where their count does not tell.
+    /// Numbers per vehicle in a table without a header, if the column count is ambiguous.
     pub dimensions: Option<Dimensions>,
-    /// Whether a table whose rows name no vehicle is of one, whatever other columns it has.
+    /// Whether all rows of a table belong to one vehicle, whatever other columns it has.
     pub one_vehicle: bool,
-    /// Whether the file is one of several of a recording, which share an origin and a clock; [`open_joined`](super::open_joined)
-    /// sets it.
+    /// Whether the file is one of several of a recording, with a common origin and clock; set by
+    /// [`open_joined`](super::open_joined).
     pub is_joined: bool,
     /// Names of columns of a table.
     pub columns: ColumnNames,
-    /// Where the curves of vehicles start, if they are relative to that \[m\].
+    /// Origins of relative curves, by vehicle \[m\].
     pub starts: BTreeMap<String, [f64; 3]>,
-    /// What the axes of an array of positions count, where its shape has several meanings.
+    /// Meaning of the axes of an array of positions, if its shape is ambiguous.
     pub layout: Option<ArrayLayout>,
-    /// The same for arrays of which nothing else says it; it may be given for recordings of any format.
+    /// Default for `layout`, which the user may set for recordings of any format.
     pub usual_layout: Option<ArrayLayout>,
-    /// The frame that all poses are brought into, where messages have several; those that no transforms lead from are left
-    /// out.
+    /// Frame to which all poses are transformed, if messages use several frames; poses without a transform to it are
+    /// omitted.
     pub frame: Option<String>,
-    /// The topics of messages that are read; all with positions where none is named.
+    /// Topics to read; if empty, all topics with positions.
     pub topics: Vec<String>,
-    /// What places on the Earth are measured from: latitude and longitude \[degrees\] and height above the ellipsoid
-    /// \[m\]; the first place where nothing is said.
+    /// Origin of places on the Earth: latitude and longitude \[degrees\], height above the ellipsoid \[m\]; by default
+    /// the first place.
     pub origin: Option<[f64; 3]>,
-    /// Whether to accept an MCAP file or a log of PX4 that was not closed, for what it holds.
+    /// Whether to read the complete part of an MCAP file or PX4 log that was not closed.
     pub allow_unfinished: bool,
 }
 
 impl ReadOptions {
-    /// Metres per unit of length that all axes have in common.
+    /// Returns the metres per unit of length that all axes have in common.
     #[must_use]
     pub fn metres(&self) -> f64 {
         self.scale.unwrap_or_default().metres
     }
 
-    /// How axes are turned and stretched, lengths apart from [`Self::metres`].
+    /// Returns the mapping of axes, including the factors of [`Scale`] beyond [`Self::metres`].
     pub(super) fn turn(&self) -> Axes {
         self.axes.unwrap_or_default().scaled(self.scale.unwrap_or_default().each)
     }
 
-    /// Refuses numbers out of range.
+    /// Refuses values out of range.
     pub(super) fn check(&self) -> Result<(), Fault> {
         let metres = self.metres();
         if !(metres.is_finite() && metres > 0.0) {
-            let problem = format!("its lengths cannot be scaled by {metres}");
+            let problem = format!("--scale must be positive, got {metres}");
             return refuse(
                 "recording/option-out-of-range",
                 problem,
-                "give a positive number of metres per unit of length with --scale",
+                "give a positive number of metres per unit of length",
             );
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
-            let problem = format!("its times cannot be counted with {rate} in a second");
+            let problem = format!("the number of time units per second must be positive, got {rate}");
             return refuse(
                 "recording/option-out-of-range",
                 problem,
@@ -279,69 +280,75 @@ impl ReadOptions {
             );
         }
         if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
-            let problem = format!("its times are in {} and in parts of a second of your own", unit.name());
-            let remedy = "leave --time-unit out, or --fps and --time-scale";
+            let problem =
+                format!("the unit of time is given twice: --time-unit {}, and --fps or --time-scale", unit.name());
+            let remedy = "omit --time-unit, or --fps and --time-scale";
             return refuse("recording/two-time-units", problem, remedy);
         }
         if let Some([latitude, longitude, height_m]) = self.origin {
             let is_on_earth = latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && height_m.is_finite();
             if !is_on_earth {
-                let problem = format!("no place on the Earth is at {latitude}, {longitude}, {height_m} m");
-                let remedy = "a latitude is within 90 degrees, and a longitude within 360";
+                let problem = format!("--origin {latitude},{longitude},{height_m} is not on the Earth");
+                let remedy = "give a latitude within 90 degrees and a longitude within 360 degrees";
                 return refuse("recording/option-out-of-range", problem, remedy);
             }
         }
         if let Some((name, _)) = self.starts.iter().find(|(_, start)| !start.iter().all(|x| x.is_finite())) {
             let problem = format!("the start of {} is not finite", quoted(name));
-            return refuse("recording/option-out-of-range", problem, "give three finite numbers of metres");
+            return refuse("recording/option-out-of-range", problem, "give three finite numbers in metres");
         }
         if !self.turn().are_finite() {
-            let problem = "the lengths of its axes cannot be multiplied by 0, nor by what is not finite";
+            let problem = "a factor of --scale is 0 or not finite";
             return refuse(
                 "recording/option-out-of-range",
                 problem,
-                "give three numbers with --scale that are not 0, such as 1,1,-1",
+                "give three finite numbers other than 0, such as 1,1,-1",
             );
         }
         Ok(())
     }
 
-    /// Refuses an option that means nothing for a format.
-    pub(super) fn refuse_needless(&self, format: Format) -> Result<(), Fault> {
+    /// Refuses an option without a meaning for the format.
+    pub(super) fn refuse_unsupported_options(&self, format: Format) -> Result<(), Fault> {
         let (is_turned, has_columns) = (!self.turn().is_identity(), self.columns != ColumnNames::default());
         let is_one_vehicle = self.one_vehicle && !self.is_joined;
         let given = [
-            (self.time_unit.is_some(), Takes::TimeUnit, "--time-unit", "has a unit of time of its own"),
+            (self.time_unit.is_some(), FormatOption::TimeUnit, "--time-unit", "has a fixed unit of time"),
             (
                 self.times_per_second.is_some(),
-                Takes::TimeUnit,
+                FormatOption::TimeUnit,
                 "--fps and --time-scale",
-                "has a unit of time of its own",
+                "has a fixed unit of time",
             ),
-            (self.sort, Takes::Rows, "--sort", "holds curves in order of time"),
-            (self.duplicates.is_some(), Takes::Rows, "--duplicates", "holds curves, and no rows"),
-            (self.dimensions.is_some(), Takes::Dimensions, "--dimensions", "says which numbers are a vehicle's"),
-            (!self.starts.is_empty(), Takes::Starts, "--start", "does not hold curves that are relative"),
-            (has_columns, Takes::Columns, "--column", "has no columns that could be named"),
-            (self.layout.is_some(), Takes::Layout, "--layout", "has no arrays"),
-            (self.origin.is_some(), Takes::Origin, "--origin", "has no latitudes and longitudes"),
-            (self.frame.is_some(), Takes::Frame, "--frame", "names no frames"),
-            (!self.topics.is_empty(), Takes::Topics, "--topic", "has no topics"),
-            (is_turned, Takes::Axes, "--axes", "gives the directions of its axes"),
-            (is_one_vehicle, Takes::OneVehicle, "--one-vehicle", "names its vehicles"),
-            (self.allow_unfinished, Takes::Unfinished, "--allow-unfinished", "cannot be read before it is closed"),
+            (self.sort, FormatOption::Rows, "--sort", "holds curves in order of time"),
+            (self.duplicates.is_some(), FormatOption::Rows, "--duplicates", "holds curves, not rows"),
+            (self.dimensions.is_some(), FormatOption::Dimensions, "--dimensions", "defines the numbers of a vehicle"),
+            (!self.starts.is_empty(), FormatOption::Starts, "--start", "does not hold relative curves"),
+            (has_columns, FormatOption::Columns, "--column", "has no columns"),
+            (self.layout.is_some(), FormatOption::Layout, "--layout", "has no arrays"),
+            (self.origin.is_some(), FormatOption::Origin, "--origin", "has no latitudes and longitudes"),
+            (self.frame.is_some(), FormatOption::Frame, "--frame", "has no frames"),
+            (!self.topics.is_empty(), FormatOption::Topics, "--topic", "has no topics"),
+            (is_turned, FormatOption::Axes, "--axes", "gives the directions of its axes"),
+            (is_one_vehicle, FormatOption::OneVehicle, "--one-vehicle", "names its vehicles"),
+            (
+                self.allow_unfinished,
+                FormatOption::Unfinished,
+                "--allow-unfinished",
+                "cannot be read before it is closed",
+            ),
         ];
-        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.takes.contains(of)) {
+        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.supports.contains(of)) {
             Some((.., option, why)) => {
-                refuse("recording/unused-option", format!("{} {why}", format.title), format!("leave {option} away"))
+                refuse("recording/unused-option", format!("{} {why}", format.title), format!("omit {option}"))
             }
             None => Ok(()),
         }
     }
 
-    /// What is to be said of a file that was not closed, or the fault that it is.
+    /// Returns the note on an unclosed file if the user accepts it, else the fault.
     pub(super) fn accept_unfinished(&self, complete: bool) -> Result<Vec<String>, Fault> {
-        let note = "the recording was not closed: it is read up to the last part that was written";
+        let note = "the recording was not closed: it is read up to its last complete part";
         match (complete, self.allow_unfinished) {
             (true, _) => Ok(Vec::new()),
             (false, true) => Ok(vec![note.to_owned()]),

@@ -1,4 +1,4 @@
-//! Rows of a recording. They are read in the order of the file and given out in the order of time.
+//! Reads the rows of a recording in the order of the file and returns them in the order of time.
 
 use std::path::PathBuf;
 
@@ -15,45 +15,46 @@ const LONGEST_JUMP_M: f64 = 1000.0;
 /// Largest accepted speed of a longer step \[m/s\], above the escape velocity of the Earth.
 const FASTEST_M_S: f64 = 12_000.0;
 
-/// What follows for a recording in which some height is not known.
+/// Consequence of an unknown height, for notes.
 pub(super) const PLANAR: &str = "the recording is judged in the plane of x and y";
 
 /// A recording being read.
 pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 
-/// What is known of a recording beside its rows.
-pub(super) struct About {
+/// Properties of a recording besides its rows.
+pub(super) struct RecordingInfo {
     pub(super) path: PathBuf,
-    /// The unit of its times, where it is known.
+    /// Unit of the times, if known.
     pub(super) unit: Option<TimeUnit>,
-    /// How many of them the user says to make a second.
+    /// Number of time units per second, if given by the user.
     pub(super) times_per_second: Option<f64>,
-    /// What the times are counted from, as the file says it \[ns\].
+    /// Epoch of the times according to the file \[ns\].
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
     pub(super) scale: f64,
-    /// Whether rows that go back in time are sorted.
+    /// Whether to sort rows with decreasing time.
     pub(super) sort: bool,
-    /// Which of several rows of a vehicle at one time is read.
+    /// Choice among several rows of a vehicle at one time.
     pub(super) duplicates: Option<Duplicates>,
-    /// Properties of the recording; the clock and the assumption are found while the rows are looked at.
+    /// Metadata; the clock and the assumption are set while rows are read.
     pub(super) metadata: Metadata,
-    /// The fault of a recording without rows.
+    /// Fault of a recording without rows.
     pub(super) none: Fault,
 }
 
-impl About {
-    /// What the user says of the unit of time goes before what the file says.
+impl RecordingInfo {
+    /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of the
+    /// file.
     pub(super) fn new(
         source: &Source,
         options: &ReadOptions,
-        said: Option<TimeUnit>,
+        file_unit: Option<TimeUnit>,
         notes: Vec<String>,
         none: Fault,
     ) -> Self {
-        let unit = options.time_unit.or(said);
+        let unit = options.time_unit.or(file_unit);
         Self {
-            path: source.shown(),
+            path: source.display_path(),
             unit,
             times_per_second: options.times_per_second,
             epoch_ns: 0,
@@ -68,34 +69,33 @@ impl About {
 
 /// Samples in order of time.
 ///
-/// A recording with a row for each time is streamed, and must not run backwards. One with a row for each vehicle and
-/// time is surveyed first: it is streamed where time never runs backwards, and sorted in memory where it does. The rows of a
-/// vehicle must not go back in time: that is a clock that was set, or two vehicles under one name. A user who knows better
-/// has them sorted.
+/// A recording with one row per time is streamed, and its time must not decrease. A recording with one row per vehicle
+/// and time is surveyed first: it is streamed if time never decreases, else sorted in memory. The time of one vehicle
+/// must not decrease: its clock was set, or two vehicles have one name. The option `sort` sorts such rows.
 pub(super) struct Ordered<R> {
-    about: About,
+    info: RecordingInfo,
     rows: R,
     timing: Timing,
-    /// Rows read that have not been given out.
+    /// Rows read but not yet returned.
     batch: std::vec::IntoIter<Row>,
-    /// All rows have been read.
+    /// Whether all rows have been read.
     ended: bool,
-    /// All rows have been given out.
+    /// Whether all rows have been returned.
     finished: bool,
     /// Stamp and time of the last row.
     now: Option<(Stamp, f64)>,
-    /// Time of each vehicle's last row, and the row.
+    /// Last row of each vehicle, and its time.
     last: Vec<Option<(f64, Row)>>,
-    /// Place of each vehicle's last row among the items of the current call, where a later row may replace it.
-    given: Vec<usize>,
-    /// Rows left out because an earlier or a later one of the vehicle is of the same time.
+    /// Index of each vehicle's last sample in the current batch, where a later row may replace it.
+    emitted: Vec<usize>,
+    /// Number of rows omitted as duplicates in vehicle and time.
     left_out: u64,
 }
 
 impl<R: Rows> Ordered<R> {
-    /// Reads as much of the recording as its order and its clock need.
-    pub(super) fn open(mut rows: R, mut about: About) -> Result<Self, ReadError> {
-        let (sort, metadata) = (about.sort, &mut about.metadata);
+    /// Reads the part of the recording that its order and its clock require.
+    pub(super) fn open(mut rows: R, mut info: RecordingInfo) -> Result<Self, ReadError> {
+        let (sort, metadata) = (info.sort, &mut info.metadata);
         let mut first = Vec::new();
         let mut ended = false;
         let probe = if rows.is_wide() && sort {
@@ -105,7 +105,7 @@ impl<R: Rows> Ordered<R> {
         } else if rows.is_wide() {
             ended = !rows.next(&mut first)?;
             let mut probe = probe(&first);
-            // Rows that go back are refused as they are reached.
+            // Decreasing times are refused when they are reached.
             if let Some(probe) = &mut probe {
                 probe.in_order = true;
             }
@@ -113,12 +113,12 @@ impl<R: Rows> Ordered<R> {
         } else {
             rows.survey()?
         };
-        let Some(probe) = probe else { return Err(about.none.into()) };
-        let settled = || Timing::settle(&probe, about.unit);
-        let (mut timing, note) = about.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
-        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(about.epoch_ns);
+        let Some(probe) = probe else { return Err(info.none.into()) };
+        let settled = || Timing::settle(&probe, info.unit);
+        let (mut timing, note) = info.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
+        timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
         metadata.notes.extend(note);
-        // What is known by now of all rows, where they were surveyed.
+        // After a survey, notes and the assumption cover all rows.
         metadata.assumed = rows.assumed();
         metadata.notes.extend(rows.notes());
         if !rows.is_wide() {
@@ -130,15 +130,15 @@ impl<R: Rows> Ordered<R> {
             if !sort {
                 refuse_steps_back(&first, &rows, &timing)?;
             }
-            // Stable: rows of one time stay in the order of the file.
+            // The sort is stable: rows with the same time stay in the order of the file.
             first.sort_by(|a, b| a.stamp.compare(b.stamp));
             ended = true;
-            metadata.notes.push("rows are not in order of time and were sorted".to_owned());
+            metadata.notes.push("rows were not in order of time and were sorted".to_owned());
         }
         metadata.clock = timing.clock.clone();
         let batch = first.into_iter();
         Ok(Self {
-            about,
+            info,
             rows,
             timing,
             batch,
@@ -146,7 +146,7 @@ impl<R: Rows> Ordered<R> {
             finished: false,
             now: None,
             last: Vec::new(),
-            given: Vec::new(),
+            emitted: Vec::new(),
             left_out: 0,
         })
     }
@@ -169,49 +169,47 @@ impl<R: Rows> Ordered<R> {
         Ok(time_s)
     }
 
-    /// Appends a row as a sample, unless it repeats another one.
-    fn give(&mut self, row: &Row, items: &mut Vec<Item>) -> Result<(), ReadError> {
+    /// Appends a row as a sample, unless it duplicates another one.
+    fn emit(&mut self, row: &Row, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let time_s = self.time_of(row)?;
         if row.vehicle >= self.last.len() {
             self.last.resize(row.vehicle + 1, None);
-            self.given.resize(row.vehicle + 1, 0);
+            self.emitted.resize(row.vehicle + 1, 0);
         }
         if let Some((before_s, before)) = self.last[row.vehicle] {
             if before_s == time_s {
                 return self.repeat(row, &before, time_s, items);
             }
             if before.radius.is_some() != row.radius.is_some() {
-                return Err(self.error(row, self.radius_missing(&before, row)));
+                return Err(self.error(row, self.radius_fault(&before, row)));
             }
         }
         let sample = self.sample(row, time_s)?;
-        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.about.metadata.earth_origin.is_some())
-        {
+        if let Some((before_s, before)) = self.last[row.vehicle].filter(|_| self.info.metadata.earth_origin.is_some()) {
             let jump_m = (row.position - before.position).norm();
             if jump_m > LONGEST_JUMP_M && jump_m > FASTEST_M_S * self.timing.longest_s(time_s - before_s) {
-                return Err(self.error(row, self.jumps(before_s, &before, jump_m, time_s)));
+                return Err(self.error(row, self.jump_fault(before_s, &before, jump_m, time_s)));
             }
         }
         self.last[row.vehicle] = Some((time_s, *row));
-        self.given[row.vehicle] = items.len();
+        self.emitted[row.vehicle] = items.len();
         items.push(Item::Sample(sample));
         Ok(())
     }
 
-    /// Leaves out one of two rows of a vehicle at one time, or refuses both.
+    /// Omits one of two rows of a vehicle at one time, or refuses the recording.
     #[cold]
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
-        let says_the_same =
-            (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.about.duplicates.or(says_the_same.then_some(Duplicates::First)) {
+        let is_equal = (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
+        match self.info.duplicates.or(is_equal.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
-                // All rows of a time are given out in one call.
-                items[self.given[row.vehicle]] = Item::Sample(sample);
+                // The first row is in the same batch: see `continues_instant`.
+                items[self.emitted[row.vehicle]] = Item::Sample(sample);
                 self.last[row.vehicle] = Some((time_s, *row));
             }
-            None | Some(Duplicates::Refuse) => return Err(self.error(row, self.twice(time_s, before, row))),
+            None | Some(Duplicates::Refuse) => return Err(self.error(row, self.duplicate_fault(time_s, before, row))),
         }
         self.left_out += 1;
         Ok(())
@@ -221,9 +219,9 @@ impl<R: Rows> Ordered<R> {
         let sample = Sample {
             vehicle: row.vehicle,
             time_s,
-            position_m: row.position * self.about.scale,
-            velocity_m_s: row.velocity.map(|velocity| velocity * self.about.scale),
-            radius_m: row.radius.map(|radius| radius * self.about.scale),
+            position_m: row.position * self.info.scale,
+            velocity_m_s: row.velocity.map(|velocity| velocity * self.info.scale),
+            radius_m: row.radius.map(|radius| radius * self.info.scale),
         };
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         if time_s.is_finite()
@@ -241,35 +239,34 @@ impl<R: Rows> Ordered<R> {
     }
 
     #[cold]
-    fn twice(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
+    fn duplicate_fault(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
-        let problem = format!("vehicle {vehicle} is there a second time at {time_s} s; the first is {first}");
-        let remedy = "take one of the two out, or say which is read with --duplicates first or --duplicates last: a \
-                      vehicle is in one place at a time; where the rows are of several, name the column that tells \
-                      them apart with --column id=NAME";
+        let problem = format!("vehicle {vehicle} has a second row at {time_s} s; the first is at {first}");
+        let remedy = "remove one of the two, or choose one with --duplicates first or --duplicates last; if the rows \
+                      belong to several vehicles, name their column with --column id=NAME";
         Fault::coded("recording/duplicate-row", problem, remedy)
     }
 
     #[cold]
-    fn jumps(&self, before_s: f64, before: &Row, jump_m: f64, time_s: f64) -> Fault {
+    fn jump_fault(&self, before_s: f64, before: &Row, jump_m: f64, time_s: f64) -> Fault {
         let (vehicle, first) = (self.name(before), self.rows.place(before.place));
         let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
         let problem =
             format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its previous position is at {first}");
-        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times \
-                      with --time-unit";
+        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the \
+                      times with --time-unit";
         Fault::coded("recording/position-jump", problem, remedy)
     }
 
     #[cold]
-    fn radius_missing(&self, before: &Row, row: &Row) -> Fault {
+    fn radius_fault(&self, before: &Row, row: &Row) -> Fault {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
-        let which = if row.radius.is_some() { "a radius here and none" } else { "no radius here and one" };
+        let which = if row.radius.is_some() { "a radius here, but none" } else { "no radius here, but one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
         Fault::coded("recording/radius", format!("vehicle {vehicle} has {which} at {first}"), remedy)
     }
 
-    /// The next row, which stays the next one until it is taken.
+    /// Returns the next row without consuming it.
     fn peek(&mut self) -> Result<Option<&Row>, ReadError> {
         if self.batch.len() == 0 && !self.ended {
             let mut batch = Vec::with_capacity(BATCH);
@@ -279,8 +276,8 @@ impl<R: Rows> Ordered<R> {
         Ok(self.batch.as_slice().first())
     }
 
-    /// Whether the next row is of the time of the last one.
-    fn goes_on_at_once(&mut self) -> Result<bool, ReadError> {
+    /// Returns whether the next row has the time of the last one.
+    fn continues_instant(&mut self) -> Result<bool, ReadError> {
         let Some((_, now_s)) = self.now else { return Ok(false) };
         let next = self.peek()?.map(|row| row.stamp);
         Ok(next.is_some_and(|stamp| self.timing.seconds(stamp) == now_s))
@@ -288,23 +285,23 @@ impl<R: Rows> Ordered<R> {
 
     fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        let waits = self.about.duplicates == Some(Duplicates::Last);
-        while items.len() < before + BATCH || (waits && self.goes_on_at_once()?) {
+        let waits = self.info.duplicates == Some(Duplicates::Last);
+        while items.len() < before + BATCH || (waits && self.continues_instant()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
-            self.give(&row, items)?;
+            self.emit(&row, items)?;
         }
         if items.len() == before && self.left_out > 0 {
             let rows = std::mem::take(&mut self.left_out);
             let which = if waits { "a later" } else { "an earlier" };
-            self.about
+            self.info
                 .metadata
                 .notes
-                .push(format!("rows left out because {which} one of the vehicle is of the same time: {rows}"));
+                .push(format!("rows omitted because {which} row of the vehicle has the same time: {rows}"));
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            self.about.metadata.notes.extend(self.rows.late_notes());
+            self.info.metadata.notes.extend(self.rows.late_notes());
         }
         Ok(items.len() > before)
     }
@@ -318,15 +315,15 @@ impl<R: Rows> Tracks for Ordered<R> {
     }
 
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        self.try_read(items).map_err(|fault| fault.of(&self.about.path))
+        self.try_read(items).map_err(|fault| fault.of(&self.info.path))
     }
 
     fn metadata(&self) -> &Metadata {
-        &self.about.metadata
+        &self.info.metadata
     }
 }
 
-/// Number of rows that are read at a time.
+/// Number of rows read at once.
 pub(super) const BATCH: usize = 10_000;
 
 /// State of a vehicle at an instant, as read from the file.
@@ -428,9 +425,8 @@ pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
                 of.place(before.place)
             );
-            let remedy = "look whether its clock was set; where the rows are of several vehicles, name the column that \
-                          tells them apart with --column id=NAME; where they are only out of order, have them sorted \
-                          with --sort";
+            let remedy = "check whether its clock was set; if the rows belong to several vehicles, name their column \
+                          with --column id=NAME; if the rows are only out of order, use --sort";
             return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
         }
     }

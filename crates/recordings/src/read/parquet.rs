@@ -1,7 +1,7 @@
-//! Tables in Parquet, with the same columns as in CSV.
+//! Reads tables in Parquet, with the same columns as in CSV.
 //!
-//! Columns are flat: numbers, text or whole numbers for the vehicle, and for time numbers or time stamps, whose unit is
-//! then known. What time counts from may stand under `epoch_ns` in the metadata of the file.
+//! Columns are flat. Vehicles are text or integers, other values are numbers. Times are numbers or time stamps, which
+//! have a unit. The key `epoch_ns` of the file metadata optionally holds the epoch.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -20,7 +20,7 @@ use super::error::{Fault, Place, ReadError, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::{BATCH, Recording};
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 use super::table;
 use super::table::Cells;
@@ -33,14 +33,14 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"PAR1"],
     sniff: |head| head.begins_with_any(READER.magic),
     open: |source, options| open(&source.clone().seekable()?, options),
-    takes: Takes::TABLE,
+    supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
 
-/// Key of the metadata that says what time counts from \[ns\].
+/// Metadata key of the epoch \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 
-/// Most cells that are read at a time: some 20 MB.
+/// Largest number of cells read at once: some 20 MB.
 const BATCH_CELLS: usize = 640_000;
 
 /// Opens a table.
@@ -53,7 +53,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     file.seek(SeekFrom::End(-4))?;
     file.read_exact(&mut end)?;
     if end != *b"PAR1" && end != *b"PARE" {
-        let what = "the end of the file, where its columns are described, is missing".to_owned();
+        let what = "the end of the file, with the description of its columns, is missing".to_owned();
         return Err(Fault::Truncated(what).into());
     }
     let reader = guarded(|| SerializedFileReader::new(file))?;
@@ -66,7 +66,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         unreadable(&reader, column).is_none()
             && !matches!(physical, Physical::BOOLEAN | Physical::INT96 | Physical::FIXED_LEN_BYTE_ARRAY)
     };
-    layout.rivals.retain(can_name);
+    layout.alternative_ids.retain(can_name);
     layout.suspects.retain(can_name);
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
@@ -84,13 +84,13 @@ thread_local! {
     static GUARDED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
 }
 
-/// Whether this thread is in a call whose panic becomes an error: a panic hook has nothing to say about it.
+/// Returns whether this thread is in a call whose panic becomes an error. A panic hook should then print nothing.
 #[must_use]
 pub fn is_guarded() -> bool {
     GUARDED.get()
 }
 
-/// Calls into the library, which panics on some damaged files.
+/// Calls the library and converts its panics on damaged files to errors.
 fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault> {
     GUARDED.set(true);
     let outcome = catch_unwind(AssertUnwindSafe(call));
@@ -103,7 +103,7 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     }
 }
 
-/// The unit of a column of time stamps.
+/// Returns the unit of a column of time stamps.
 fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
     match (column.logical_type_ref(), column.converted_type()) {
         (Some(LogicalType::Timestamp(stamp)), _) => Some(match stamp.unit {
@@ -117,7 +117,7 @@ fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
     }
 }
 
-/// What keeps a column from being read as numbers or text without a change of meaning, and what helps.
+/// Returns code, problem and remedy of a column that cannot be read as numbers or text.
 fn unreadable(
     reader: &SerializedFileReader<File>,
     column: usize,
@@ -126,7 +126,7 @@ fn unreadable(
     let metadata = reader.metadata();
     let descriptor = metadata.file_metadata().schema_descr().column(column);
     if descriptor.max_rep_level() > 0 {
-        return Some((ELEMENT_TYPE, "holds lists", "save a number in each cell"));
+        return Some((ELEMENT_TYPE, "holds lists", "save one number per cell"));
     }
     let other = match (descriptor.logical_type_ref(), descriptor.converted_type()) {
         (Some(LogicalType::Decimal(_)), _) | (_, ConvertedType::DECIMAL) => Some("holds decimals"),
@@ -141,16 +141,16 @@ fn unreadable(
     }
     let mut chunks = metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
     let packed = chunks.find_map(|chunk| match chunk.compression() {
-        Compression::BROTLI(_) => Some("is packed by brotli, which is not read"),
-        Compression::LZO => Some("is packed by lzo, which is not read"),
+        Compression::BROTLI(_) => Some("is packed by brotli, which is not supported"),
+        Compression::LZO => Some("is packed by lzo, which is not supported"),
         _ => None,
     });
     packed.map(|what| {
-        ("recording/unsupported-compression", what, "save it plain, or packed by snappy, gzip, lz4 or zstd")
+        ("recording/unsupported-compression", what, "save it uncompressed, or packed by snappy, gzip, lz4 or zstd")
     })
 }
 
-/// Whether the whole numbers of a column have no sign.
+/// Returns whether the integers of a column are unsigned.
 fn is_unsigned(column: &ColumnDescriptor) -> bool {
     use ConvertedType as Converted;
     match column.logical_type_ref() {
@@ -162,16 +162,16 @@ fn is_unsigned(column: &ColumnDescriptor) -> bool {
     }
 }
 
-/// A cell of a column.
+/// Cell of a column.
 enum Cell {
     Empty,
-    /// Wide enough for all of 64 bits, with and without a sign.
+    /// Wide enough for signed and unsigned integers of 64 bits.
     Whole(i128),
     Real(f64),
     Text(ByteArray),
 }
 
-/// The next cells of the column of this name.
+/// Reads the next cells of the column with this name.
 fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>, Fault> {
     let (present, unsigned) = (column.present, column.unsigned);
     match &mut column.reader {
@@ -186,7 +186,7 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
         ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
         _ => refuse(
             "recording/element-type",
-            format!("column `{name}` is neither of numbers (float, double, int32, int64) nor of text"),
+            format!("column `{name}` holds neither numbers (float, double, int32, int64) nor text"),
             "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
         ),
     }
@@ -208,41 +208,41 @@ fn cells<D: DataType>(
     Ok(levels.into_iter().map(next).map(|cell| cell.unwrap_or(Cell::Empty)).collect())
 }
 
-/// A column of the current group of rows.
+/// Column of the current row group.
 struct Column {
     number: usize,
-    /// The definition level of a cell that is there.
+    /// Definition level of a cell that is not null.
     present: i16,
     unsigned: bool,
     reader: ColumnReader,
     cells: Vec<Cell>,
 }
 
-/// A table, group of rows by group of rows.
+/// Table, read one row group after another.
 struct Groups {
     reader: SerializedFileReader<File>,
     header: Vec<String>,
-    /// Columns that are read.
+    /// Columns to read.
     wanted: Vec<usize>,
     columns: Vec<Column>,
     cursor: Cursor,
 }
 
-/// How far a table has been read.
+/// Reading position in a table.
 #[derive(Default)]
 struct Cursor {
-    /// Number of the next group of rows.
+    /// Index of the next row group.
     group: usize,
-    /// Rows of the current group that have not been read.
+    /// Number of unread rows of the current group.
     rows_left: usize,
-    /// Rows in the cells that were read, which one of them is the current one, and how many came before them.
+    /// Number of rows in the cells, index of the current one, and number of rows before them.
     count: usize,
     at: usize,
     rows_before: u64,
 }
 
 impl Groups {
-    /// Goes to the next group of rows; `false` behind the last.
+    /// Opens the next row group; returns `false` after the last one.
     fn open_group(&mut self) -> Result<bool, Fault> {
         if self.cursor.group >= self.reader.num_row_groups() {
             return Ok(false);
@@ -257,13 +257,14 @@ impl Groups {
             columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
         }
         let rows = self.reader.metadata().row_group(self.cursor.group).num_rows();
-        self.cursor.rows_left = usize::try_from(rows).map_err(|_| Fault::damaged("a group has less than no rows"))?;
+        self.cursor.rows_left =
+            usize::try_from(rows).map_err(|_| Fault::damaged("a row group has a negative row count"))?;
         self.columns = columns;
         self.cursor.group += 1;
         Ok(true)
     }
 
-    /// Reads some rows; 0 at the end.
+    /// Reads some rows; returns their number, 0 at the end.
     fn fill(&mut self) -> Result<usize, Fault> {
         while self.cursor.rows_left == 0 {
             if !self.open_group()? {
@@ -282,7 +283,7 @@ impl Groups {
         Ok(count)
     }
 
-    /// The cell of the current row in a column that is read.
+    /// Returns the cell of the current row in a column.
     fn cell(&self, number: usize) -> &Cell {
         let at = self.columns.binary_search_by_key(&number, |column| column.number);
         at.ok().and_then(|at| self.columns[at].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
@@ -345,7 +346,7 @@ impl Cells for Groups {
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         if let Cell::Real(_) = self.cell(column) {
             let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
-            return refuse("recording/element-type", problem, "save vehicles as text or as whole numbers");
+            return refuse("recording/element-type", problem, "save vehicles as text or as integers");
         }
         self.text(column)
     }

@@ -1,4 +1,4 @@
-//! Table of the readers, with a row for each format, and recognition of a format by the content of a file.
+//! Table of the readers, one row per format, and recognition of the format of a file by its content.
 
 use std::io::Read;
 use std::ops::Deref;
@@ -22,13 +22,13 @@ pub struct Reader {
     pub extensions: &'static [&'static str],
     /// Description for `--help` and docs/recordings.md.
     pub docs: &'static str,
-    /// First bytes of every file of the format; empty if there are none.
+    /// First bytes of every file of the format; empty without such bytes.
     pub(super) magic: &'static [&'static [u8]],
     /// Whether a file is of this format, by its first bytes. The first row of [`READERS`] that accepts a file reads it.
     pub(super) sniff: fn(&Head<'_>) -> bool,
     pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-    /// Options of [`Takes`] that this format supports.
-    pub(super) takes: &'static [Takes],
+    /// Options of [`FormatOption`] that this format supports.
+    pub(super) supports: &'static [FormatOption],
     pub(super) packing: Packing,
 }
 
@@ -51,7 +51,7 @@ pub static READERS: &[Reader] = &[
 
 /// Options that only some formats support.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Takes {
+pub(super) enum FormatOption {
     TimeUnit,
     Rows,
     Dimensions,
@@ -66,7 +66,7 @@ pub(super) enum Takes {
     Unfinished,
 }
 
-impl Takes {
+impl FormatOption {
     /// Options of tables with named columns.
     pub(super) const TABLE: &'static [Self] =
         &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle];
@@ -117,7 +117,7 @@ pub struct Format(&'static Reader);
 impl Format {
     /// A table in CSV.
     pub const CSV: Self = Self(&csv::CSV);
-    /// Numbers between blanks.
+    /// Numbers separated by blanks.
     pub const TEXT: Self = Self(&csv::TEXT);
     /// A table of `TrajNet`.
     pub const TRAJNET: Self = Self(&csv::TRAJNET);
@@ -166,10 +166,10 @@ impl fmt::Debug for Format {
     }
 }
 
-/// Bytes that are looked at.
+/// Number of bytes examined.
 const HEAD_BYTES: u64 = 64 * 1024;
 
-/// Recognises a file, and finds out whether it is packed by gzip.
+/// Recognises the format of a file, and whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
     source.gzip = false;
     let mut head = head_of(source)?;
@@ -198,17 +198,17 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     Ok(format)
 }
 
-/// Whether a file is a zip archive that holds neither `NumPy` arrays nor a show.
+/// Returns whether a file is a zip archive that contains neither `NumPy` arrays nor a show.
 pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
     let head = head_of(&Source::file(path))?;
     Ok(Head::new(&head).begins_with_any(Format::NPZ.magic)
         && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
 }
 
-/// Whether a file is text with neither a row of numbers nor the name of a column of time: a note beside tables.
+/// Returns whether a file is text without a row of numbers or a time column, such as a note beside tables.
 pub(super) fn is_prose(source: &Source) -> bool {
     let Ok(head) = head_of(source) else { return false };
-    // What is looked at may end within a letter.
+    // The examined bytes may end inside a character.
     let text = match str::from_utf8(&head) {
         Ok(text) => text,
         Err(error) if error.error_len().is_none() => str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
@@ -227,7 +227,7 @@ fn is_recording(entry: &str) -> bool {
     entry == SHOW || entry.rsplit('.').next() == Some("npy")
 }
 
-/// The first bytes, unpacked.
+/// Returns the first bytes, unpacked.
 fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
     let mut head = Vec::new();
     source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
@@ -245,11 +245,11 @@ fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
     Format::all().find(|format| (format.sniff)(&head)).ok_or(Fault::UnknownFormat)
 }
 
-/// Beginnings of files, what they are, and what helps.
+/// Unsupported formats: first bytes, description and remedy.
 const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
     (b"#ROSBAG V", "a ROS 1 bag", BAG),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
-    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was made of"),
+    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was compiled from"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT ", "a DataFlash log of ArduPilot", DATAFLASH),
@@ -260,50 +260,53 @@ const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
     ),
     (b"MATLAB 5.0", "a file of MATLAB", "write it with `writetable` as t,id,x,y,z"),
     (b"RRF2", "a recording of Rerun", "write its positions as a table t,id,x,y,z"),
-    (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it first, with unzstd"),
+    (b"\x28\xb5\x2f\xfd", "packed by zstd", "unpack it with unzstd"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip install \
-                              rosbags`), and give the folder `flight`";
-const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table t,id,lat,lon,alt \
-                         in degrees and metres";
+pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip \
+                              install rosbags`), and give the folder `flight`";
+const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table \
+                         t,id,lat,lon,alt in degrees and metres";
 const UNPACK: &str = "unpack it, and give the folder";
-pub(super) const TABLE: &str =
-    "give positions over time, such as a table t,id,x,y,z, or an object of JSON in each line";
+pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z, or one JSON object per line";
 const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
-/// Returns what a file is and the remedy, where the format is known and not read.
+/// Returns the fault of a known but unsupported format.
 fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
-        let problem = "it is a single NumPy array, which tells no times";
+        let problem = "it is a single NumPy array, without times";
         return Some(Fault::coded("recording/no-time-column", problem, remedy));
     }
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
         return Some(Fault::NotUtf8);
     }
-    // Each message of telemetry has the microseconds since 1970 in front.
+    // Each message of telemetry begins with the microseconds since 1970.
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
-        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from that a table \
-                      t,id,lat,lon,alt in degrees and metres";
+        let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from \
+                      that a table t,id,lat,lon,alt in degrees and metres";
         return Some(Fault::coded(
             "recording/unsupported-format",
-            "it is a MAVLink telemetry log, which is not read",
+            "it is a MAVLink telemetry log, which is not supported",
             remedy,
         ));
     }
     if head.get(257..262) == Some(b"ustar") {
-        return Some(Fault::coded("recording/unsupported-format", "it is a tar archive, which is not read", UNPACK));
+        return Some(Fault::coded(
+            "recording/unsupported-format",
+            "it is a tar archive, which is not supported",
+            UNPACK,
+        ));
     }
     let known = UNSUPPORTED.iter().find(|(begin, ..)| head.starts_with(begin));
     known.map(|(_, what, remedy)| {
-        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), *remedy)
+        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not supported"), *remedy)
     })
 }
 
-/// The same of text, which has no blanks in front.
+/// Returns the fault of a known but unsupported text format; the text has no leading blanks.
 fn unsupported_text(text: &[u8]) -> Option<Fault> {
     let holds = |word: &str| memchr::memmem::find(text, word.as_bytes()).is_some();
     let (what, remedy) = match text.first()? {
@@ -311,8 +314,8 @@ fn unsupported_text(text: &[u8]) -> Option<Fault> {
         b'<' if holds("<kml") => ("a KML file", EARTH),
         b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
         b'<' => ("an XML file", TABLE),
-        b'[' => ("JSON, but no Skybrush show", TABLE),
+        b'[' => ("JSON, but not a Skybrush show", TABLE),
         _ => return None,
     };
-    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not read"), remedy))
+    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not supported"), remedy))
 }

@@ -1,8 +1,9 @@
-//! Skybrush shows: `show.json`, alone or inside a `.skyc` archive.
+//! Reads Skybrush shows: `show.json`, alone or inside a `.skyc` archive.
 //!
-//! Each drone has a trajectory of keyed points `[t, [x, y, z], [control points]]`. Times count from the drone's take-off,
-//! before which it stands at its first point; a drone with a single point stands there throughout. The control points belong to the segment that ends at the point: with n of
-//! them the segment is a Bezier curve of degree n + 1, so without any it is a straight line.
+//! Each drone has a trajectory of keyed points `[t, [x, y, z], [control points]]`. Times count from the take-off of the
+//! drone; before it, the drone stands at its first point. A drone with a single point stands there throughout. The
+//! control points belong to the segment that ends at the point: n of them give a Bezier curve of degree n + 1, none a
+//! straight line.
 
 use std::io::Read;
 
@@ -14,7 +15,7 @@ use super::curves::{Curves, distinct, from_json, piece};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Archive, Source};
 use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
@@ -27,14 +28,14 @@ pub(super) const READER: Reader = Reader {
     magic: &[],
     sniff: |head| head.begins_with_any(npz::READER.magic) || head.is_text(|text| text.starts_with(b"{")),
     open,
-    takes: &[Takes::Axes],
+    supports: &[FormatOption::Axes],
     packing: Packing::None,
 };
 
-/// Highest degree of a Bezier segment that is read.
+/// Highest supported degree of a Bezier segment.
 const HIGHEST_DEGREE: usize = 15;
 
-/// The entry of an archive that holds the show.
+/// Name of the archive entry with the show.
 pub(super) const SHOW: &str = "show.json";
 
 #[derive(Deserialize)]
@@ -84,12 +85,12 @@ struct Trajectory {
     takeoff_s: f64,
 }
 
-/// Time \[s\], position and control points, the last of which may be left out, and what is not read.
+/// Time \[s\], position, optional control points, and an ignored field.
 #[derive(Deserialize)]
 #[serde(expecting = "a keyed point [t, [x, y, z], [control points]]")]
 struct Point(f64, [f64; 3], #[serde(default)] Vec<[f64; 3]>, #[serde(default)] IgnoredAny);
 
-/// The show of a file, and the archive of its parts.
+/// Reads the show of a file; also returns the archive, if it is one.
 fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     let mut head = [0; 2];
     let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
@@ -97,11 +98,11 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     let show = match &mut archive {
         Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
         Some(_) => {
-            let problem = format!("it is an archive that holds neither `{SHOW}` nor NumPy arrays nor tables");
+            let problem = format!("it is an archive with neither `{SHOW}` nor NumPy arrays nor tables");
             return refuse(
                 "recording/unknown-format",
                 problem,
-                "give a .skyc or .npz file, or pack a table for each vehicle",
+                "give a .skyc or .npz file, or pack one table per vehicle",
             );
         }
         None => {
@@ -113,7 +114,7 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     Ok((show, archive))
 }
 
-/// How close drones may come, as the show itself says \[units of length\].
+/// Returns the minimum distance of drones that the show defines \[units of length\].
 pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> {
     let settings = show(source)?.0.settings;
     Ok(settings.and_then(|settings| settings.validation?.least_distance))
@@ -125,7 +126,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(swarm) = show.swarm else {
         return refuse(
             "recording/unsupported-format",
-            "it is JSON, but no Skybrush show: it has no `swarm`",
+            "it is JSON, but not a Skybrush show: it has no `swarm`",
             readers::TABLE,
         );
     };
@@ -156,7 +157,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
 }
 
-/// A drone with a single point stands there until the show ends.
+/// Extends a drone with a single point to the end of the show.
 fn stand_throughout(curves: &mut [Vec<Item>]) {
     let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
     let end_s = curves.iter().flatten().map(end_of).fold(f64::NEG_INFINITY, f64::max);
@@ -170,19 +171,19 @@ fn stand_throughout(curves: &mut [Vec<Item>]) {
     }
 }
 
-/// The document behind `$ref`.
+/// Returns the document behind `$ref`.
 fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &str) -> Result<T, ReadError> {
     let name = reference.split('#').next().unwrap_or_default();
     let name = name.trim_start_matches("./");
     let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
-        let problem = format!("it refers to `{reference}`, which is not there");
+        let problem = format!("it refers to `{reference}`, which is missing");
         return refuse("recording/archive-entry", problem, "give the .skyc file that holds all parts of the show");
     };
     parse(&archive.whole(name)?, Some(name))
 }
 
 fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {
-    from_json(bytes, "a Skybrush show", "give a show as Skybrush exports it").map_err(|error| match entry {
+    from_json(bytes, "a Skybrush show", "export the show from Skybrush again").map_err(|error| match entry {
         Some(entry) => {
             let line = error.place.as_ref().map_or_else(String::new, Place::to_string);
             ReadError { place: Some(Place::Part(format!("entry `{entry}`, {line}"))), ..error }
@@ -191,10 +192,10 @@ fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, Re
     })
 }
 
-/// The curve of a drone, or the number of the point that is wrong.
+/// Returns the curve of a drone, or the fault and the index of its point.
 fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
     if let Some(version) = trajectory.version.filter(|&version| version != 1.0) {
-        let problem = format!("the trajectory is of version {version}");
+        let problem = format!("the version of the trajectory is {version}, expected 1");
         return Err((
             None,
             Fault::coded("recording/unsupported-format", problem, "export the show with trajectories of version 1"),
@@ -221,30 +222,26 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
     Ok(items)
 }
 
-/// The coefficients of a segment between two points at these times.
+/// Returns the coefficients of a segment between two points at these times.
 fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Vec<Vector3<f64>>, Fault> {
     if to_s == from_s {
         let problem = format!("two points are at the same time, {to_s} s");
-        return refuse("recording/duplicate-row", problem, "a drone is in one place at a time: take one out");
+        return refuse("recording/duplicate-row", problem, "remove one of them: a drone is in one place at a time");
     }
     if to_s < from_s {
         let problem = format!("time runs backwards: {to_s} s comes after {from_s} s");
-        return refuse(
-            "recording/time-backwards",
-            problem,
-            "look at the order of the points, and export the show again",
-        );
+        return refuse("recording/time-backwards", problem, "check the order of the points, and export the show again");
     }
     let degree = point.2.len() + 1;
     if degree > HIGHEST_DEGREE {
-        let problem = format!("the segment is of degree {degree}");
-        return refuse("recording/degree", problem, format!("degrees up to {HIGHEST_DEGREE} are read"));
+        let problem = format!("the degree of the segment is {degree}, at most {HIGHEST_DEGREE} is supported");
+        return refuse("recording/degree", problem, "use fewer control points");
     }
     let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
     Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))
 }
 
-/// The Bezier curve of these points over a duration as coefficients of the powers of time.
+/// Converts the Bezier curve of these points over a duration T to coefficients of the powers of time.
 ///
 /// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
 fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
@@ -268,11 +265,11 @@ mod tests {
 
     use super::*;
 
-    /// Rounding of a handful of additions of numbers around 10.
+    /// Rounding error of a few additions of numbers around 10.
     const ROUNDING_M: f64 = 1e-13;
 
     #[test]
-    fn powers_say_the_same_as_de_casteljau() {
+    fn power_coefficients_agree_with_de_casteljau() {
         let points = [vector![1.0, 2.0, 3.0], vector![-2.0, 0.5, 4.0], vector![0.0, 7.0, 1.0], vector![5.0, 5.0, 5.0]];
         let coefficients = powers(&points, 2.5);
         for step in 0..=10 {

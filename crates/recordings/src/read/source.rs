@@ -1,4 +1,4 @@
-//! Files as streams of bytes and of lines, zip archives, and limits to the growth of what is packed.
+//! Files as streams of bytes and lines, zip archives, and limits on the growth of compressed data.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -15,43 +15,43 @@ use zip::{CompressionMethod, ZipArchive};
 
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 
-/// Longest line that is read \[bytes\]: an instant of a hundred thousand vehicles.
+/// Longest accepted line \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
 
-/// Bytes read at a time.
+/// Block size of reads \[bytes\].
 const BLOCK_BYTES: usize = 256 * 1024;
 
 /// First bytes of a gzip file.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
-/// First bytes of a file in Zstandard.
+/// First bytes of a Zstandard file.
 pub(super) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// A file, alone or in an archive, that can be read from its start as often as needed.
+/// File or archive entry that can be read repeatedly.
 #[derive(Clone, Debug)]
 pub(super) struct Source {
     pub(super) path: PathBuf,
-    /// The entry of the archive that `path` then is.
+    /// Entry, if `path` is an archive.
     pub(super) entry: Option<String>,
     pub(super) gzip: bool,
     pub(super) zstd: bool,
-    /// Where what was an entry has been unpacked to, and what errors call it.
+    /// Unpacked copy of an entry, and its name for errors.
     unpacked: Option<(Arc<TempPath>, PathBuf)>,
 }
 
 impl Source {
-    /// A file of its own.
+    /// Returns the source of a file.
     pub(super) fn file(path: &Path) -> Self {
         Self { path: path.to_owned(), entry: None, gzip: false, zstd: false, unpacked: None }
     }
 
-    /// An entry of an archive.
+    /// Returns the source of an archive entry.
     pub(super) fn entry(archive: &Path, name: String) -> Self {
         Self { entry: Some(name), ..Self::file(archive) }
     }
 
-    /// As a file of its own, whose bytes can be read in any order: an entry or a packed file is unpacked, until the last copy
-    /// of this is gone.
+    /// Returns a seekable file: entries and compressed files are unpacked to a temporary file, which lives as long as
+    /// any clone of the source.
     pub(super) fn seekable(self) -> Result<Self, ReadError> {
         if self.entry.is_none() && !self.gzip && !self.zstd {
             return Ok(self);
@@ -59,28 +59,28 @@ impl Source {
         let mut file = tempfile::NamedTempFile::new()?;
         std::io::copy(&mut self.bytes()?, &mut file)?;
         let unpacked = Arc::new(file.into_temp_path());
-        let called = self.shown();
-        Ok(Self { unpacked: Some((unpacked.clone(), called)), ..Self::file(&unpacked) })
+        let display_name = self.display_path();
+        Ok(Self { unpacked: Some((unpacked.clone(), display_name)), ..Self::file(&unpacked) })
     }
 
-    /// What errors call it.
-    pub(super) fn shown(&self) -> PathBuf {
+    /// Returns the name for errors.
+    pub(super) fn display_path(&self) -> PathBuf {
         match (&self.unpacked, &self.entry) {
-            (Some((_, called)), _) => called.clone(),
+            (Some((_, display_name)), _) => display_name.clone(),
             (None, Some(entry)) => self.path.join(entry),
             (None, None) => self.path.clone(),
         }
     }
 
-    /// What its only vehicle is called: the name of the file without what says the format.
+    /// Returns the name of its only vehicle: the file name without extensions.
     pub(super) fn stem(&self) -> String {
-        let path = self.shown();
+        let path = self.display_path();
         let packed = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gz"));
         let path = if packed { path.with_extension("") } else { path };
         path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 
-    /// The bytes of the file, unpacked.
+    /// Returns the bytes of the file, unpacked.
     pub(super) fn bytes(&self) -> Result<Box<dyn Read>, ReadError> {
         let (file, packed_bytes): (Box<dyn Read>, _) = if let Some(entry) = &self.entry {
             (Archive::open(&self.path)?.entry(entry)?, File::open(&self.path)?.metadata()?.len())
@@ -99,10 +99,10 @@ impl Source {
     }
 }
 
-/// The lines of a text, one in memory at a time.
+/// Lines of a text, with one line in memory.
 pub(super) struct Lines {
     input: BufReader<Box<dyn Read>>,
-    /// The current line with its end.
+    /// Current line with its line end.
     buffer: Vec<u8>,
     number: u64,
 }
@@ -112,19 +112,19 @@ impl Lines {
         Ok(Self { input: BufReader::with_capacity(BLOCK_BYTES, source.bytes()?), buffer: Vec::new(), number: 0 })
     }
 
-    /// The current line without its end.
+    /// Returns the current line without its line end.
     #[inline]
     pub(super) fn line(&self) -> &[u8] {
         let line = self.buffer.strip_suffix(b"\n").unwrap_or(&self.buffer);
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Its number, from 1.
+    /// Returns its number, from 1.
     pub(super) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Goes to the next line; `false` behind the last one.
+    /// Moves to the next line; returns `false` after the last one.
     #[inline]
     pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
         self.buffer.clear();
@@ -141,16 +141,16 @@ impl Lines {
     }
 }
 
-/// Longest end of an archive: its last record with the longest comment \[bytes\].
+/// Longest end record of an archive, including its comment \[bytes\].
 const END_LIMIT_BYTES: u64 = 22 + 65_535;
 
-/// Up to here compressed data may grow without being looked at \[bytes\].
+/// Unpacked size below which growth is not limited \[bytes\].
 const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
 
-/// Beyond [`FREE_GROWTH_BYTES`] data may grow by this factor. Deflate reaches 1032, recordings of real motion 20.
+/// Largest growth factor beyond [`FREE_GROWTH_BYTES`]. Deflate reaches 1032, recordings of real motion 20.
 const GROWTH_LIMIT: u64 = 200;
 
-/// An archive opened for reading.
+/// Opened zip archive.
 pub(super) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
@@ -167,27 +167,23 @@ impl Archive {
         if zip.has_duplicate_names()
             && let Some(name) = repeated(path, zip.central_directory_start())?
         {
-            let remedy = "unpack it, look which of the two is meant, and make the archive again with that one";
-            return refuse(
-                "recording/archive-entry",
-                format!("two of its entries are called {}", quoted(&name)),
-                remedy,
-            );
+            let remedy = "unpack it, and make an archive with only one of the two";
+            return refuse("recording/archive-entry", format!("two entries have the name {}", quoted(&name)), remedy);
         }
         Ok(Self { path: path.to_owned(), zip })
     }
 
-    /// Whether there is an entry of this name.
+    /// Returns whether there is an entry with this name.
     pub(super) fn holds(&self, name: &str) -> bool {
         self.zip.index_for_name(name).is_some()
     }
 
-    /// Names of all entries.
+    /// Returns the names of all entries.
     pub(super) fn names(&self) -> Vec<String> {
         self.zip.file_names().filter_map(Result::ok).map(std::borrow::Cow::into_owned).collect()
     }
 
-    /// The bytes of an entry, unpacked and compared with their checksum.
+    /// Returns the bytes of an entry, unpacked and verified by their checksum.
     pub(super) fn entry(&mut self, name: &str) -> Result<Box<dyn Read>, ReadError> {
         self.try_entry(name).map_err(|fault| fault.at(place(name)))
     }
@@ -204,10 +200,10 @@ impl Archive {
                 "give an archive without a password",
             );
         }
-        let start = start.ok_or_else(|| Fault::damaged("the entry has no place in the archive"))?;
+        let start = start.ok_or_else(|| Fault::damaged("the entry has no offset in the archive"))?;
         let mut file = File::open(&self.path)?;
         file.seek(SeekFrom::Start(start))?;
-        // What the archive says of its lengths is no more than a claim: an entry cannot be longer than its file.
+        // The declared lengths are not trusted: an entry cannot be longer than its file.
         let file_bytes = file.metadata().map_or(0, |data| data.len());
         let packed = BufReader::new(file.take(packed_bytes));
         let packed_bytes = packed_bytes.min(file_bytes);
@@ -217,13 +213,13 @@ impl Archive {
                 Box::new(Checked::new(Growing::new(DeflateDecoder::new(packed), packed_bytes), crc))
             }
             other => {
-                let remedy = "make the archive with deflate or unpacked, as numpy.savez does";
+                let remedy = "make the archive with deflate or without compression, as numpy.savez does";
                 return refuse("recording/unsupported-compression", format!("it is packed by {other}"), remedy);
             }
         })
     }
 
-    /// All bytes of an entry, unpacked.
+    /// Returns all bytes of an entry, unpacked.
     pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
         let mut bytes = Vec::new();
         self.entry(name)?.read_to_end(&mut bytes).map_err(|error| Fault::from(error).at(place(name)))?;
@@ -235,7 +231,7 @@ fn place(name: &str) -> Place {
     Place::Part(format!("entry `{name}`"))
 }
 
-/// Whether the record that every archive ends with is among the last bytes of a file.
+/// Returns whether the end record of an archive is among the last bytes of a file.
 fn has_end(path: &Path) -> bool {
     let tail = File::open(path).and_then(|mut file| {
         let (bytes, mut tail) = (file.metadata()?.len(), Vec::new());
@@ -245,9 +241,10 @@ fn has_end(path: &Path) -> bool {
     tail.is_ok_and(|tail| memchr::memmem::find(&tail, b"PK\x05\x06").is_some())
 }
 
-/// The first name that two files of the directory of an archive have; it begins at this byte. Folders may come twice.
+/// Returns the first file name that occurs twice in the directory of an archive, which starts at byte `directory`.
+/// Folders may repeat.
 fn repeated(path: &Path, directory: u64) -> io::Result<Option<String>> {
-    /// Bytes of an entry before its name, the first four of them.
+    /// Size of a directory entry before its name, and its first four bytes.
     const FIXED_BYTES: usize = 46;
     const BEGIN: [u8; 4] = *b"PK\x01\x02";
     let mut file = BufReader::new(File::open(path)?);
@@ -273,14 +270,14 @@ fn zip_fault(error: ZipError) -> Fault {
         }
         ZipError::UnsupportedArchive(what) => Fault::coded(
             "recording/unsupported-compression",
-            format!("the archive needs what is not supported: {what}"),
-            "make it with deflate or unpacked",
+            format!("unsupported archive feature: {what}"),
+            "make the archive with deflate or without compression",
         ),
         other => Fault::damaged(other),
     }
 }
 
-/// Unpacked data that are refused once they grow beyond all measure.
+/// Unpacked data with a growth limit.
 pub(super) struct Growing<R> {
     inner: R,
     packed_bytes: u64,
@@ -288,7 +285,7 @@ pub(super) struct Growing<R> {
 }
 
 impl<R: Read> Growing<R> {
-    /// What is packed takes so much of the file \[bytes\].
+    /// Limits `inner`, whose compressed size is `packed_bytes`.
     pub(super) fn new(inner: R, packed_bytes: u64) -> Self {
         Self { inner, packed_bytes, inflated_bytes: 0 }
     }
@@ -300,14 +297,14 @@ impl<R: Read> Read for Growing<R> {
         self.inflated_bytes += bytes as u64;
         let Self { inflated_bytes, packed_bytes, .. } = *self;
         if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
-            let grown = format!("it grows to more than {inflated_bytes} bytes out of {packed_bytes}");
+            let grown = format!("it unpacks to more than {inflated_bytes} bytes from {packed_bytes}");
             return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
         }
         Ok(bytes)
     }
 }
 
-/// Bytes that are compared with their checksum as they end.
+/// Bytes that are verified by their checksum at the end.
 struct Checked<R> {
     inner: R,
     hasher: crc32fast::Hasher,

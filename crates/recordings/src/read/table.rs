@@ -1,4 +1,4 @@
-//! Tables row by row, and their cells as numbers and names.
+//! Reads tables row by row, and their cells as numbers, times and names.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -6,47 +6,47 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::clock::{Date, Probe, Stamp, TimeUnit};
-use super::earth::{Local, bring, is_no_fix, no_fixes, origin};
+use super::earth::{LocalFrame, convert_to_local, is_no_fix, no_fixes, origin};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
-use super::identity::{Names, Rival, Suspect, SwapMonitor};
-use super::layout::{Body, Layout};
+use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
+use super::layout::{Layout, VehicleColumns};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::Source;
 
-/// Number of vehicles, from the first, whose rows are examined for several vehicles under one name.
+/// Number of vehicles, from the first on, whose rows are examined for several vehicles under one name.
 const MOST_SUSPECTED: usize = 256;
 
-/// A table, long or wide.
+/// Long or wide table.
 struct Table<C> {
     cells: C,
     layout: Layout,
     names: Names,
-    /// What turns latitude, longitude and height into metres.
-    local: Option<Local>,
-    /// The frame of the place that positions were last measured from, where rows say one.
-    there: Option<Local>,
-    /// Whether the clock of the table starts with its vehicle, and other tables are read beside it.
+    /// Frame that converts latitude, longitude and height to metres.
+    local: Option<LocalFrame>,
+    /// Frame of the last origin, if rows have their own origin.
+    row_frame: Option<LocalFrame>,
+    /// Whether the clock starts with the vehicle and other files are read too.
     has_own_clock: bool,
-    /// The first time, where times are written as dates.
+    /// First time, if times are dates.
     dates: Option<Date>,
-    /// Other columns that may name the vehicles.
-    rivals: Vec<Rival>,
-    /// Columns that may name several vehicles among the rows of one, for each vehicle.
-    suspects: Vec<Vec<Suspect>>,
-    /// Columns of a wide table that may name vehicles.
+    /// Alternative vehicle columns.
+    alternative_ids: Vec<AlternativeId>,
+    /// For each vehicle, unused columns that may distinguish several vehicles among its rows.
+    suspects: Vec<Vec<SuspectColumn>>,
+    /// Quantities of a wide table whose values may be vehicle names.
     watches: Vec<SwapMonitor>,
-    /// Positions of a wide table whose vehicle a column names.
+    /// Number of positions whose vehicle is named by a column of a wide table.
     named: usize,
-    /// How many rows of each vehicle have no fix.
+    /// Number of rows without a fix, by vehicle.
     no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
     vehicle: usize,
-    /// Rows before the current one.
+    /// Number of rows before the current one.
     count: i64,
 }
 
-/// Opens a table of these cells; `unit` is that of its times where the format says it.
+/// Opens a table with these cells; `unit` is the unit of times if the format defines it.
 pub(super) fn open<C: Cells + 'static>(
     source: &Source,
     mut cells: C,
@@ -56,36 +56,37 @@ pub(super) fn open<C: Cells + 'static>(
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
     if let (Some(rest), Some(_)) = (layout.rest, unit) {
-        let problem = format!("it has a column of time stamps, and {} as well", quoted(&cells.header()[rest.column]));
-        return refuse("recording/ambiguous-column", problem, "name the one that is meant with --column t=NAME");
+        let problem =
+            format!("it has a column of time stamps and a second time column {}", quoted(&cells.header()[rest.column]));
+        return refuse("recording/ambiguous-column", problem, "name one of them with --column t=NAME");
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
-    let mut about = About::new(source, options, unit, layout.notes.clone(), Fault::header_only());
+    let mut info = RecordingInfo::new(source, options, unit, layout.notes.clone(), Fault::header_only());
     if dates.is_some_and(|first| !first.has_zone) {
-        about.metadata.notes.push("times are dates without a zone and are taken as UTC".to_owned());
+        info.metadata.notes.push("times are dates without a zone and are read as UTC".to_owned());
     }
-    about.metadata.has_directions = layout.convention.has_directions();
-    about.metadata.is_planar = layout.is_planar;
+    info.metadata.has_directions = layout.convention.has_directions();
+    info.metadata.is_planar = layout.is_planar;
     let names = Names::from_list(layout.names.clone())?;
     let local = origin(&mut cells, &layout, options)?;
-    about.metadata.notes.extend(local.map(|local| local.note()));
-    about.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
+    info.metadata.notes.extend(local.map(|local| local.note()));
+    info.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
     cells.restart(&layout.columns_to_see(), true)?;
-    // Of places on the Earth the scale is that of heights, and is in the sizes of their columns already.
-    about.scale = if layout.on_earth { 1.0 } else { about.scale };
+    // For places on the Earth the scale applies to heights only, and is part of the column factors.
+    info.scale = if layout.on_earth { 1.0 } else { info.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
-    let rivals = layout.rivals.iter().copied().map(Rival::new).collect();
+    let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
     let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let table = Table {
         cells,
         layout,
         names,
         local,
-        there: None,
+        row_frame: None,
         has_own_clock,
         dates,
-        rivals,
+        alternative_ids,
         suspects: Vec::new(),
         watches,
         named: 0,
@@ -93,17 +94,17 @@ pub(super) fn open<C: Cells + 'static>(
         vehicle: 0,
         count: 0,
     };
-    Ok(Box::new(Ordered::open(table, About { epoch_ns, ..about })?))
+    Ok(Box::new(Ordered::open(table, RecordingInfo { epoch_ns, ..info })?))
 }
 
-/// The first time of a table, where it is a date.
+/// Returns the first time of a table if it is a date.
 fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Result<Option<Date>, ReadError> {
     let Some(column) = layout.time else { return Ok(None) };
     cells.restart(&[column], false)?;
     let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
-        return refuse("recording/contradicts-option", problem, "leave --time-unit, --fps and --time-scale away");
+        return refuse("recording/contradicts-option", problem, "omit --time-unit, --fps and --time-scale");
     }
     Ok(first)
 }
@@ -128,14 +129,14 @@ impl<C: Cells> Table<C> {
         }
     }
 
-    /// The time in a column that counts something.
+    /// Returns the time in a numeric column.
     #[inline]
     fn number_of_units(&mut self, column: usize) -> Result<Stamp, Fault> {
         if let Some(stamp) = self.cells.stamp(column).filter(|stamp| stamp.approximately().is_finite()) {
             return Ok(stamp);
         }
         if let Some(of_day) = self.cells.text(column).ok().filter(|text| text.contains(':')) {
-            let what = if Date::parse(&of_day).is_some() { "a date below numbers" } else { "a time of day" };
+            let what = if Date::parse(&of_day).is_some() { "a date after numbers" } else { "a time of day" };
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
             return refuse(
                 "recording/time-format",
@@ -144,11 +145,11 @@ impl<C: Cells> Table<C> {
                  like 2023-11-14T22:13:20.5Z",
             );
         }
-        let number = odd_number(&self.cells, column, "take the row out: each needs a time")?;
+        let number = odd_number(&self.cells, column, "remove the row: each row needs a time")?;
         number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
     }
 
-    /// The time in a column of dates.
+    /// Returns the time in a column of dates.
     fn date(&self, column: usize, first: Date) -> Result<Stamp, Fault> {
         let text = self.cells.text(column)?;
         if text.trim().is_empty() {
@@ -160,8 +161,8 @@ impl<C: Cells> Table<C> {
         };
         match Date::parse(&text) {
             Some(date) if date.has_zone == first.has_zone => Ok(Stamp::Whole(date.since_1970_ns)),
-            Some(_) => Err(holds("and other rows are dates of another kind", "write the zone in all rows or in none")),
-            None => Err(holds("which is no date with a time", "write it like 2023-11-14T22:13:20.5Z")),
+            Some(_) => Err(holds("but other dates differ in the zone", "write the zone in all rows or in none")),
+            None => Err(holds("which is not a date with a time", "write it like 2023-11-14T22:13:20.5Z")),
         }
     }
 
@@ -176,7 +177,7 @@ impl<C: Cells> Table<C> {
         Ok(self.vehicle)
     }
 
-    /// Appends what the current row says.
+    /// Appends the positions of the current row.
     #[inline]
     fn append(&mut self, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let stamp = self.stamp()?;
@@ -194,7 +195,7 @@ impl<C: Cells> Table<C> {
             }
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
-                if !bring(&self.cells, &mut row, (columns, valid), self.local, &mut self.there)? {
+                if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.row_frame)? {
                     continue;
                 }
             } else if let Some(local) = &self.local {
@@ -218,11 +219,11 @@ impl<C: Cells> Table<C> {
         Ok(())
     }
 
-    /// Looks at what columns that are not read say of a row of a vehicle.
+    /// Examines the unused columns in a row of a vehicle.
     fn suspect(&mut self, row: Option<Row>) -> Result<(), Fault> {
         let Some(row) = row.filter(|row| row.vehicle < MOST_SUSPECTED) else { return Ok(()) };
         while self.suspects.len() <= row.vehicle {
-            self.suspects.push(self.layout.suspects.iter().copied().map(Suspect::new).collect());
+            self.suspects.push(self.layout.suspects.iter().copied().map(SuspectColumn::new).collect());
         }
         let suspects = &mut self.suspects[row.vehicle];
         for suspect in suspects.iter_mut() {
@@ -233,18 +234,18 @@ impl<C: Cells> Table<C> {
         Ok(())
     }
 
-    /// Returns the fault of a vehicle whose rows look like rows of several vehicles.
-    fn suspicion(&self) -> Option<Fault> {
+    /// Returns the fault of a vehicle whose rows look like those of several vehicles.
+    fn several_vehicles_fault(&self) -> Option<Fault> {
         let header = self.cells.header();
         if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)
             && self.names.all().len() == self.named
         {
             let problem =
-                format!("column {} has another value in each row, and so names no vehicle", quoted(&header[column]));
+                format!("column {} has a different value in each row and so names no vehicle", quoted(&header[column]));
             return Some(Fault::coded(
                 "recording/ambiguous-vehicle",
                 problem,
-                "remove such columns if their values are no names",
+                "remove such columns if their values are not names",
             ));
         }
         let id = self.layout.id.filter(|_| self.names.all().len() > 1);
@@ -254,37 +255,45 @@ impl<C: Cells> Table<C> {
         })
     }
 
-    /// Refuses rows that are named by a column that numbers them, or by two columns in two ways.
+    /// Refuses a vehicle column that numbers the rows, or two vehicle columns that contradict each other.
     fn check_names(&self, id: usize, rows: usize, is_one_instant: bool) -> Result<(), Fault> {
         let header = self.cells.header();
         let called = |column: usize| quoted(&header[column]);
-        // Two rows at two times are of vehicles that never meet.
+        // Two rows at two times may belong to two vehicles.
         if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
-            let others: Vec<_> = self.layout.rivals.iter().chain(&self.layout.suspects).copied().map(called).collect();
+            let others: Vec<_> =
+                self.layout.alternative_ids.iter().chain(&self.layout.suspects).copied().map(called).collect();
             let others = if others.is_empty() {
                 String::new()
             } else {
                 format!("; the other columns are {}", others.join(", "))
             };
             let problem =
-                format!("column {} has another value in each row, and so names no vehicle{others}", called(id));
-            let remedy = "say which column names the vehicle with --column id=NAME, or take this one out";
+                format!("column {} has a different value in each row and so names no vehicle{others}", called(id));
+            let remedy = "name the column of the vehicle with --column id=NAME, or remove this one";
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
-        if let Some(rival) = self.rivals.iter().find(|rival| rival.is_one()) {
-            let (first, other) = (called(id), called(rival.column));
-            let problem = format!("the columns {first} and {other} could both name the vehicle, and do not agree");
-            let [first, other] = [&header[id], &header[rival.column]];
-            let remedy = format!("say which one does with --column id={first} or --column id={other}");
+        if let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) {
+            let (first, other) = (called(id), called(alternative.column));
+            let problem =
+                format!("the columns {first} and {other} could both name the vehicle, but contradict each other");
+            let [first, other] = [&header[id], &header[alternative.column]];
+            let remedy = format!("choose one with --column id={first} or --column id={other}");
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         Ok(())
     }
 }
 
-/// The row of a vehicle; none where it was not seen.
+/// Returns the row of a vehicle; `None` if it was not seen.
 #[inline]
-fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[f64]) -> Result<Option<Row>, Fault> {
+fn row(
+    cells: &impl Cells,
+    stamp: Stamp,
+    vehicle: usize,
+    body: &VehicleColumns,
+    metres: &[f64],
+) -> Result<Option<Row>, Fault> {
     let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
     let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
     let radius = match body.radius {
@@ -293,7 +302,7 @@ fn row(cells: &impl Cells, stamp: Stamp, vehicle: usize, body: &Body, metres: &[
     };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
-        return refuse("recording/radius", problem, "write 0 or more");
+        return refuse("recording/radius", problem, "write 0 or a positive number");
     }
     Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
@@ -303,7 +312,7 @@ impl<C: Cells> Rows for Table<C> {
         let before = rows.len();
         while rows.len() < before + BATCH {
             if !self.cells.advance()? {
-                return self.suspicion().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
+                return self.several_vehicles_fault().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
             }
             self.append(rows).map_err(|fault| self.at_row(fault))?;
         }
@@ -346,11 +355,11 @@ impl<C: Cells> Rows for Table<C> {
         self.has_own_clock.then(|| "the clocks of all vehicles started together".to_owned())
     }
 
-    /// Only times and names are looked at, which is several times faster than reading everything.
+    /// Reads only times and names, which is several times faster.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let Some(id) = self.layout.id else { return Ok(None) };
-        let mut columns: Vec<usize> = self.layout.of_time().chain([id]).collect();
-        columns.extend(&self.layout.rivals);
+        let mut columns: Vec<usize> = self.layout.time_columns().chain([id]).collect();
+        columns.extend(&self.layout.alternative_ids);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
         let mut probe: Option<Probe> = None;
@@ -361,9 +370,10 @@ impl<C: Cells> Rows for Table<C> {
             probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
-            for rival in &mut self.rivals {
-                let value = self.cells.text(rival.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
-                rival.see(self.vehicle, value.trim());
+            for alternative in &mut self.alternative_ids {
+                let value =
+                    self.cells.text(alternative.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
+                alternative.see(self.vehicle, value.trim());
             }
         }
         self.check_names(id, rows, is_one_instant)?;
@@ -371,45 +381,45 @@ impl<C: Cells> Rows for Table<C> {
     }
 }
 
-/// The cells of the current row of a table.
+/// Access to the cells of the current row of a table.
 pub(super) trait Cells {
-    /// Names of the columns.
+    /// Returns the names of the columns.
     fn header(&self) -> &[String];
 
-    /// Goes before the first row. Of each row these columns are asked, in rising order; where not `all` that a table
-    /// needs are among them, no more is looked at.
+    /// Moves before the first row. Only these columns are requested afterwards, in ascending order. Unless `all`
+    /// required columns are among them, other cells are not checked.
     fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError>;
 
-    /// Goes to the next row; `false` behind the last one.
+    /// Moves to the next row; returns `false` after the last one.
     fn advance(&mut self) -> Result<bool, ReadError>;
 
-    /// Number of the current row.
+    /// Returns the number of the current row.
     fn row(&self) -> u64;
 
-    /// Where a row of this number is.
+    /// Returns the place of the row with this number.
     fn place(row: u64) -> Place;
 
-    /// A cell as it is written; nothing where it is empty.
+    /// Returns a cell as written; an empty string for an empty cell.
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault>;
 
-    /// The number in a cell that plainly holds one.
+    /// Returns the number in a cell of plain numeric form.
     fn number(&self, column: usize) -> Option<f64>;
 
-    /// The time in a cell that plainly holds one.
+    /// Returns the time in a cell of plain numeric form.
     fn stamp(&mut self, column: usize) -> Option<Stamp>;
 
-    /// A cell as the name of a vehicle; nothing where it is empty.
+    /// Returns a cell as the name of a vehicle; an empty string for an empty cell.
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         self.text(column)
     }
 }
 
-/// The fault of an empty cell.
+/// Returns the fault of an empty cell.
 pub(super) fn empty(cells: &impl Cells, column: usize) -> Fault {
     Fault::empty_cell(&cells.header()[column])
 }
 
-/// The finite number in a cell; none where it is empty.
+/// Returns the finite number in a cell; `None` for an empty cell.
 #[inline]
 pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, Fault> {
     match cells.number(column) {
@@ -418,7 +428,7 @@ pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, F
     }
 }
 
-/// The number in a cell that does not plainly hold a finite one; `unseen` helps where it is not finite.
+/// Parses a cell without a plain finite number; `unseen` is the remedy for a number that is not finite.
 #[cold]
 pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
     let (text, column) = (cells.text(column)?, &cells.header()[column]);
@@ -438,7 +448,7 @@ pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Res
     }
 }
 
-/// Three numbers, none where all cells are empty.
+/// Returns three numbers; `None` if all cells are empty.
 #[inline]
 pub(super) fn vector(
     cells: &impl Cells,

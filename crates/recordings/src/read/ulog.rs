@@ -1,14 +1,14 @@
-//! `ULog` files of PX4: the positions of the vehicle whose log it is.
+//! Reads `ULog` files of PX4: the positions of one vehicle.
 //!
-//! | topic | fields that are read |
+//! | topic | fields |
 //! | --- | --- |
 //! | `vehicle_global_position` | `lat`, `lon` \[degrees\], `alt` \[m\]; `lat_lon_valid`, `alt_valid` |
 //! | `vehicle_local_position` | `x`, `y`, `z` \[m\] north, east and down of `ref_lat`, `ref_lon`, `ref_alt`; `xy_valid`, `z_valid`, `xy_global`, `z_global` |
-//! | `vehicle_gps_position`, `sensor_gps` | `time_utc_usec`, by which the clock of the vehicle is set |
+//! | `vehicle_gps_position`, `sensor_gps` | `time_utc_usec`, which sets the clock of the vehicle |
 //!
-//! The global position is read where there is one, else the local one. Times count from the start of each vehicle's
-//! computer: the smallest delay of a GPS message sets them to UTC. The messages are decoded here, because the kept crate fills
-//! one that breaks off with zeros.
+//! The global position is read if there is one, else the local position. Times count from the start of the vehicle's
+//! computer; the GPS message with the smallest delay converts them to UTC. Messages are decoded here, because the
+//! available crate fills truncated messages with zeros.
 
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
@@ -18,11 +18,11 @@ use nalgebra::Vector3;
 
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
-use super::earth::{Local, is_no_fix, no_fixes};
+use super::earth::{LocalFrame, is_no_fix, no_fixes};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
-use super::order::{About, BATCH, Ordered, Recording, Row, Rows};
-use super::readers::{Packing, Reader, Takes};
+use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 
 pub(super) const READER: Reader = Reader {
@@ -33,7 +33,13 @@ pub(super) const READER: Reader = Reader {
     magic: &[b"ULog\x01\x12\x35"],
     sniff: |head| head.begins_with_any(READER.magic),
     open,
-    takes: &[Takes::Rows, Takes::Origin, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    supports: &[
+        FormatOption::Rows,
+        FormatOption::Origin,
+        FormatOption::Topics,
+        FormatOption::Axes,
+        FormatOption::Unfinished,
+    ],
     packing: Packing::Any,
 };
 
@@ -41,40 +47,40 @@ const GLOBAL: &str = "vehicle_global_position";
 const LOCAL: &str = "vehicle_local_position";
 const GPS: [&str; 2] = ["vehicle_gps_position", "sensor_gps"];
 
-/// Bytes of the header: magic, version, start.
+/// Size of the header \[bytes\]: magic, version, start time.
 const HEADER_BYTES: usize = 16;
 
-/// How deep formats may hold each other.
+/// Largest nesting depth of formats.
 const DEEPEST: usize = 8;
 
-/// Times of GPS before it \[us\] are those of a receiver without a fix: 2001.
+/// Earliest valid UTC of GPS \[us\], in 2001; receivers without a fix send earlier times.
 const EARLIEST_UTC_US: u64 = 1_000_000_000_000_000;
 
 /// Opens a log.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     axes::refuse_known(options, "a log of PX4")?;
-    let asked = match &options.topics[..] {
+    let topic_option = match &options.topics[..] {
         [] => None,
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
-            let problem = format!("{} is no topic that one vehicle's position is read from", quoted(topic));
-            return refuse("recording/unknown-topic", problem, format!("give --topic {GLOBAL} or --topic {LOCAL}"));
+            let problem = format!("{} is not a position topic", quoted(topic));
+            return refuse("recording/unknown-topic", problem, format!("use --topic {GLOBAL} or --topic {LOCAL}"));
         }
     };
     let mut log = Log::default();
     let is_complete = log.scan(BufReader::new(source.bytes()?))?;
     let mut notes = options.accept_unfinished(is_complete)?;
-    let topic = asked.unwrap_or(if log.global.is_empty() { LOCAL } else { GLOBAL });
+    let topic = topic_option.unwrap_or(if log.global.is_empty() { LOCAL } else { GLOBAL });
     let fixes = if topic == GLOBAL { &log.global } else { &log.local };
     let Some(first) = fixes.first() else {
-        let problem = format!("it has no {} whose place on the Earth is known", asked.unwrap_or("position"));
-        let remedy = "log vehicle_global_position, or give the positions of a common frame as a table t,id,x,y,z";
+        let problem = format!("it has no {} with a known place on the Earth", topic_option.unwrap_or("position"));
+        let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
         return refuse("recording/no-fix", problem, remedy);
     };
-    let local = Local::first(first.origin, options)?;
+    let local = LocalFrame::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
     notes.push(local.note());
-    notes.push(format!("positions are those of {topic}"));
+    notes.push(format!("positions are read from {topic}"));
     let (clock, assumed) = match log.boot_us {
         Some(_) => ("times are set to UTC by GPS", "clocks set by the GPS of each vehicle"),
         None => ("times count from the start of the vehicle's computer", "the clocks of all vehicles started together"),
@@ -82,47 +88,47 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     notes.push(clock.to_owned());
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
     let none = Fault::coded("recording/empty", "it holds no position", "record again");
-    let mut about = About::new(source, options, Some(TimeUnit::Microseconds), notes, none);
-    about.metadata.earth_origin = Some(local.measured_from(options.origin));
+    let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Microseconds), notes, none);
+    info.metadata.earth_origin = Some(local.measured_from(options.origin));
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
-    Ok(Box::new(Ordered::open(rows, about)?))
+    Ok(Box::new(Ordered::open(rows, info)?))
 }
 
-/// A position of the vehicle.
+/// Position of the vehicle.
 #[derive(Clone, Copy, Debug)]
 struct Fix {
-    /// The byte where its message begins.
+    /// Offset of its message in the file \[bytes\].
     at: u64,
-    /// Since the start of the vehicle's computer \[us\].
+    /// Time since the start of the vehicle's computer \[us\].
     time_us: u64,
-    /// Latitude and longitude \[degrees\] and height \[m\] of the place that it is measured from.
+    /// Origin: latitude, longitude \[degrees\] and height \[m\].
     origin: Vector3<f64>,
-    /// East, north and up of that \[m\].
+    /// East, north and up of the origin \[m\].
     position: Vector3<f64>,
 }
 
-/// What was read of a log.
+/// Parsed content of a log.
 #[derive(Default)]
 struct Log {
     formats: BTreeMap<String, Vec<Field>>,
     topics: BTreeMap<u16, Topic>,
     global: Vec<Fix>,
     local: Vec<Fix>,
-    /// Global positions that are none.
+    /// Number of global positions without a fix.
     no_fixes: u64,
-    /// When the computer started \[us since 1970\], where GPS says it.
+    /// Start of the computer \[us since 1970\], if known from GPS.
     boot_us: Option<i64>,
 }
 
-/// A field of a format.
+/// Field of a format.
 struct Field {
     name: String,
     kind: String,
     count: usize,
 }
 
-/// Fields of a topic that is read: where they begin, and of what kind they are.
+/// Position topic or GPS topic: offset and kind of its fields.
 struct Topic {
     name: String,
     fields: BTreeMap<String, (usize, Kind)>,
@@ -137,7 +143,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// The kind of a field that is read, and the bytes of any that is not made of others.
+    /// Returns the size of a primitive type \[bytes\], and its kind if such fields are read.
     fn of(name: &str) -> Option<(usize, Option<Self>)> {
         Some(match name {
             "bool" => (1, Some(Self::Byte)),
@@ -154,7 +160,7 @@ impl Kind {
 }
 
 impl Log {
-    /// Reads a log to its end; `false` where it breaks off.
+    /// Reads a log to its end; returns `false` if it is truncated.
     fn scan(&mut self, mut input: impl Read) -> Result<bool, ReadError> {
         let mut header = [0; HEADER_BYTES];
         if fill(&mut input, &mut header)? < HEADER_BYTES {
@@ -192,7 +198,7 @@ impl Log {
                 self.topics.remove(&u16::from_le_bytes(id));
             }
             b'D' => self.data(body, at)?,
-            // Those of no interest, and those of versions to come.
+            // Other message types, also of later versions.
             _ if kind.is_ascii_uppercase() => {}
             _ => return Err(Fault::damaged(format!("a message of kind {kind:#04x}"))),
         }
@@ -208,7 +214,7 @@ impl Log {
             _ if GPS.contains(&name) => &["timestamp", "time_utc_usec"],
             _ => &[],
         };
-        // Other instances are of other sensors or estimators.
+        // Other instances belong to other sensors or estimators.
         if wanted.is_empty() || body[0] != 0 {
             self.topics.remove(&id);
             return Ok(());
@@ -230,7 +236,7 @@ impl Log {
         Ok(())
     }
 
-    /// Bytes of a kind, which may be a format.
+    /// Returns the size of a type \[bytes\], which may be a format.
     fn size(&self, kind: &str, depth: usize) -> Result<usize, Fault> {
         if let Some((bytes, _)) = Kind::of(kind) {
             return Ok(bytes);
@@ -272,7 +278,7 @@ impl Log {
             }
             _ => {
                 let utc_us = message.whole("time_utc_usec")?;
-                // The message that was on its way for the shortest time knows best.
+                // The message with the smallest delay gives the latest start time.
                 let boot_us = i64::try_from(utc_us)
                     .ok()
                     .zip(i64::try_from(time_us).ok())
@@ -285,25 +291,25 @@ impl Log {
         Ok(())
     }
 
-    fn rows(&self, fixes: &[Fix], local: &Local) -> Result<Vec<Row>, ReadError> {
-        let mut there = *local;
-        let row = |fix: &Fix| self.row(fix, local, &mut there).map_err(|fault| fault.at(Place::Byte(fix.at)));
+    fn rows(&self, fixes: &[Fix], local: &LocalFrame) -> Result<Vec<Row>, ReadError> {
+        let mut fix_frame = *local;
+        let row = |fix: &Fix| self.row(fix, local, &mut fix_frame).map_err(|fault| fault.at(Place::Byte(fix.at)));
         fixes.iter().map(row).collect()
     }
 
-    /// A position in the frame `local`; `there` is the last frame that one was measured in.
-    fn row(&self, fix: &Fix, local: &Local, there: &mut Local) -> Result<Row, Fault> {
-        if !there.is_at(fix.origin) {
-            *there = Local::at(fix.origin)?;
+    /// Converts a position to the frame `local`; `fix_frame` caches the frame of the last origin.
+    fn row(&self, fix: &Fix, local: &LocalFrame, fix_frame: &mut LocalFrame) -> Result<Row, Fault> {
+        if !fix_frame.is_at(fix.origin) {
+            *fix_frame = LocalFrame::at(fix.origin)?;
         }
         let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
         let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);
-        let position = local.place_from(there, fix.position);
+        let position = local.position_from(fix_frame, fix.position);
         Ok(Row { stamp, place: fix.at, vehicle: 0, position, velocity: None, radius: None })
     }
 }
 
-/// A message of a topic that is read.
+/// Message of a subscribed topic.
 struct Message<'a> {
     topic: &'a Topic,
     bytes: &'a [u8],
@@ -334,13 +340,13 @@ impl Message<'_> {
         Ok(numbers)
     }
 
-    /// A place on the Earth; none where it is not known: not finite, or where latitude and longitude are 0.
+    /// Returns a place on the Earth; `None` if a number is not finite, or latitude and longitude are 0.
     fn place(&self, names: [&str; 3]) -> Result<Option<Vector3<f64>>, Fault> {
         let place = Vector3::from(self.numbers(names)?);
         Ok(Some(place).filter(|place| place.iter().all(|x| x.is_finite()) && !is_no_fix(place)))
     }
 
-    /// Whether a flag is set, or is not there.
+    /// Returns whether a flag is set or absent.
     fn is_set(&self, name: &str) -> Result<bool, Fault> {
         match self.topic.fields.get(name) {
             Some(&(at, Kind::Byte)) => Ok(take::<1>(self.bytes, at)? != [0]),
@@ -349,7 +355,7 @@ impl Message<'_> {
     }
 }
 
-/// Reads as many bytes as there are, and says how many.
+/// Fills the buffer as far as possible; returns the number of bytes read.
 fn fill(input: &mut impl Read, bytes: &mut [u8]) -> Result<usize, ReadError> {
     let mut filled = 0;
     while filled < bytes.len() {
@@ -372,25 +378,25 @@ fn text(bytes: &[u8]) -> Result<&str, Fault> {
     str::from_utf8(bytes).map_err(|_| Fault::NotUtf8)
 }
 
-/// Where the messages that are read end, going by the flags of a log: what is appended behind a crash are no positions.
+/// Returns the end of the readable messages by the flags of a log: data appended after a crash are not positions.
 fn flags(body: &[u8]) -> Result<u64, Fault> {
     const APPENDED: u8 = 1;
     let needed: [u8; 8] = take(body, 8)?;
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
-        let problem = "it is of a version of ULog that is not known";
+        let problem = "unknown version of ULog";
         return refuse(
             "recording/unsupported-format",
             problem,
-            "write its vehicle_global_position with `ulog2csv`, and give that",
+            "convert its vehicle_global_position with `ulog2csv`, and give the result",
         );
     }
     let appended = u64::from_le_bytes(take(body, 16)?);
     Ok(if needed[0] & APPENDED == 0 || appended == 0 { u64::MAX } else { appended })
 }
 
-/// The name and the fields of a format, such as `gps:uint64_t timestamp;float[3] v;`.
+/// Parses the name and the fields of a format such as `gps:uint64_t timestamp;float[3] v;`.
 fn format_of(text: &str) -> Result<(String, Vec<Field>), Fault> {
-    let damaged = || Fault::damaged(format!("a format says {}", quoted(text)));
+    let damaged = || Fault::damaged(format!("invalid format {}", quoted(text)));
     let (name, fields) = text.split_once(':').ok_or_else(damaged)?;
     let field = |text: &str| {
         let (kind, name) = text.trim().split_once(' ')?;
@@ -405,7 +411,7 @@ fn format_of(text: &str) -> Result<(String, Vec<Field>), Fault> {
     Ok((name.to_owned(), fields.ok_or_else(damaged)?))
 }
 
-/// The positions of a log.
+/// Positions of a log.
 struct Positions {
     names: Vec<String>,
     rows: std::vec::IntoIter<Row>,

@@ -1,8 +1,9 @@
-//! VVIZ shows of Verge Aero and Finale 3D: JSON with a performance for each drone.
+//! Reads VVIZ shows of Verge Aero and Finale 3D: JSON with one performance per drone.
 //!
-//! A drone begins at its home, and each sample says how far it moves from the one before, and in how much time, which is
-//! otherwise that of `defaultPositionRate`. The first sample is at time 0 unless it says its time itself. Axes are those of
-//! graphics: x right, y up, z forward. Files are thinned out for looking at, so samples are samples and no curve.
+//! A drone starts at its home. Each sample gives the displacement from the previous sample and the time between them,
+//! by default that of `defaultPositionRate`. The first sample is at time 0 unless it gives a time. Axes are those of
+//! computer graphics: x right, y up, z forward. Files are decimated for display, so that samples are read as samples,
+//! not as curves.
 
 use std::collections::BTreeSet;
 use std::io::Read as _;
@@ -14,11 +15,11 @@ use super::curves::{Curves, from_json};
 use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Packing, Reader, Takes};
+use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 use tautline_core::track::{Item, Sample};
 
-/// Keys in front of the long arrays of a show.
+/// Keys before the long arrays of a show.
 const KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
 
 pub(super) const READER: Reader = Reader {
@@ -32,11 +33,11 @@ pub(super) const READER: Reader = Reader {
         head.is_text(|text| text.starts_with(b"{") && holds(text))
     },
     open,
-    takes: &[Takes::Rows],
+    supports: &[FormatOption::Rows],
     packing: Packing::Any,
 };
 
-/// The only axes that are known, and what is said where none are.
+/// The only supported axes, also the default.
 const GRAPHICS: &str = "ogl";
 
 #[derive(Deserialize)]
@@ -66,7 +67,7 @@ struct Agent {
     steps: Vec<Step>,
 }
 
-/// How far a drone moves from one sample to the next, and in how much time \[s\].
+/// Displacement of a drone from the previous sample, and the time between them \[s\].
 #[derive(Deserialize)]
 struct Step {
     dx: f64,
@@ -81,8 +82,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     source.bytes()?.read_to_end(&mut bytes)?;
     let show: Show = from_json(&bytes, "a VVIZ show", "export the show as VVIZ 1.0")?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
-        let problem = format!("its axes are those of {}, which are not known", quoted(frame));
-        return refuse("recording/unusable-frame", problem, "export it with the axes `ogl`: x right, y up, z forward");
+        let problem = format!("unknown axes {}", quoted(frame));
+        return refuse("recording/unusable-frame", problem, "export with the axes `ogl`: x right, y up, z forward");
     }
     let (mut vehicles, mut names) = (Vec::new(), BTreeSet::new());
     for performance in &show.performances {
@@ -96,7 +97,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         };
         if !names.insert(name.clone()) {
             let fault =
-                Fault::coded("recording/vehicle-twice", "two drones have this id", "give each an id of its own");
+                Fault::coded("recording/vehicle-twice", "two drones have this id", "give each drone its own id");
             return Err(fault.at(place(None)));
         }
         let flown = items(&performance.agent_description, vehicles.len(), &show, options.metres());
@@ -106,19 +107,20 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
         return refuse(
             "recording/no-positions",
-            "it has no drone with a sample of its way",
-            "export it with the ways of its drones",
+            "it has no drone with samples",
+            "export the show with the paths of its drones",
         );
     }
-    let mut notes = vec!["axes of graphics are turned: x right, y forward, z up".to_owned()];
+    let mut notes = vec!["axes of graphics are mapped to x right, y forward, z up".to_owned()];
     let still: Vec<_> = vehicles.iter().filter(|(_, items)| items.is_empty()).map(|(name, _)| quoted(name)).collect();
     if !still.is_empty() {
-        notes.push(format!("not judged, for the show does not say when they are at their homes: {}", still.join(", ")));
+        notes
+            .push(format!("not judged, because the show has no times for drones at their homes: {}", still.join(", ")));
     }
     Ok(Curves::recording(vehicles, notes))
 }
 
-/// The samples of a drone, or the number of the step that is wrong.
+/// Returns the samples of a drone, or the fault and the index of its step.
 fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
     let mut at = [agent.home_x, agent.home_y, agent.home_z];
     let mut time_s = show.time_offset_secs;
@@ -138,11 +140,11 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
             let duration_s = duration(step, show).map_err(fail)?;
             let after_s = time_s + duration_s;
             if after_s <= time_s {
-                let problem = format!("it comes {duration_s:?} s after the one before");
+                let problem = format!("it follows the previous sample after {duration_s:?} s");
                 return Err(fail(Fault::coded(
                     "recording/duration",
                     problem,
-                    "a drone is in one place at a time: take one of the samples out",
+                    "remove one of the samples: a drone is in one place at a time",
                 )));
             }
             time_s = after_s;
@@ -155,14 +157,14 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
     Ok(items)
 }
 
-/// How long a step lasts \[s\].
+/// Returns the duration of a step \[s\].
 fn duration(step: &Step, show: &Show) -> Result<f64, Fault> {
     match (step.dt, show.default_position_rate) {
         (Some(duration_s), _) => Ok(duration_s),
         (None, Some(rate)) if rate > 0.0 => Ok(rate.recip()),
         _ => refuse(
             "recording/frame-rate",
-            "neither `dt` nor a positive `defaultPositionRate` says when it is",
+            "it has neither `dt` nor a positive `defaultPositionRate`",
             "export the show again",
         ),
     }

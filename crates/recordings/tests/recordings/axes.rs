@@ -1,4 +1,4 @@
-//! Axes that the user, the names of columns or the program that wrote the file say are turned to z up.
+//! Axes are mapped to x east, y north and z up by the user, by column names or by known programs.
 
 use std::fs;
 
@@ -30,7 +30,7 @@ fn turned(name: &str, scale: [f64; 3]) -> ReadOptions {
 }
 
 #[test]
-fn axes_are_those_that_the_user_says() {
+fn axes_option_maps_positions_and_velocities() {
     let text = "t_s,id,x,y,z,vx,vy,vz\n0,a,1,2,3,4,5,6\n";
     for (name, position, velocity) in [
         ("enu", [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]),
@@ -45,19 +45,19 @@ fn axes_are_those_that_the_user_says() {
             (position, Some(velocity)),
             "{name}"
         );
-        assert_eq!(found.notes.iter().any(|note| note.starts_with("axes are turned")), name != "enu");
+        assert_eq!(found.notes.iter().any(|note| note.starts_with("axes are mapped")), name != "enu");
     }
     let curve = read_bytes("cf1.csv", b"duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,1,4,2,5,3,6\n", &turned("ned", [1.0; 3]));
     let curve = curve.expect("read");
     let Item::Piece(piece) = &curve.items[0] else { panic!("a sample") };
     assert_eq!(piece.coefficients[1].as_slice(), [5.0, 4.0, -6.0]);
-    // Signs go with units in names, which a scale would contradict.
+    // Signs of `--scale` are accepted with units in names; a factor would contradict them.
     let mm = "t,id,x [mm],y [mm],z [mm]\n0,a,1000,2000,3000\n";
     assert_eq!(read_with(mm, &turned("x,y,z", [1.0, 1.0, -1.0])).expect("read").samples()[0].2, [1.0, 2.0, -3.0]);
 }
 
 #[test]
-fn a_scale_of_each_axis_has_no_radius() {
+fn scale_per_axis_is_refused_with_radii() {
     let text = "t,id,x,y,z,radius\n0,a,1,2,3,0.5\n";
     let stretched = read_with(text, &turned("x,y,z", [1.0, 1.0, 0.001])).expect_err("refused");
     assert_refused(&stretched, "recording/contradicts-option", "");
@@ -67,7 +67,7 @@ fn a_scale_of_each_axis_has_no_radius() {
 }
 
 #[test]
-fn names_that_say_a_direction_are_read_in_it() {
+fn columns_named_by_direction_are_converted() {
     for header in [
         "t,id,north,east,down",
         "t,id,n,e,d",
@@ -83,19 +83,19 @@ fn names_that_say_a_direction_are_read_in_it() {
     }
     assert_eq!(read("t,id,east,north,up\n0,a,1,2,3\n").samples()[0].2, [1.0, 2.0, 3.0]);
     assert_eq!(read("t,a.north,a.east,a.down,b.north,b.east,b.down\n0,1,2,3,4,5,6\n").samples()[1].2, [5.0, 4.0, -6.0]);
-    // What says no frame is read as it is.
+    // Columns without a frame are read unchanged.
     assert_eq!(read("t,id,x,y,z\n0,a,1,2,3\n").samples()[0].2, [1.0, 2.0, 3.0]);
 }
 
 #[test]
-fn trajectories_of_mavsdk_drone_show_are_north_east_down() {
+fn mavsdk_drone_show_is_north_east_down() {
     let text = "idx,t,px,py,pz,vx,vy,vz,ax,ay,az,yaw,mode,ledr,ledg,ledb\n0,0.0,1,2,-3,4,5,-6,0,0,0,0,70,255,255,255\n";
     let Item::Sample(sample) = &read(text).items[0] else { panic!("a piece") };
     assert_eq!(sample.position_m.as_slice(), [2.0, 1.0, 3.0]);
     assert_eq!(sample.velocity_m_s.map(Into::into), Some([5.0, 4.0, 6.0]));
 }
 
-/// As `ulog2csv` writes a `vehicle_local_position`, 10 m above its reference.
+/// Returns a `vehicle_local_position` table of `ulog2csv`, 10 m above its reference.
 fn px4(lat: &str, rows: &[(&str, u8)]) -> Vec<u8> {
     let mut text =
         "timestamp,timestamp_sample,ref_timestamp,ref_lat,ref_lon,x,y,z,delta_z,vx,vy,vz,z_deriv,ax,ay,az,heading,\
@@ -110,8 +110,8 @@ fn px4(lat: &str, rows: &[(&str, u8)]) -> Vec<u8> {
 }
 
 #[test]
-fn local_positions_of_px4_are_brought_to_one_place() {
-    // A hundred metres apart by their references, at one place by their positions.
+fn px4_local_positions_share_one_origin() {
+    // The references are a hundred metres apart, the positions are equal.
     let apart = 100.0 / 111_176.0;
     let (a, b) = (px4("47.0", &[("100", 1), ("100", 1)]), px4(&format!("{}", 47.0 + apart), &[("0", 1), ("0", 1)]));
     let folder = folder(&[("a.csv", &a), ("b.csv", &b)]);
@@ -126,7 +126,7 @@ fn local_positions_of_px4_are_brought_to_one_place() {
     assert!(first == [0.0, 100.0, 10.0] && (second[2] - 10.0).abs() < 0.01, "{first:?} {second:?}");
     assert_eq!(found.assumed.as_deref(), Some("the clocks of all vehicles started together"));
     assert_eq!(found.clock.unit, "us");
-    // One alone assumes nothing of others.
+    // A single file needs no assumption.
     let alone = Whole::read(&folder.path().join("a.csv"), &ReadOptions::default()).expect("read");
     assert_eq!((alone.samples()[0].2, alone.assumed), ([0.0, 100.0, 10.0], None));
     let Item::Sample(sample) = &alone.items[0] else { panic!("a piece") };
@@ -134,7 +134,7 @@ fn local_positions_of_px4_are_brought_to_one_place() {
 }
 
 #[test]
-fn local_positions_of_px4_without_a_reference_are_not_known() {
+fn px4_local_positions_without_a_reference_are_unknown() {
     let read = |bytes: &[u8]| read_bytes("px4.csv", bytes, &ReadOptions::default());
     let found = read(&px4("47.0", &[("1", 0), ("2", 1)])).expect("read");
     assert_eq!(found.items.len(), 1, "the first row says that it is not valid");
@@ -152,7 +152,7 @@ fn local_positions_of_px4_without_a_reference_are_not_known() {
 }
 
 #[test]
-fn axes_that_are_known_are_not_turned_again() {
+fn axes_option_is_refused_for_known_axes() {
     let ned = turned("ned", [1.0; 3]);
     let earth = read_with("t,id,lat,lon,alt\n0,a,47,8,400\n", &ned).expect_err("known");
     assert_refused(&earth, "recording/contradicts-option", "");
@@ -162,7 +162,7 @@ fn axes_that_are_known_are_not_turned_again() {
 }
 
 #[test]
-fn heights_are_turned_once() {
+fn height_columns_are_inverted_once() {
     for (header, z) in [
         ("t,id,north,east,down", -3.0),
         ("t,id,north,east,depth", -3.0),
@@ -171,7 +171,7 @@ fn heights_are_turned_once() {
     ] {
         assert_eq!(read(&format!("{header}\n0,a,1,2,3\n")).samples()[0].2, [2.0, 1.0, z], "{header}");
     }
-    // The name says which way is up, and so may not the user say another.
+    // The direction of a height column contradicts the option.
     for name in ["depth", "alt"] {
         let text = format!("t,id,x,y,{name}\n0,a,1,2,3\n");
         let z = if name == "alt" { 3.0 } else { -3.0 };
@@ -188,7 +188,7 @@ fn heights_are_turned_once() {
 }
 
 #[test]
-fn a_plane_stays_one_when_it_is_turned() {
+fn planar_recording_stays_planar() {
     let folder = folder(&[("flat.csv", b"t,id,x,y,vx,vy\n0,a,1,2,3,4\n")]);
     let flat = folder.path().join("flat.csv");
     let ned = turned("ned", [1.0; 3]);
@@ -196,7 +196,7 @@ fn a_plane_stays_one_when_it_is_turned() {
     assert_eq!(Whole::read(&flat, &ned).expect("read").samples()[0].2, [2.0, 1.0, 0.0]);
     let error = Whole::read(&flat, &turned("x,z,y", [1.0; 3])).expect_err("no z");
     assert_refused(&error, "recording/contradicts-option", "");
-    // North and east alone are a plane too.
+    // North and east alone are planar too.
     std::fs::write(&flat, "t,id,north,east\n0,a,1,2\n").expect("written");
     let open = || tautline_recordings::read::open(&flat, &ReadOptions::default()).expect("read");
     assert!(
@@ -206,7 +206,7 @@ fn a_plane_stays_one_when_it_is_turned() {
 }
 
 #[test]
-fn axes_of_which_some_say_their_direction_and_others_do_not_are_refused() {
+fn partly_directed_axes_are_refused() {
     for header in ["t,a_x_ned,a_y_ned,a_z_ned,b_x,b_y,b_z", "t,a.north,a.east,a.down,b.x,b.y,b.z"] {
         let error = read_with(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
         assert_refused(&error, "recording/several-frames", "line 1");

@@ -1,8 +1,8 @@
-"""Makes the ROS 2 bags of this folder, with the writer of rosbags 0.11.9 (`pip install rosbags==0.11.9`).
+"""Creates the ROS 2 bags of this folder with rosbags 0.11.9 (`pip install rosbags==0.11.9`).
 
-    python3 crates/recordings/tests/recordings/bags.py crates/recordings/tests/recordings/bags
+Usage: `python3 crates/recordings/tests/recordings/bags.py crates/recordings/tests/recordings/bags`.
 
-The motion is our own: two vehicles that pass each other, a robot that is known through `map -> odom -> base_link`.
+The motion is synthetic: two vehicles that pass each other, and a robot with transforms `map -> odom -> base_link`.
 """
 
 import math

@@ -1,4 +1,4 @@
-//! VVIZ shows, and exports of motion capture as they are described by those who make them.
+//! VVIZ shows, and motion capture exports in the formats that their vendors document.
 
 use tautline_recordings::read::{ReadError, ReadOptions};
 
@@ -13,7 +13,7 @@ fn whole(text: &str) -> Whole {
     read(text).unwrap_or_else(|error| panic!("{error}\n{}", error.help()))
 }
 
-/// Asserts that each change of a valid text is refused with this code at this place, and that the text itself is read.
+/// Asserts that a valid text is read, and that each change of it is refused with this code at this place.
 fn refused(valid: &str, changes: &[(&str, &str, &str, &str)]) {
     whole(valid);
     for (from, to, code, place) in changes {
@@ -22,16 +22,19 @@ fn refused(valid: &str, changes: &[(&str, &str, &str, &str)]) {
     }
 }
 
-const VVIZ: &str = r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl",
-    "defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": [
-    {"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": [
-        {"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]},
-     "payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "b": 3, "frames": 4}]}]},
-    {"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": [
-        {"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}]}, "payloadDescription": []}]}"#;
+const VVIZ: &str = concat!(
+    r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl", "#,
+    r#""defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": [ "#,
+    r#"{"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": [ "#,
+    r#"{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]}, "#,
+    r#""payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "#,
+    r#""b": 3, "frames": 4}]}]}, "#,
+    r#"{"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": [ "#,
+    r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}]}, "payloadDescription": []}]}"#,
+);
 
 #[test]
-fn shows_of_vviz_begin_at_home_and_move_from_sample_to_sample() {
+fn vviz_drones_start_at_home_and_sum_displacements() {
     let found = whole(VVIZ);
     assert_eq!(found.vehicles, ["0", "B"]);
     assert_eq!(
@@ -48,7 +51,7 @@ fn shows_of_vviz_begin_at_home_and_move_from_sample_to_sample() {
 }
 
 #[test]
-fn a_drone_of_vviz_without_a_way_is_named() {
+fn vviz_drone_without_samples_is_noted() {
     let still = VVIZ.replace(r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}"#, "");
     let found = whole(&still);
     assert_eq!(found.samples().len(), 3);
@@ -60,7 +63,7 @@ fn a_drone_of_vviz_without_a_way_is_named() {
 }
 
 #[test]
-fn shows_of_vviz_are_refused_where_they_are_wrong() {
+fn invalid_vviz_shows_are_refused() {
     refused(
         VVIZ,
         &[
@@ -88,25 +91,29 @@ fn mm(length: f64) -> f64 {
     length * 0.001
 }
 
-const MOTIVE: &str = "\
-Format Version,1.23,Take Name,Take 1,Take Notes,,Capture Frame Rate,100.000000,Export Frame Rate,100.000000,Capture Start \
-Time,2024-01-01 10.00.00.000 AM,Total Frames in Take,3,Total Exported Frames,3,Rotation Type,Quaternion,Length \
-Units,Millimeters,Coordinate Space,Global
-
-,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body Marker,Rigid Body \
-Marker,Rigid Body Marker,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
-,Name,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1:Marker 001,cf1:Marker 001,cf1:Marker 001,cf2,cf2,cf2,cf2,cf2,cf2,cf2,cf2
-,ID,A,A,A,A,A,A,A,A,B,B,B,C,C,C,C,C,C,C,C
-,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,Position,Position,Position,Rotation,\
-Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error
-Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,X,Y,Z,W,X,Y,Z,
-0,0.000000,0,0,0,1,1000.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,0.2
-1,0.010000,0,0,0,1,1001.0,1500.0,-250.0,0.1,9,9,9,,,,,,,,
-2,0.020000,0,0,0,1,1002.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,0.2
-";
+const MOTIVE: &str = concat!(
+    "Format Version,1.23,Take Name,Take 1,Take Notes,,Capture Frame Rate,100.000000,Export Frame Rate,",
+    "100.000000,Capture Start Time,2024-01-01 10.00.00.000 AM,Total Frames in Take,3,",
+    "Total Exported Frames,3,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global\n",
+    "\n",
+    ",Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,",
+    "Rigid Body Marker,Rigid Body Marker,Rigid Body Marker,Rigid Body,Rigid Body,Rigid Body,Rigid Body,",
+    "Rigid Body,Rigid Body,Rigid Body,Rigid Body\n",
+    ",Name,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1,cf1:Marker 001,cf1:Marker 001,cf1:Marker 001,cf2,cf2,cf2,cf2,",
+    "cf2,cf2,cf2,cf2\n",
+    ",ID,A,A,A,A,A,A,A,A,B,B,B,C,C,C,C,C,C,C,C\n",
+    ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,Position,",
+    "Position,Position,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error\n",
+    "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,X,Y,Z,W,X,Y,Z,\n",
+    "0,0.000000,0,0,0,1,1000.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,",
+    "0.2\n",
+    "1,0.010000,0,0,0,1,1001.0,1500.0,-250.0,0.1,9,9,9,,,,,,,,\n",
+    "2,0.020000,0,0,0,1,1002.0,1500.0,-250.0,0.1,9,9,9,0,0,0,1,0.0,500.0,125.0,",
+    "0.2\n",
+);
 
 #[test]
-fn takes_of_motive_are_turned_and_who_is_lost_is_not_seen() {
+fn motive_axes_are_mapped_and_lost_bodies_omitted() {
     let found = whole(MOTIVE);
     let expected = [
         (0.0, "cf1", [1.0, 0.25, 1.5]),
@@ -123,21 +130,27 @@ fn takes_of_motive_are_turned_and_who_is_lost_is_not_seen() {
 }
 
 #[test]
-fn without_rigid_bodies_the_labelled_markers_of_a_name_are_a_vehicle() {
+fn motive_markers_form_vehicles_without_rigid_bodies() {
     let markers = MOTIVE.replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Bone").replace(",cf2", ",cf1:x");
     let found = whole(&markers);
     assert_eq!(found.samples()[0], (0.0, "cf1", [mm(9.0), -mm(9.0), mm(9.0)]));
-    let two = "Format Version,1.23,Length Units,Meters\n,Type,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker\n\
-        ,Name,a:1,a:1,a:1,a:2,a:2,a:2,Unlabeled 7,Unlabeled 7,Unlabeled 7\n,ID,1,1,1,2,2,2,3,3,3\n\
-        ,,Position,Position,Position,Position,Position,Position,Position,Position,Position\n\
-        Frame,Time (Seconds),X,Y,Z,X,Y,Z,X,Y,Z\n0,0,1,1,1,3,1,1,9,9,9\n1,0.01,1,1,1,,,,9,9,9\n";
+    let two = concat!(
+        "Format Version,1.23,Length Units,Meters\n",
+        ",Type,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker,Marker\n",
+        ",Name,a:1,a:1,a:1,a:2,a:2,a:2,Unlabeled 7,Unlabeled 7,Unlabeled 7\n",
+        ",ID,1,1,1,2,2,2,3,3,3\n",
+        ",,Position,Position,Position,Position,Position,Position,Position,Position,Position\n",
+        "Frame,Time (Seconds),X,Y,Z,X,Y,Z,X,Y,Z\n",
+        "0,0,1,1,1,3,1,1,9,9,9\n",
+        "1,0.01,1,1,1,,,,9,9,9\n",
+    );
     let found = whole(two);
     assert_eq!(found.samples(), [(0.0, "a", [2.0, -1.0, 1.0])]);
-    assert!(found.notes.iter().any(|note| note.ends_with("is the place of a (2)")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("if all of them are seen, for a (2)")), "{:?}", found.notes);
 }
 
 #[test]
-fn takes_of_motive_are_refused_where_they_are_wrong() {
+fn invalid_motive_takes_are_refused() {
     refused(
         MOTIVE,
         &[
@@ -161,7 +174,7 @@ fn takes_of_motive_are_refused_where_they_are_wrong() {
     assert_refused(&read(&none).expect_err("none"), "recording/no-positions", "line 7");
     let scaled = ReadOptions { scale: Some(0.1.into()), ..ReadOptions::default() };
     let error = read_bytes("take.csv", MOTIVE.as_bytes(), &scaled).expect_err("scaled");
-    assert_eq!(error.help(), "leave --scale away");
+    assert_eq!(error.help(), "omit --scale");
 }
 
 const NEXUS: &str = "\
@@ -174,7 +187,7 @@ Objects\n200\n,,cf1:cf1,,,,,,,cf2:cf2,,,,,,\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,T
 ,,,,,,mm,mm,mm,,,,,mm,mm,mm\n1,0,0,0,0,1,1000,2000,500,0,0,0,1,-1,-2,-4\n2,0,0,0,0,1,1000,2000,500,,,,,,,\n";
 
 #[test]
-fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
+fn vicon_objects_and_marker_means_are_read() {
     let found = whole(NEXUS);
     let expected = [
         (0.01, "cf1", [0.2, 0.0, 1.0]),
@@ -183,20 +196,20 @@ fn exports_of_vicon_are_read_by_object_or_by_the_middle_of_markers() {
         (0.03, "ball", [-0.5, 0.25, 0.0]),
     ];
     assert_eq!(found.samples(), expected);
-    assert!(found.notes.iter().any(|note| note.ends_with("is the place of cf1 (2)")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("if all of them are seen, for cf1 (2)")), "{:?}", found.notes);
     let found = whole(TRACKER);
     let expected =
         [(0.005, "cf1", [1.0, 2.0, 0.5]), (0.005, "cf2", [-0.001, -0.002, -0.004]), (0.01, "cf1", [1.0, 2.0, 0.5])];
     assert_eq!(found.samples(), expected);
-    // Where both are there, objects go before markers.
+    // Objects take precedence over markers.
     let both = whole(&format!("{NEXUS}\n{TRACKER}"));
     assert_eq!(both.samples(), expected);
-    let note = "not read, beside those of the section Objects: Force, ball";
+    let note = "not read, as they are outside the section Objects: Force, ball";
     assert!(both.notes.iter().any(|said| said == note), "{:?}", both.notes);
 }
 
 #[test]
-fn exports_of_vicon_are_refused_where_they_are_wrong() {
+fn invalid_vicon_exports_are_refused() {
     refused(
         NEXUS,
         &[

@@ -1,4 +1,4 @@
-//! Times are those that the file says: in order, of one clock, exact, and in a unit that somebody said.
+//! Times are ordered, from one clock, exact, and in a known or noted unit.
 
 use std::fs;
 
@@ -26,7 +26,7 @@ fn refused(text: &str, options: &ReadOptions, code: &str, place: &str) {
 }
 
 #[test]
-fn a_vehicle_whose_rows_go_back_in_time_is_refused() {
+fn decreasing_time_of_a_vehicle_is_refused() {
     let plain = ReadOptions::default();
     let sorted = ReadOptions { sort: true, ..ReadOptions::default() };
     let back = "t,id,x,y,z\n0,a,0,0,0\n2,a,2,0,0\n1,b,9,9,9\n1,a,1,0,0\n";
@@ -36,10 +36,10 @@ fn a_vehicle_whose_rows_go_back_in_time_is_refused() {
         [(0.0, "a", [0.0; 3]), (1.0, "b", [9.0; 3]), (1.0, "a", [1.0, 0.0, 0.0]), (2.0, "a", [2.0, 0.0, 0.0])];
     assert_eq!(found.samples(), expected);
     assert!(found.notes.iter().any(|note| note.contains("were sorted")), "{:?}", found.notes);
-    // Vehicles one after the other are in order, each of them.
+    // Vehicles in sequence are ordered individually.
     let by_vehicle = "t,id,x,y,z\n0,a,0,0,0\n1,a,1,0,0\n0,b,9,9,9\n1,b,9,9,9\n";
     assert_eq!(times(by_vehicle), [0.0, 0.0, 1.0, 1.0]);
-    // A row for each time.
+    // One row per time.
     let wide = "t,x1,y1\n0,0,0\n2,2,0\n1,1,0\n";
     refused(wide, &plain, "recording/time-backwards", "line 4");
     assert_eq!(read_with(wide, &sorted).expect("sorted").samples()[1], (1.0, "1", [1.0, 0.0, 0.0]));
@@ -48,7 +48,7 @@ fn a_vehicle_whose_rows_go_back_in_time_is_refused() {
 }
 
 #[test]
-fn of_two_rows_at_one_time_the_user_says_which_is_read() {
+fn duplicates_option_selects_a_row() {
     let long = "t,id,x,y,z\n0,a,1,0,0\n0,b,9,9,9\n0,a,2,0,0\n1,a,3,0,0\n1,b,9,9,9\n";
     let wide = "t,x1,y1\n0,1,0\n0,2,0\n1,3,0\n";
     let which = |duplicates| ReadOptions { duplicates, ..ReadOptions::default() };
@@ -60,19 +60,19 @@ fn of_two_rows_at_one_time_the_user_says_which_is_read() {
             let found = read_with(text, &which(Some(duplicates))).expect("read");
             assert_eq!(found.samples()[0].2[0], x, "{duplicates:?}");
             assert_eq!(found.items.len(), if text == long { 4 } else { 2 });
-            assert!(found.notes.iter().any(|note| note.contains("rows left out")), "{:?}", found.notes);
+            assert!(found.notes.iter().any(|note| note.contains("rows omitted")), "{:?}", found.notes);
         }
     }
-    // Rows that say the same say nothing else.
+    // Equal rows are read once.
     let same = "t,id,x,y,z\n0,a,1,0,0\n0,a,1,0,0\n1,a,3,0,0\n";
     let found = read(same).expect("read");
     assert_eq!(found.items.len(), 2);
-    assert!(found.notes.iter().any(|note| note.ends_with("is of the same time: 1")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.ends_with("has the same time: 1")), "{:?}", found.notes);
     refused(same, &which(Some(Duplicates::Refuse)), "recording/duplicate-row", "line 3");
 }
 
 #[test]
-fn the_last_of_many_rows_at_one_time_is_found_behind_the_end_of_a_batch() {
+fn last_duplicate_is_found_across_batches() {
     let vehicles = 12_000;
     let rows = (0..2).flat_map(|round| (0..vehicles).map(move |k| format!("0,{k},{round},0,0\n")));
     let text = format!("t_s,id,x,y,z\n{}", rows.collect::<String>());
@@ -83,18 +83,18 @@ fn the_last_of_many_rows_at_one_time_is_found_behind_the_end_of_a_batch() {
 }
 
 #[test]
-fn files_of_a_folder_say_how_many_rows_they_repeat() {
+fn omitted_duplicates_of_joined_files_are_noted() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["a.csv", "b.csv"] {
         fs::write(folder.path().join(name), "t_s,x,y\n0,1,2\n0,1,2\n1,1,2\n").expect("written");
     }
     let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
-    assert!(found.notes.iter().any(|note| note.contains("rows left out")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("rows omitted")), "{:?}", found.notes);
     assert_eq!(found.items.len(), 4);
 }
 
 #[test]
-fn seconds_and_the_rest_below_a_second_are_one_time() {
+fn seconds_and_subseconds_form_one_time() {
     for (header, unit, per_second) in [
         ("t_sec,t_nsec", "ns", 1_000_000_000),
         ("time_s,time_ns", "ns", 1_000_000_000),
@@ -111,14 +111,14 @@ fn seconds_and_the_rest_below_a_second_are_one_time() {
         let times: Vec<_> = found.samples().iter().map(|sample| sample.0).collect();
         assert_eq!(times, [1.0 / per_second as f64, 0.5, 1.0], "{header}");
         assert_eq!(found.clock.epoch_ns, 1_700_000_000_000_000_000);
-        assert!(found.notes.iter().any(|note| note.starts_with("a time is")), "{:?}", found.notes);
+        assert!(found.notes.iter().any(|note| note.starts_with("times are the sum of")), "{:?}", found.notes);
     }
-    // Whole numbers that are written with decimals, in a table with a row for each time.
+    // Integral values in decimal notation, in a wide table.
     assert_eq!(times("x1,y1,sec,nanosec\n1,2,5.0,250000000.0\n1,2,6.0,0.0\n"), [5.25, 6.0]);
 }
 
 #[test]
-fn two_columns_of_time_that_are_no_parts_of_one_are_refused() {
+fn unrelated_time_columns_are_refused() {
     let plain = ReadOptions::default();
     let (time_format, ambiguous) = ("recording/time-format", "recording/ambiguous-column");
     for (text, code, place) in [
@@ -136,14 +136,15 @@ fn two_columns_of_time_that_are_no_parts_of_one_are_refused() {
     let mut named = ReadOptions::default();
     assert!(named.columns.set("t", "stamp"));
     assert_eq!(read_with("t,stamp,id,x,y\n1,2,a,1,2\n", &named).expect("read").samples()[0].0, 2.0);
-    // A part alone is no time, and other quantities in seconds are none either.
+    // A part of a time alone is not a time, nor are other quantities in seconds.
     refused("sec,id,x,y\n1,a,1,2\n", &plain, "recording/no-time-column", "line 1");
     assert_eq!(times("t_s,flight_sec,latency_ms,id,x,y\n7,1,2,a,1,2\n"), [7.0]);
 }
 
 #[test]
-fn dates_are_read_to_the_last_digit() {
-    let text = "time,id,x,y\n2023-11-14T22:13:20.000000001Z,a,1,2\n2023-11-14T23:13:20.5+01:00,a,1,2\n2023-11-14 22:13:21Z,a,1,2\n";
+fn dates_keep_all_digits() {
+    let text = "time,id,x,y\n2023-11-14T22:13:20.000000001Z,a,1,2\n2023-11-14T23:13:20.5+01:00,a,1,2\n\
+                2023-11-14 22:13:21Z,a,1,2\n";
     let found = read(text).expect("read");
     assert_eq!(found.samples().iter().map(|sample| sample.0).collect::<Vec<_>>(), [1e-9, 0.5, 1.0]);
     assert_eq!(
@@ -152,13 +153,13 @@ fn dates_are_read_to_the_last_digit() {
     );
     let local = read("datetime;x1;y1\n2023-11-14 22:13:20;1;2\n2023-11-14 22:13:20,25;1;2\n").expect("read");
     assert_eq!(local.samples()[1].0, 0.25);
-    assert!(local.notes.iter().any(|note| note.contains("taken as UTC")), "{:?}", local.notes);
-    assert!(!found.notes.iter().any(|note| note.contains("taken as UTC")));
+    assert!(local.notes.iter().any(|note| note.contains("read as UTC")), "{:?}", local.notes);
+    assert!(!found.notes.iter().any(|note| note.contains("read as UTC")));
     assert_eq!(times("time (utc),x,y\n2023-11-14T22:13:20Z,1,2\n"), [0.0]);
 }
 
 #[test]
-fn what_is_no_date_among_dates_is_refused() {
+fn other_values_among_dates_are_refused() {
     let plain = ReadOptions::default();
     let dates = |last: &str| format!("t,id,x,y\n2023-11-14T22:13:20Z,a,1,2\n{last},a,1,2\n");
     for (text, code, place) in [
@@ -175,7 +176,7 @@ fn what_is_no_date_among_dates_is_refused() {
 }
 
 #[test]
-fn whole_numbers_may_be_of_any_unit() {
+fn integral_times_leave_the_unit_uncertain() {
     let unsure = |first: &str, second: &str| {
         read(&format!("t,id,x,y\n{first},a,1,2\n{second},a,1,2\n")).expect("read").clock.by_steps
     };
@@ -186,7 +187,7 @@ fn whole_numbers_may_be_of_any_unit() {
 }
 
 #[test]
-fn a_time_of_one_vehicle_alone_is_refused() {
+fn time_column_of_one_vehicle_is_refused() {
     for header in ["t,x1,y1,t2,x2,y2", "t,a.x,a.y,a.timestamp,b.x,b.y", "t,a_x,a_y,time_b,b_x,b_y"] {
         let error = read(&format!("{header}\n0,1,2,3,4,5\n")).expect_err(header);
         assert_refused(&error, "recording/several-clocks", "line 1");

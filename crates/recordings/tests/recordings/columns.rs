@@ -1,4 +1,4 @@
-//! Units and columns are taken for what their names say, or refused: nothing is guessed in silence.
+//! Units and columns are read as named, or refused.
 
 use std::fs;
 
@@ -17,20 +17,20 @@ fn read(content: &str) -> Result<Whole, ReadError> {
     read_with("flight.csv", content, &ReadOptions::default())
 }
 
-/// The columns of a table of two rows, all of whose numbers are 1 and later 2.
+/// Returns a table of two rows whose cells are 1, then 2.
 fn ones(header: &str) -> String {
     let row = |number: &str| vec![number; header.split(',').count()].join(",");
     format!("{header}\n{}\n{}\n", row("1"), row("2"))
 }
 
-/// Asserts that a header is refused with this code.
+/// Asserts that a table is refused with this code.
 #[track_caller]
 fn refused(content: &str, options: &ReadOptions, code: &str) {
     assert_refused(&read_with("flight.csv", content, options).expect_err(content), code, "line 1");
 }
 
 #[test]
-fn units_of_length_are_honoured_wherever_a_name_says_them() {
+fn length_units_in_names_are_applied() {
     for (header, metres) in [
         ("t,x1 [mm],y1 [mm],z1 [mm]", 0.001),
         ("t,a.x [mm],a.y [mm],a.z [mm]", 0.001),
@@ -52,7 +52,7 @@ fn units_of_length_are_honoured_wherever_a_name_says_them() {
 }
 
 #[test]
-fn units_that_are_not_known_or_contradict_each_other_are_refused() {
+fn unknown_and_contradictory_units_are_refused() {
     let scaled = ReadOptions { scale: Some(0.001.into()), ..ReadOptions::default() };
     let plain = ReadOptions::default();
     for (header, options, code) in [
@@ -65,21 +65,21 @@ fn units_that_are_not_known_or_contradict_each_other_are_refused() {
     ] {
         refused(&ones(header), options, code);
     }
-    // A column that the user names says its unit as well.
+    // The unit in the name of a column given by the user applies too.
     for (east, north) in [("east [mm]", "north (mm)"), ("east_mm", "north_mm")] {
         let mut named = ReadOptions::default();
         assert!(named.columns.set("x", east) && named.columns.set("y", north));
         let whole = read_with("f.csv", &ones(&format!("t,id,{east},{north}")), &named).expect("read");
         assert_eq!(whole.samples()[0].2, [0.001, 0.001, 0.0]);
     }
-    // Metres are what a scale scales.
+    // Names in metres do not contradict a scale.
     assert_eq!(read_with("f.csv", &ones("t,x [m],y"), &scaled).expect("read").samples()[0].2, [0.001, 0.001, 0.0]);
-    // A column that nobody reads may be in any unit.
+    // Unused columns may have any unit.
     assert!(read(&ones("t,id,x,y,z,gyro_x [deg/s]")).is_ok());
 }
 
 #[test]
-fn units_of_time_are_honoured_or_refused() {
+fn time_units_in_names_are_applied_or_refused() {
     let ms = read(&ones("Time [MS],x,y")).expect("read");
     assert_eq!((ms.clock.unit, ms.clock.inferred), ("ms", false));
     for header in ["time [min],x,y", "time (hours),id,x,y", "t_min,x1,y1", "timestamp [frames],x,y"] {
@@ -93,7 +93,7 @@ fn units_of_time_are_honoured_or_refused() {
 }
 
 #[test]
-fn numbers_of_frames_are_no_times() {
+fn frame_numbers_require_a_rate() {
     for header in ["frame,id,x,y", "Frame Number,x1,y1", "frame_idx,x,y", "step,id,x,y"] {
         refused(&ones(header), &ReadOptions::default(), "recording/frames");
         let options = ReadOptions { times_per_second: Some(50.0), ..ReadOptions::default() };
@@ -103,12 +103,12 @@ fn numbers_of_frames_are_no_times() {
     let mut named = ReadOptions::default();
     named.columns.set("t", "frame");
     refused(&ones("t,frame,id,x,y"), &named, "recording/frames");
-    // Where there is a time, frames are beside the point.
+    // Frame numbers beside a time are ignored.
     assert_eq!(read(&ones("frame,t,id,x,y")).expect("read").samples()[1].0, 2.0);
 }
 
 #[test]
-fn quantities_are_no_vehicles() {
+fn quantities_are_not_vehicles() {
     for extra in [
         "gyro_x,gyro_y,gyro_z",
         "a_x,a_y,a_z",
@@ -125,7 +125,7 @@ fn quantities_are_no_vehicles() {
         assert!(whole.notes.contains(&unused), "{:?}", whole.notes);
         refused(&ones(&format!("t,{extra}")), &ReadOptions::default(), "recording/no-vehicle-column");
     }
-    // Vehicles called by letters are vehicles, and `a` is one of them.
+    // If all vehicles are named by letters, `a` is one of them.
     assert_eq!(read(&ones("t,a_x,a_y,b_x,b_y")).expect("read").vehicles, ["a", "b"]);
     assert_eq!(read(&ones("t,a.x,a.y,v.x,v.y")).expect("read").vehicles, ["a", "v"]);
     let ambiguous = ones("t,cf1_x,cf1_y,cf2_x,cf2_y,a_x,a_y");
@@ -133,10 +133,10 @@ fn quantities_are_no_vehicles() {
 }
 
 #[test]
-fn what_was_taken_as_a_vehicle_is_listed_where_it_was_guessed() {
+fn vehicles_inferred_from_column_names_are_noted() {
     let listed = |header: &str| {
         let notes = read(&ones(header)).expect("read").notes;
-        notes.iter().find_map(|note| note.strip_prefix("vehicles, going by the names of columns: ").map(str::to_owned))
+        notes.iter().find_map(|note| note.strip_prefix("vehicles by column names: ").map(str::to_owned))
     };
     assert_eq!(listed("t,cf1.x,cf1.y,home.x,home.y").as_deref(), Some("`cf1`, `home`"));
     assert_eq!(listed("t,x1,y1,x2,y2").as_deref(), Some("`1`, `2`"));
@@ -145,7 +145,7 @@ fn what_was_taken_as_a_vehicle_is_listed_where_it_was_guessed() {
 }
 
 #[test]
-fn columns_that_are_repeated_are_not_dropped() {
+fn repeated_columns_are_refused() {
     for header in [
         "t,px,py,pz,px.1,py.1,pz.1",
         "t,id,px,py,pz,px.1,py.1,pz.1",
@@ -162,13 +162,14 @@ fn columns_that_are_repeated_are_not_dropped() {
 }
 
 #[test]
-fn plain_numbers_that_may_mean_several_things_are_asked_about() {
+fn ambiguous_plain_numbers_require_dimensions() {
     let text = |count: usize| format!("{}\n{}\n", vec!["0"; count].join(" "), vec!["1"; count].join(" "));
     let vehicles = |count, dimensions| {
         let options = ReadOptions { dimensions, ..ReadOptions::default() };
         read_with("flight.txt", &text(count), &options).map(|whole| whole.vehicles.len())
     };
-    // Ten numbers may be three vehicles, or one with velocity and acceleration. Eleven may be two with heading and speed.
+    // Ten numbers may be three vehicles, or one with velocity and acceleration; eleven may be two with heading and
+    // speed.
     for (count, ways) in [(5, "2 or 2+2"), (7, "2 or 3 or 3+3"), (10, "3"), (11, "2"), (13, "2 or 3 or 2+2 or 3+3")] {
         let error = vehicles(count, None).expect_err("asked");
         assert!(error.help().contains(&format!("--dimensions {ways}:")), "{}", error.help());
@@ -192,7 +193,7 @@ fn plain_numbers_that_may_mean_several_things_are_asked_about() {
 }
 
 #[test]
-fn a_header_may_stand_behind_a_hash() {
+fn header_may_be_a_comment() {
     for content in [
         "# made up\n# t,id,x,y\n0,7,1,2\n",
         "#t id x y\n0 7 1 2\n",
@@ -202,12 +203,12 @@ fn a_header_may_stand_behind_a_hash() {
         let whole = read_with("flight.txt", content, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((whole.vehicles[0].trim_start_matches("cf"), whole.samples()[0].2), ("7", [1.0, 2.0, 0.0]));
     }
-    // A remark of as many words is none.
+    // A comment with the same number of words is not a header.
     assert!(read("# one two three four\n0,7,1,2\n").is_err());
 }
 
 #[test]
-fn tuples_and_tables_of_one_vehicle_are_read() {
+fn tuples_and_single_vehicle_tables_are_read() {
     let rvo = read_with("rvo.txt", "0 (1,2) (-3,4.5)\n0.25 (1.5, 2) (-3,4)\n", &ReadOptions::default()).expect("read");
     let samples = [(0.0, "1", [1.0, 2.0, 0.0]), (0.0, "2", [-3.0, 4.5, 0.0])];
     assert_eq!(rvo.samples()[..2], samples);

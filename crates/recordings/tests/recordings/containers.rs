@@ -1,4 +1,4 @@
-//! MCAP, NPZ, Skybrush shows and Crazyflie polynomials give the motion that was written into them.
+//! MCAP, NPZ, Skybrush shows and Crazyflie polynomials are read with the motion that was written.
 
 use std::fs;
 use std::io::{Cursor, Write as _};
@@ -12,7 +12,7 @@ use crate::messages::{NO_TURN, SEC, cdr, header, mcap_of, mcap_with, read_bytes,
 use crate::recording::{Whole, assert_refused};
 
 #[test]
-fn ros_messages_are_read_in_both_byte_orders_and_lose_no_nanosecond() {
+fn ros_messages_keep_nanoseconds_in_both_byte_orders() {
     for little in [true, false] {
         let array = |ns| cdr(&(header(ns), vec![([1.0, 2.0, 3.0], NO_TURN), ([4.0, 5.0, 6.0], NO_TURN)]), little);
         let poses = "geometry_msgs/msg/PoseArray";
@@ -25,7 +25,7 @@ fn ros_messages_are_read_in_both_byte_orders_and_lose_no_nanosecond() {
 }
 
 #[test]
-fn poses_with_a_topic_each_and_transforms_are_called_by_topic_and_frame() {
+fn poses_are_named_by_topic_and_transforms_by_frame() {
     let stamped = |ns| cdr(&(header(ns), ([1.0, 2.0, 3.0], NO_TURN)), true);
     let kind = "geometry_msgs/msg/PoseStamped";
     let file = mcap_of(&[("/cf1/pose", kind, "cdr", 1, stamped(5)), ("/cf2/pose", kind, "cdr", 1, stamped(6))]);
@@ -38,7 +38,7 @@ fn poses_with_a_topic_each_and_transforms_are_called_by_topic_and_frame() {
 }
 
 #[test]
-fn frames_that_stand_still_are_no_vehicles() {
+fn constant_frames_are_not_vehicles() {
     let kind = "tf2_msgs/msg/TFMessage";
     let transform = |parent: &'static str, child: &'static str, x: f64| {
         cdr(&(vec![(((SEC, 5), parent), child, ([x, 2.0, 3.0], NO_TURN))],), true)
@@ -46,15 +46,15 @@ fn frames_that_stand_still_are_no_vehicles() {
     let fixed = ("/tf_static", kind, "cdr", 1, transform("cf1", "camera", 0.1));
     let found = whole("tf.mcap", &mcap_of(&[fixed.clone(), ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]));
     assert_eq!(found.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0])]);
-    assert!(found.notes.iter().any(|note| note.ends_with("no vehicles: camera")), "{:?}", found.notes);
-    // On a topic of another name the same message moves, and hangs on the vehicle all the same.
+    assert!(found.notes.iter().any(|note| note.ends_with("not vehicles: camera")), "{:?}", found.notes);
+    // On a topic with another name the same transform counts as moving; its frame still belongs to the vehicle.
     let moving = ("/other", kind, "cdr", 1, fixed.4);
     let both = whole("tf.mcap", &mcap_of(&[moving, ("/tf", kind, "cdr", 2, transform("map", "cf1", 1.0))]));
     assert_eq!(both.samples(), [(5e-9, "cf1", [1.0, 2.0, 3.0])]);
-    assert!(both.notes.iter().any(|note| note.ends_with("hangs on them: camera")), "{:?}", both.notes);
+    assert!(both.notes.iter().any(|note| note.ends_with("belong to them: camera")), "{:?}", both.notes);
 }
 
-/// The parts of Foxglove's messages that the reader does not need are written too.
+/// Foxglove message with fields that the reader ignores.
 mod foxglove {
     #[derive(Clone, PartialEq, prost::Message)]
     pub(crate) struct Time {
@@ -112,27 +112,32 @@ fn foxglove_messages_are_read_in_protobuf_and_json() {
     let kind = "foxglove.PosesInFrame";
     let found = whole("protobuf.mcap", &mcap_of(&[("/p", kind, "protobuf", 1, foxglove_poses())]));
     assert_eq!(found.samples(), FOXGLOVE_TRUTH);
-    let json = r#"{"timestamp": {"sec": 12, "nsec": 500000000}, "frame_id": "map", "poses": [
-        {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}},
-        {"position": {"x": 4, "y": 5, "z": 6}}]}"#;
+    let json = concat!(
+        r#"{"timestamp": {"sec": 12, "nsec": 500000000}, "frame_id": "map", "poses": [ "#,
+        r#"{"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}, "#,
+        r#"{"position": {"x": 4, "y": 5, "z": 6}}]}"#,
+    );
     let found = whole("json.mcap", &mcap_of(&[("/p", kind, "json", 1, json.into())]));
     assert_eq!(found.samples(), FOXGLOVE_TRUTH);
-    let json = r#"{"transforms": [{"timestamp": {"sec": 12, "nsec": 500000000}, "parent_frame_id": "map",
-        "child_frame_id": "1", "translation": {"x": 1, "y": 2, "z": 3}}, {"timestamp": {"sec": 12, "nsec": 500000000},
-        "parent_frame_id": "map", "child_frame_id": "2", "translation": {"x": 4, "y": 5, "z": 6}}]}"#;
+    let json = concat!(
+        r#"{"transforms": [{"timestamp": {"sec": 12, "nsec": 500000000}, "parent_frame_id": "map", "#,
+        r#""child_frame_id": "1", "translation": {"x": 1, "y": 2, "z": 3}}, "#,
+        r#"{"timestamp": {"sec": 12, "nsec": 500000000}, "#,
+        r#""parent_frame_id": "map", "child_frame_id": "2", "translation": {"x": 4, "y": 5, "z": 6}}]}"#,
+    );
     let found = whole("tf.mcap", &mcap_of(&[("/tf", "foxglove.FrameTransforms", "json", 1, json.into())]));
     assert_eq!(found.samples(), FOXGLOVE_TRUTH);
 }
 
 #[test]
-fn messages_without_a_time_are_at_the_time_when_they_were_logged() {
-    let json = r#"{"poses": [{"position": {"x": 1, "y": 2, "z": 3}}]}"#;
+fn messages_without_a_time_use_the_log_time() {
+    let json = concat!(r#"{"poses": [{"position": {"x": 1, "y": 2, "z": 3}}]}"#,);
     let found = whole("json.mcap", &mcap_of(&[("/p", "foxglove.PosesInFrame", "json", 2_500_000_000, json.into())]));
     assert_eq!(found.samples(), [(2.5, "1", [1.0, 2.0, 3.0])]);
 }
 
 #[test]
-fn a_time_of_zero_is_a_time_where_other_messages_have_one() {
+fn zero_is_a_valid_time_on_a_stamped_topic() {
     let json = |nsec: u32| {
         format!(r#"{{"timestamp": {{"sec": 0, "nsec": {nsec}}}, "poses": [{{"position": {{"x": {nsec}}}}}]}}"#)
             .into_bytes()
@@ -146,7 +151,7 @@ fn a_time_of_zero_is_a_time_where_other_messages_have_one() {
 }
 
 #[test]
-fn two_frames_are_refused_until_one_is_named() {
+fn several_frames_require_the_frame_option() {
     let at = |frame: &'static str| cdr(&(((1, 0), frame), ([1.0, 2.0, 3.0], NO_TURN)), true);
     let kind = "geometry_msgs/msg/PoseStamped";
     let file = mcap_of(&[("/a", kind, "cdr", 1, at("map")), ("/b", kind, "cdr", 1, at("odom"))]);
@@ -157,7 +162,7 @@ fn two_frames_are_refused_until_one_is_named() {
 }
 
 #[test]
-fn a_file_that_was_not_closed_is_refused_until_it_is_accepted() {
+fn unclosed_file_requires_allow_unfinished() {
     let json = |x: u32| format!(r#"{{"poses": [{{"position": {{"x": {x}}}}}]}}"#).into_bytes();
     let kind = "foxglove.PosesInFrame";
     let options = mcap::WriteOptions::new().compression(None).chunk_size(Some(1));
@@ -170,7 +175,7 @@ fn a_file_that_was_not_closed_is_refused_until_it_is_accepted() {
     assert!(!found.items.is_empty() && found.notes.iter().any(|note| note.contains("not closed")), "{found:?}");
 }
 
-/// An archive of entries, each packed or not.
+/// Returns an archive of these entries, packed or not.
 fn archive(entries: &[(&str, Vec<u8>)], packed: bool) -> Vec<u8> {
     let method = if packed { zip::CompressionMethod::Deflated } else { zip::CompressionMethod::Stored };
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
@@ -190,7 +195,7 @@ fn npy(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Options that name the layout of an array: 0 is time, vehicle, axis and 1 vehicle, time, axis.
+/// Returns options with a layout: 0 is time, vehicle, axis, and 1 is vehicle, time, axis.
 fn laid_out(layout: usize) -> ReadOptions {
     ReadOptions { layout: Some(ArrayAxis::LAYOUTS[layout]), ..ReadOptions::default() }
 }
@@ -208,7 +213,7 @@ const NPZ_TRUTH: [(f64, &str, [f64; 3]); 6] = [
     (1.0, "2", [15.0, 16.0, 17.0]),
 ];
 
-/// The numbers of [`NPZ_TRUTH`] in the order of an array: each index of it is (time, vehicle, axis).
+/// Returns the numbers of [`NPZ_TRUTH`] in the order of an array; each index is (time, vehicle, axis).
 fn arranged(indices: impl Iterator<Item = [usize; 3]>) -> Vec<f64> {
     indices.map(|[k, i, axis]| NPZ_TRUTH[2 * k + i].2[axis]).collect()
 }
@@ -218,7 +223,7 @@ fn cube(a: usize, b: usize, c: usize) -> impl Iterator<Item = [usize; 3]> {
 }
 
 #[test]
-fn arrays_are_read_in_every_order_of_their_axes_packed_or_not() {
+fn npz_is_read_in_every_axis_order_packed_or_not() {
     let time_first = arranged(cube(3, 2, 3));
     let vehicle_first = arranged(cube(2, 3, 3).map(|[i, k, axis]| [k, i, axis]));
     let fortran = arranged(cube(3, 2, 3).map(|[axis, i, k]| [k, i, axis]));
@@ -246,7 +251,7 @@ fn arrays_are_read_in_every_order_of_their_axes_packed_or_not() {
 }
 
 #[test]
-fn what_was_seen_is_laid_out_as_the_positions_are() {
+fn npz_seen_has_the_layout_of_positions() {
     let t = || ("t.npy", npy("<f8", "False", "(3,)", &doubles(&[0.0, 0.5, 1.0])));
     let positions = || ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
     // Vehicle 2 was not seen at 0.5 s.
@@ -281,7 +286,7 @@ fn what_was_seen_is_laid_out_as_the_positions_are() {
 }
 
 #[test]
-fn of_two_arrays_of_times_none_is_ignored() {
+fn two_time_arrays_are_refused() {
     let times = || npy("<f8", "False", "(3,)", &doubles(&[0.0, 0.5, 1.0]));
     let positions = ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
     let bytes = archive(&[("t.npy", times()), ("timestamps.npy", times()), positions], true);
@@ -293,7 +298,7 @@ fn of_two_arrays_of_times_none_is_ignored() {
 }
 
 #[test]
-fn no_time_is_refused() {
+fn nat_time_is_refused() {
     let stamps: Vec<u8> = [0_i64, i64::MIN, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
     let t = ("t.npy", npy("<M8[ms]", "False", "(3,)", &stamps));
     let positions = ("positions.npy", npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3)))));
@@ -302,7 +307,7 @@ fn no_time_is_refused() {
 }
 
 #[test]
-fn times_of_numpy_have_their_unit_and_a_square_of_axes_is_asked_about() {
+fn npz_time_unit_is_read_and_square_shape_is_ambiguous() {
     let stamps: Vec<u8> = [0_i64, 500, 1000].iter().flat_map(|ms| ms.to_le_bytes()).collect();
     let t = npy("<M8[ms]", "False", "(3,)", &stamps);
     let positions = npy("<f8", "False", "(3, 2, 3)", &doubles(&arranged(cube(3, 2, 3))));
@@ -335,7 +340,7 @@ const TRAJECTORY: &str = r#"{"version": 1, "takeoffTime": 2,
     "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], []], [6, [5, 2, 8], [[1, 2, 8], [5, 2, 8]]]], "landingHeight": 0}"#;
 
 #[test]
-fn shows_are_read_alone_and_out_of_an_archive_with_parts() {
+fn skybrush_shows_are_read_as_json_and_skyc() {
     let show = |trajectory: &str| {
         format!(
             r#"{{"version": 1, "environment": {{"type": "outdoor"}}, "swarm": {{"drones": [
@@ -354,16 +359,16 @@ fn shows_are_read_alone_and_out_of_an_archive_with_parts() {
         assert_eq!(spans, [(0.0, 2.0), (2.0, 6.0), (6.0, 8.0)]);
         assert_eq!(at(pieces[0], 1.0), [1.0, 2.0, 0.0]);
         assert_eq!(at(pieces[1], 4.0), [1.0, 2.0, 4.0]);
-        // Half-way a cubic Bezier curve is at (P0 + 3 P1 + 3 P2 + P3) / 8.
+        // The midpoint of a cubic Bezier curve is (P0 + 3 P1 + 3 P2 + P3) / 8.
         assert_eq!(at(pieces[2], 7.0), [3.0, 2.0, 8.0]);
-        // Its control points make it begin and end at rest.
+        // The control points give zero velocity at both ends.
         assert_eq!(pieces[2].coefficients[1].x, 0.0);
     }
     assert_eq!(alone.items, parted.items);
 }
 
 #[test]
-fn a_drone_with_a_single_point_stands_there_until_the_show_ends() {
+fn skybrush_drone_with_one_point_stands_throughout() {
     let drone = |name: &str, points: &str| {
         format!(r#"{{"settings": {{"name": "{name}", "trajectory": {{"points": {points}}}}}}}"#)
     };
@@ -389,7 +394,7 @@ fn write(folder: &Path, name: &str, content: &str) {
 }
 
 #[test]
-fn polynomials_follow_each_other_within_a_file_and_from_file_to_file() {
+fn polynomials_are_concatenated_within_and_across_files() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), "cf10.csv", &polynomial(&[(1.0, [5.0, 0.0, 1.0])]));
     write(folder.path(), "cf9.csv", &polynomial(&[(1.5, [0.0, 0.0, 1.0]), (0.5, [1.5, 0.0, 1.0])]));
@@ -408,15 +413,19 @@ fn polynomials_follow_each_other_within_a_file_and_from_file_to_file() {
 }
 
 #[test]
-fn a_curve_that_jumps_is_read_and_said() {
+fn curve_jump_is_noted() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), "cf1.csv", &polynomial(&[(1.0, [0.0, 0.0, 1.0]), (1.0, [1.5, 0.0, 1.0])]));
     let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
-    assert!(found.notes.iter().any(|note| note.contains("jumps by 0.5000 m at 1 s")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|note| note.contains("jump of a curve is 0.5000 m, of `cf1` at 1 s")),
+        "{:?}",
+        found.notes
+    );
 }
 
 #[test]
-fn an_array_whose_shape_has_several_meanings_is_asked_about_and_no_other() {
+fn only_ambiguous_npz_shapes_are_refused() {
     let read = |shape: [usize; 3], times: usize, axes: &[&str], options: &ReadOptions| {
         let stamps: Vec<_> = (0..u8::try_from(times).expect("few")).map(f64::from).collect();
         let t = ("t.npy", npy("<f8", "False", &format!("({times},)"), &doubles(&stamps)));
@@ -430,7 +439,7 @@ fn an_array_whose_shape_has_several_meanings_is_asked_about_and_no_other() {
         read_bytes("flight.npz", &archive(&arrays, false), options)
     };
     let plain = ReadOptions::default();
-    // Times, vehicles, and whether it is planar.
+    // Times, vehicles, and whether the recording is planar.
     for (shape, times, vehicles) in [([9, 4, 3], 9, 4), ([4, 9, 3], 9, 4), ([9, 4, 2], 9, 4), ([9, 1, 3], 9, 1)] {
         let found = read(shape, times, &[], &plain).unwrap_or_else(|error| panic!("{shape:?}: {error}"));
         assert_eq!((found.vehicles.len(), found.items.len()), (vehicles, times * vehicles), "{shape:?}");

@@ -1,4 +1,4 @@
-//! Latitude, longitude and height become metres around an origin.
+//! Latitude, longitude and height are converted to metres from an origin.
 
 use std::fs;
 
@@ -7,12 +7,12 @@ use tautline_recordings::read::{ReadError, ReadOptions};
 use crate::messages::{Message, SEC, cdr, mcap_of, read_bytes};
 use crate::recording::{Whole, assert_refused};
 
-/// Two units in the last place of a coordinate around the Earth's centre.
+/// Two units in the last place of an Earth-centred coordinate.
 const ROUNDING_M: f64 = 2e-9;
 
 const ORIGIN: [f64; 3] = [47.397_742, 8.545_594, 488.0];
 
-/// Places, and where PROJ 9 (`+proj=topocentric` behind `+proj=cart`) has them from [`ORIGIN`].
+/// Places, and their positions relative to [`ORIGIN`] by PROJ 9 (`+proj=cart`, then `+proj=topocentric`).
 const KNOWN: [([f64; 3], [f64; 3]); 4] = [
     (ORIGIN, [0.0, 0.0, 0.0]),
     ([47.398_742, 8.547_594, 508.5], [150.988_644_194_237_08, 111.189_420_765_010_33, 20.497_245_891_892_348]),
@@ -36,7 +36,7 @@ fn table(header: &str) -> String {
     format!("{header}\n{}", rows.collect::<String>())
 }
 
-fn is_known(found: &Whole) {
+fn assert_known(found: &Whole) {
     assert_eq!(found.items.len(), KNOWN.len());
     for ((_, _, position), (place, expected)) in found.samples().iter().zip(KNOWN) {
         let off = position.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -45,7 +45,7 @@ fn is_known(found: &Whole) {
 }
 
 #[test]
-fn places_of_tables_agree_with_proj() {
+fn table_positions_agree_with_proj() {
     for header in [
         "t_s,id,lat,lon,alt",
         "t_s,id,Latitude,Longitude,Altitude",
@@ -54,7 +54,7 @@ fn places_of_tables_agree_with_proj() {
         "t_s,id,lat_deg,lon_deg,alt_m",
     ] {
         let found = whole(&table(header));
-        is_known(&found);
+        assert_known(&found);
         let note = "east, north and up of 47.397742,8.545594,488.0 on WGS 84";
         assert!(found.notes.iter().any(|said| said.contains(note)), "{:?}", found.notes);
     }
@@ -62,11 +62,11 @@ fn places_of_tables_agree_with_proj() {
     for (role, name) in [("lat", "phi"), ("lon", "lambda"), ("alt", "h")] {
         assert!(named.columns.set(role, name));
     }
-    is_known(&read(&table("t_s,id,phi,lambda,h"), &named).expect("read"));
+    assert_known(&read(&table("t_s,id,phi,lambda,h"), &named).expect("read"));
 }
 
 #[test]
-fn wide_tables_and_other_units_say_the_same() {
+fn wide_tables_and_other_units_are_equivalent() {
     let [(a, _), (b, expected)] = [KNOWN[0], KNOWN[1]];
     let wide = format!(
         "t,cf1.lat,cf1.lon,cf1.alt,cf2.lat,cf2.lon,cf2.alt\n0,{},{},{},{},{},{}\n",
@@ -92,27 +92,27 @@ fn wide_tables_and_other_units_say_the_same() {
 }
 
 #[test]
-fn the_origin_can_be_given_and_metres_go_before_degrees() {
+fn origin_option_is_used_and_metres_take_precedence() {
     let origin = ReadOptions { origin: Some(KNOWN[1].0), ..ReadOptions::default() };
     assert_eq!(read(&table("t_s,id,lat,lon,alt"), &origin).expect("read").samples()[1].2, [0.0; 3]);
     let both = whole("t,id,x,y,z,lat,lon\n0,a,1,2,3,47,8\n");
     assert_eq!(both.samples(), [(0.0, "a", [1.0, 2.0, 3.0])]);
     assert!(both.notes.iter().any(|note| note == "columns not used: lat, lon"), "{:?}", both.notes);
     let needless = read("t,id,x,y,z\n0,a,1,2,3\n", &origin).expect_err("refused");
-    assert_eq!(needless.help(), "leave --origin away");
+    assert_eq!(needless.help(), "omit --origin");
 }
 
 #[test]
-fn who_is_not_seen_has_no_place_and_heights_may_be_missing_altogether() {
+fn empty_positions_are_omitted_and_heights_are_optional() {
     let found = whole("t,id,lat,lon,alt\n0,a,,,\n1,a,47,8,400\n");
     assert_eq!(found.samples(), [(1.0, "a", [0.0; 3])]);
     let flat = whole("t,id,lat,lon\n0,a,47,8\n");
     assert_eq!(flat.samples(), [(0.0, "a", [0.0; 3])]);
-    assert!(flat.notes.iter().any(|note| note.contains("no column for the height")), "{:?}", flat.notes);
+    assert!(flat.notes.iter().any(|note| note.contains("no column gives the height")), "{:?}", flat.notes);
 }
 
 #[test]
-fn what_is_no_place_is_refused_where_it_is() {
+fn invalid_places_are_refused_with_their_line() {
     for (row, code) in [
         ("0,a,91,8,400", "recording/not-on-earth"),
         ("0,a,473977420,85455940,488", "recording/not-on-earth"),
@@ -128,7 +128,7 @@ fn what_is_no_place_is_refused_where_it_is() {
 }
 
 #[test]
-fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
+fn scale_applies_to_heights_and_missing_unit_is_noted() {
     let rows = "0,a,47,8,1000\n1,a,47,8,1100\n1,b,47,8.001,1100\n";
     let origin = [47.0, 8.0, 304.8];
     let read = |height: &str, scale: f64| {
@@ -136,32 +136,32 @@ fn a_height_without_a_unit_is_said_and_a_scale_is_that_of_heights() {
         read(&format!("t,id,lat,lon,{height}\n{rows}"), &options)
     };
     let metres = read("alt", 1.0).expect("read");
-    let note = "heights are those of column `alt`, in metres: the name says no unit (--scale gives another)";
+    let note = "heights are read from column `alt`, in metres: the name has no unit (--scale sets another)";
     assert!(metres.notes.iter().any(|said| said == note), "{:?}", metres.notes);
     let feet = read("alt", 0.3048).expect("read");
-    let note = "heights are those of column `alt`, in units of 0.3048 m as --scale says";
+    let note = "heights are read from column `alt`, in units of 0.3048 m (--scale)";
     assert!(feet.notes.iter().any(|said| said == note), "{:?}", feet.notes);
     let heights = |found: &Whole| found.samples().iter().map(|(_, _, position)| position[2]).collect::<Vec<_>>();
     assert!((heights(&metres)[0] - 695.2).abs() < 1e-8 && heights(&feet)[0].abs() < 1e-8);
     assert!((heights(&feet)[1] - 30.48).abs() < 1e-8);
-    // What is across the ground is not scaled, and a unit in the name says the same.
+    // The scale does not apply to horizontal positions; a unit in the name has the same effect.
     let named = read("alt [ft]", 1.0).expect("read");
     assert_eq!(named.samples(), feet.samples());
-    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale gives")));
+    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale sets")));
     assert_refused(&read("alt [ft]", 0.5).expect_err("refused"), "recording/contradicts-option", "line 1");
 }
 
 #[test]
-fn a_fix_at_zero_and_zero_is_none() {
+fn zero_latitude_and_longitude_is_no_fix() {
     let found = whole("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,47,8,400\n2,a,0.0,-0.0,400\n3,a,47,8,400\n3,b,0,0,0\n");
     assert_eq!(found.samples(), [(1.0, "a", [0.0; 3]), (3.0, "a", [0.0; 3])]);
-    let note = "3 places are no fixes and were left out of `a`, `b`: latitude and longitude are both exactly 0";
+    let note = "3 positions of `a`, `b` omitted for lack of a fix: latitude and longitude are exactly 0";
     assert!(found.notes.iter().any(|said| said == note), "{:?}", found.notes);
-    // Where one of them is 0 it is the equator, or the meridian of Greenwich.
+    // A single 0 is a place on the equator or the meridian of Greenwich.
     let near = whole("t,id,lat,lon,alt\n0,a,0,8,0\n0,b,51,0,0\n0,c,0,1e-7,0\n");
     assert_eq!(near.items.len(), 3);
-    assert!(!near.notes.iter().any(|said| said.contains("no fix")), "{:?}", near.notes);
-    // So are metres.
+    assert!(!near.notes.iter().any(|said| said.contains("lack of a fix")), "{:?}", near.notes);
+    // Zero is a valid position in metres.
     assert_eq!(whole("t,id,x,y,z\n0,a,0,0,0\n").items.len(), 1);
     let none = read("t,id,lat,lon,alt\n0,a,0,0,0\n1,a,0,0,9\n", &ReadOptions::default()).expect_err("refused");
     assert_refused(&none, "recording/no-fix", "");
@@ -176,18 +176,18 @@ fn a_fix_at_zero_and_zero_is_none() {
     let found = Whole::read(folder.path(), &origin).expect("read");
     assert_eq!(found.items.len(), 4);
     for name in ["a", "b"] {
-        let note = format!("1 place is no fix and was left out of `{name}`");
+        let note = format!("1 position of `{name}` omitted for lack of a fix");
         assert!(found.notes.iter().any(|said| said.contains(&note)), "{:?}", found.notes);
     }
     let kind = "sensor_msgs/msg/NavSatFix";
     let messages = [[0.0; 3], [47.0, 8.0, 400.0]].map(|place| ("/r1/fix", kind, "cdr", 1, fix(0, 0, place)));
     let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
     assert_eq!(found.samples().len(), 1);
-    assert!(found.notes.iter().any(|said| said.contains("1 place is no fix")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|said| said.contains("1 position omitted for lack of a fix")), "{:?}", found.notes);
 }
 
 #[test]
-fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
+fn impossible_jumps_are_refused() {
     for other in ["0,8", "1e-7,0", "-1,-1", "90,0", "47,188"] {
         let text = format!("t,id,lat,lon,alt\n0,a,47,8,400\n0.1,a,47,8,400\n0.2,a,{other},400\n0.3,a,47,8,400\n");
         let error = read(&text, &ReadOptions::default()).expect_err(other);
@@ -206,7 +206,7 @@ fn a_place_that_no_vehicle_reaches_in_the_time_is_refused() {
 }
 
 #[test]
-fn a_vehicle_in_degrees_beside_one_in_metres_is_refused() {
+fn degrees_and_metres_in_one_table_are_refused() {
     for header in ["t,A.lat,A.lon,A.alt,B_x,B_y,B_z", "t,B_x,B_y,B_z,cf1_lat,cf1_lon,cf1_alt,B_lat,B_lon"] {
         let cells = "0,".repeat(header.split(',').count());
         let text = format!("{header}\n{}\n", cells.trim_end_matches(','));
@@ -224,7 +224,7 @@ fn a_vehicle_in_degrees_beside_one_in_metres_is_refused() {
 }
 
 #[test]
-fn files_of_one_vehicle_each_are_measured_from_one_origin() {
+fn joined_files_share_one_origin() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, ([lat, lon, alt], _)) in ["a.csv", "b.csv"].iter().zip(KNOWN) {
         fs::write(folder.path().join(name), format!("t,lat,lon,alt\n0,{lat},{lon},{alt}\n")).expect("written");
@@ -237,14 +237,14 @@ fn files_of_one_vehicle_each_are_measured_from_one_origin() {
     assert!((found.samples()[1].2[0] - KNOWN[1].1[0]).abs() < 2.0 * ROUNDING_M, "{:?}", found.samples());
 }
 
-/// A fix at a time \[s\]: status -1 is none.
+/// Returns a fix at a time \[s\]; status -1 means no fix.
 fn fix(second: i32, status: i8, [latitude, longitude, height]: [f64; 3]) -> Vec<u8> {
     let position = ((latitude, longitude, height), [0.0; 9], 2_u8);
     cdr(&(((SEC + second, 0), "gps"), (status, 1_u16), position), second % 2 == 0)
 }
 
 #[test]
-fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
+fn nav_sat_fixes_are_read_unless_status_is_no_fix() {
     let kind = "sensor_msgs/msg/NavSatFix";
     let nan = f64::NAN;
     let mut messages: Vec<_> =
@@ -253,7 +253,7 @@ fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
     messages.insert(1, ("/r1/fix", kind, "cdr", 1, fix(-1, 0, [47.0, 8.0, nan])));
     let found = read_bytes("gps.mcap", &mcap_of(&messages), &ReadOptions::default()).expect("read");
     assert_eq!(found.vehicles, ["/r1/fix"]);
-    is_known(&found);
+    assert_known(&found);
     messages.push(("/r1/fix", kind, "cdr", 1, fix(9 * APART_S, 0, [nan, 8.0, 1.0])));
     let refused = |messages: &[Message], options: &ReadOptions| {
         read_bytes("gps.mcap", &mcap_of(messages), options).expect_err("refused")
@@ -266,5 +266,5 @@ fn fixes_of_satellites_are_read_and_none_where_there_is_none() {
     let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default());
     assert_refused(&error, "recording/several-frames", "message 2 on topic `/r2/pose`");
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
-    assert_eq!(refused(&[pose], &origin).help(), "leave --origin away");
+    assert_eq!(refused(&[pose], &origin).help(), "omit --origin");
 }

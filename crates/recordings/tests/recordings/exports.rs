@@ -1,4 +1,4 @@
-//! What is exported is read back to the last bit.
+//! Exports round-trip bit for bit.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn folder_with(name: &str, content: &str) -> (TempDir, PathBuf) {
     (folder, path)
 }
 
-/// Everything that must come back, bit by bit.
+/// Returns all exported values as bits.
 fn bits(whole: &Whole) -> Vec<(u64, String, Vec<u64>)> {
     let item = |item: &Item| {
         let Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s, radius_m }) = item else {
@@ -41,7 +41,7 @@ fn bits(whole: &Whole) -> Vec<(u64, String, Vec<u64>)> {
     whole.items.iter().map(item).collect()
 }
 
-/// Numbers that use all their bits, a vehicle that comes late, one without a velocity, and odd names.
+/// Returns a table with numbers that use all bits, a late vehicle, a vehicle without velocity, and unusual names.
 fn awkward(first_time: &str, more_time: &str) -> String {
     [
         "t_s,id,x,y,z,vx,vy,vz,radius\n",
@@ -54,7 +54,7 @@ fn awkward(first_time: &str, more_time: &str) -> String {
 }
 
 #[test]
-fn every_format_gives_back_the_same_bits() {
+fn every_format_round_trips_bit_for_bit() {
     for (first, more) in [
         ("0.1", "0.30000000000000004"),
         ("-3.5", "0"),
@@ -76,7 +76,7 @@ fn every_format_gives_back_the_same_bits() {
 }
 
 #[test]
-fn a_chain_through_all_formats_loses_nothing() {
+fn chain_of_exports_is_lossless() {
     let rows: Vec<_> = (0..3000)
         .map(|k| {
             let (time, phase) = (f64::from(k / 3) / 60.0, f64::from(k));
@@ -95,7 +95,7 @@ fn a_chain_through_all_formats_loses_nothing() {
 }
 
 #[test]
-fn as_many_times_as_vehicles_come_back_in_their_places() {
+fn square_arrays_keep_their_axes() {
     let (folder, source) = folder_with("source.csv", "t_s,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n1,1,7,8,9\n1,2,10,11,12\n");
     let target = folder.path().join("target.npz");
     export(&source, &target, Format::NPZ, &ExportOptions::default()).expect("exported");
@@ -103,7 +103,7 @@ fn as_many_times_as_vehicles_come_back_in_their_places() {
 }
 
 #[test]
-fn a_changed_bit_is_seen() {
+fn bit_comparison_detects_one_changed_bit() {
     let (_folder, source) = folder_with("source.csv", &awkward("0", "1"));
     let mut changed = whole(&source);
     let truth = bits(&changed);
@@ -115,7 +115,7 @@ fn a_changed_bit_is_seen() {
 const PARABOLA: &str = "duration,x^0,x^1,x^2,y^0,y^1,y^2,z^0,z^1,z^2\n2,1,2,3,0,0,0,1,0,0\n";
 
 #[test]
-fn curves_are_sampled_only_where_it_is_asked_for() {
+fn curves_require_a_sampling_rate() {
     let (folder, source) = folder_with("cf1.csv", PARABOLA);
     let target = folder.path().join("target.csv");
     let refused = export(&source, &target, Format::CSV, &ExportOptions::default()).expect_err("refused");
@@ -130,7 +130,7 @@ fn curves_are_sampled_only_where_it_is_asked_for() {
 }
 
 #[test]
-fn the_end_of_every_curve_is_sampled() {
+fn end_of_every_curve_is_sampled() {
     let folder = tempfile::tempdir().expect("a folder");
     let curves = folder.path().join("curves");
     fs::create_dir(&curves).expect("a folder");
@@ -145,7 +145,7 @@ fn the_end_of_every_curve_is_sampled() {
 }
 
 #[test]
-fn samples_are_not_sampled_again_and_odd_rates_are_refused() {
+fn resampling_and_invalid_rates_are_refused() {
     let (folder, samples) = folder_with("source.csv", &awkward("0", "1"));
     let target = folder.path().join("target.csv");
     let at = |hz| ExportOptions { sample_hz: Some(hz) };

@@ -1,4 +1,4 @@
-//! Every format gives the motion that was written into it, and has a row in the table of formats in docs/recordings.md.
+//! Every format is read with the motion that was written, and has a row in docs/recordings.md.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::recording::Whole;
 
-/// A file of a folder that lives as long as the test.
+/// File in a temporary folder that lives as long as the value.
 struct File {
     _folder: TempDir,
     path: PathBuf,
@@ -31,7 +31,7 @@ fn read_with(name: &str, bytes: impl AsRef<[u8]>, options: &ReadOptions) -> Whol
     Whole::read(&file(name, bytes).path, options).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Two vehicles at two times, as every table below says it.
+/// Two vehicles at two times, equal in all tables below.
 const TRUTH: [(f64, &str, [f64; 3]); 4] = [
     (0.0, "1", [1.0, 2.0, 3.0]),
     (0.0, "2", [-1.5, 0.25, 1e-3]),
@@ -42,7 +42,7 @@ const TRUTH: [(f64, &str, [f64; 3]); 4] = [
 const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,-1.5,0.25,1e-3\n0.5,1,1.5,2,3\n0.5,2,-1,0.25,2e-3\n";
 
 #[test]
-fn tables_of_every_shape_say_the_same() {
+fn tables_of_every_shape_are_equivalent() {
     let swapped = "id,z,y,x,t\n1,3,2,1,0\n2,1e-3,.25,-1.5,0\n1,3,2,1.5,.5\n2,2e-3,.25,-1,.5\n";
     let wide = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,-1,.25,2e-3\n";
     let named = "time [s],1.x,1.y,1.z,2.x,2.y,2.z\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,-1,.25,2e-3\n";
@@ -70,7 +70,7 @@ fn tables_of_every_shape_say_the_same() {
 }
 
 #[test]
-fn rows_out_of_order_are_sorted_and_it_is_said() {
+fn unordered_rows_are_sorted_with_a_note() {
     let grouped = "t,id,x,y,z\n0,1,1,2,3\n0.5,1,1.5,2,3\n0,2,-1.5,0.25,1e-3\n0.5,2,-1,0.25,2e-3\n";
     let whole = read("grouped.csv", grouped);
     assert_eq!(whole.samples(), TRUTH);
@@ -79,20 +79,20 @@ fn rows_out_of_order_are_sorted_and_it_is_said() {
 }
 
 #[test]
-fn times_that_differ_by_less_than_a_double_are_sorted_too() {
+fn times_closer_than_double_precision_are_sorted() {
     let whole = read("fine.csv", "t,id,x,y,z\n1700000000.00000005,a,1,0,0\n1700000000,b,2,0,0\n");
     assert_eq!(whole.samples(), [(0.0, "b", [2.0, 0.0, 0.0]), (5e-8, "a", [1.0, 0.0, 0.0])]);
 }
 
 #[test]
-fn a_name_may_begin_with_a_hash_and_comments_stand_above_the_header() {
+fn names_may_begin_with_a_hash_below_the_header() {
     let whole = read("hash.csv", "# made up\nid,t_s,x,y,z\nleader,0,0,0,0\n#2,0,0,0,0\n");
     assert_eq!(whole.vehicles, ["leader", "#2"]);
     assert_eq!(read("hash.txt", "# up\n0 1.5 2 3\n# down\n1 1.5 2 3\n").items.len(), 2);
 }
 
 #[test]
-fn vehicles_with_numbers_come_in_their_order_and_others_as_they_appear() {
+fn numeric_vehicle_names_are_sorted() {
     let vehicles = |ids: [&str; 3]| {
         let rows = ids.map(|id| format!("0,{id},1,2,3\n")).concat();
         read("ids.csv", format!("t,id,x,y,z\n{rows}")).vehicles
@@ -102,7 +102,7 @@ fn vehicles_with_numbers_come_in_their_order_and_others_as_they_appear() {
 }
 
 #[test]
-fn velocities_and_radii_are_read_where_they_are_known() {
+fn velocities_and_radii_are_optional() {
     let whole = read("more.csv", "t,id,x,y,z,vx,vy,vz,radius\n0,a,1,2,3,4,5,6,0.1\n0,b,1,2,3,,,,\n");
     let known = |item: &Item| match item {
         Item::Sample(sample) => (sample.velocity_m_s.map(Into::into), sample.radius_m),
@@ -113,25 +113,28 @@ fn velocities_and_radii_are_read_where_they_are_known() {
 }
 
 #[test]
-fn a_vehicle_that_is_not_seen_has_no_sample() {
+fn unseen_vehicle_has_no_sample() {
     let whole = read("late.csv", "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,,,\n0.5,1,2,3,4,5,6\n");
     let seen: Vec<_> = whole.samples().iter().map(|&(t, name, _)| (t, name.to_owned())).collect();
     assert_eq!(seen, [(0.0, "1".to_owned()), (0.5, "1".to_owned()), (0.5, "2".to_owned())]);
 }
 
 #[test]
-fn without_z_everything_is_in_a_plane_and_it_is_said() {
+fn table_without_z_is_planar_with_a_note() {
     let whole = read("flat.csv", "t,id,x,y\n0,1,1,2\n");
     assert_eq!(whole.samples(), [(0.0, "1", [1.0, 2.0, 0.0])]);
     assert!(
-        whole.notes.iter().any(|note| note.contains("no column for the height: the recording is judged in the plane")),
+        whole
+            .notes
+            .iter()
+            .any(|note| note.contains("no column gives the height: the recording is judged in the plane")),
         "{:?}",
         whole.notes
     );
 }
 
 #[test]
-fn names_of_columns_unit_and_scale_can_be_given() {
+fn column_names_unit_and_scale_options_are_used() {
     let mut options =
         ReadOptions { time_unit: Some(TimeUnit::Milliseconds), scale: Some(0.01.into()), ..ReadOptions::default() };
     for (role, name) in [("t", "clock"), ("id", "who"), ("x", "east"), ("y", "north"), ("z", "up")] {
@@ -144,7 +147,7 @@ fn names_of_columns_unit_and_scale_can_be_given() {
 }
 
 #[test]
-fn a_unit_in_the_name_of_the_column_is_known_and_any_other_is_said() {
+fn inferred_time_unit_is_noted() {
     let named = read("named.csv", "time_ms,id,x,y,z\n0,1,1,2,3\n500,1,1,2,3\n");
     assert_eq!((named.clock.unit, named.clock.inferred, named.samples()[1].0), ("ms", false, 0.5));
     let inferred = read("unsaid.csv", "t,id,x,y,z\n0,1,1,2,3\n20000000,1,1,2,3\n");
@@ -153,7 +156,7 @@ fn a_unit_in_the_name_of_the_column_is_known_and_any_other_is_said() {
 }
 
 #[test]
-fn more_rows_than_a_batch_come_in_order_and_complete() {
+fn rows_across_batches_are_complete_and_ordered() {
     const ROWS: usize = 25_001;
     let rows: Vec<_> = (0..ROWS).map(|k| format!("{},{},{k},0,0\n", (k / 3) as f64 * 0.25, k % 3 + 1)).collect();
     let whole = read("many.csv", ["t,id,x,y,z\n", &rows.concat()].concat());
@@ -163,7 +166,7 @@ fn more_rows_than_a_batch_come_in_order_and_complete() {
 }
 
 #[test]
-fn the_table_of_formats_in_the_docs_has_a_row_for_each_reader() {
+fn docs_list_every_reader() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recordings.md");
     let docs = fs::read_to_string(path).expect("the page");
     let row = |Reader { name, extensions, docs, .. }: &Reader| {
@@ -179,7 +182,7 @@ fn the_table_of_formats_in_the_docs_has_a_row_for_each_reader() {
 }
 
 #[test]
-fn names_of_readers_differ() {
+fn reader_names_are_distinct() {
     let names: BTreeSet<_> = READERS.iter().map(|reader| reader.name).collect();
     assert_eq!(names.len(), READERS.len());
 }

@@ -1,4 +1,4 @@
-//! Heights are read where a column names them, and known to be missing everywhere else.
+//! Heights are read from named columns; otherwise the recording is planar.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ fn read(text: &str, options: &ReadOptions) -> Result<Whole, ReadError> {
     read_bytes("flight.csv", text.as_bytes(), options)
 }
 
-/// A table of a row, whose cells are 1, 2, 3, ...
+/// Returns a table with one row whose cells are 1, 2, 3, ...
 fn row(header: &str) -> String {
     let cells: Vec<_> = (1..=header.split(',').count()).map(|number| number.to_string()).collect();
     format!("{header}\n{}\n", cells.join(","))
@@ -28,7 +28,7 @@ fn has_note(found: &Whole, note: &str) {
 }
 
 #[test]
-fn columns_that_name_a_height_are_read_and_said() {
+fn height_columns_are_read_with_a_note() {
     for name in [
         "alt",
         "Altitude",
@@ -49,7 +49,7 @@ fn columns_that_name_a_height_are_read_and_said() {
     ] {
         let found = read(&row(&format!("t,id,x,y,{name}")), &ReadOptions::default()).expect(name);
         assert_eq!(found.samples()[0].2, [3.0, 4.0, 5.0], "{name}");
-        has_note(&found, &format!("heights are those of column `{name}`"));
+        has_note(&found, &format!("heights are read from column `{name}`"));
     }
     for (name, z) in [("depth", -5.0), ("down", -5.0), ("pos_down", -5.0), ("depth_cm", -0.05), ("alt [ft]", 1.524)] {
         let unit =
@@ -58,13 +58,13 @@ fn columns_that_name_a_height_are_read_and_said() {
         let found = read(&row(&header), &ReadOptions::default()).expect(name);
         assert!((found.samples()[0].2[2] - z).abs() < 1e-12, "{name}: {:?}", found.samples());
     }
-    // Of a wide table too, each vehicle's own.
+    // Wide tables have a height column per vehicle.
     let wide = whole("flight.csv", row("t,a.x,a.y,a.alt,b.x,b.y,b.alt").as_bytes());
     assert_eq!(wide.samples(), [(1.0, "a", [2.0, 3.0, 4.0]), (1.0, "b", [5.0, 6.0, 7.0])]);
 }
 
 #[test]
-fn no_other_column_is_taken_for_a_height() {
+fn other_columns_are_not_heights() {
     let path = tempfile::tempdir().expect("a folder");
     let file = path.path().join("flight.csv");
     for header in ["t,id,x,y", "t,id,x,y,alt_setpoint", "t,id,x,y,ground_height", "t,x1,y1,x2,y2,alt", "t,id,x,y,upper"]
@@ -76,14 +76,14 @@ fn no_other_column_is_taken_for_a_height() {
         fs::write(&file, row(header)).expect("written");
         assert!(!is_planar(&file), "{header}");
     }
-    // z goes before what is called a height.
+    // `z` takes precedence over height columns.
     let both = whole("flight.csv", row("t,id,x,y,alt,z").as_bytes());
     assert_eq!(both.samples()[0].2, [3.0, 4.0, 6.0]);
     has_note(&both, "columns not used: alt");
 }
 
 #[test]
-fn two_heights_are_asked_about() {
+fn two_height_columns_are_refused() {
     for header in ["t,id,x,y,geoaltitude,baroaltitude", "t,id,lat,lon,baroaltitude,geoaltitude", "t,id,x,y,up,down"] {
         let refused = read(&row(header), &ReadOptions::default()).expect_err(header);
         assert_refused(&refused, "recording/ambiguous-column", "line 1");
@@ -100,7 +100,7 @@ fn two_heights_are_asked_about() {
 }
 
 #[test]
-fn where_a_height_is_missing_none_is_known_in_any_format() {
+fn recording_without_some_height_is_planar_in_every_format() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let text = "t,id,x,y,vx,vy\n0,a,1,2,0.5,0.25\n0,b,3,4,0,0\n1,a,1.5,2.25,0.5,0.25\n1,b,3,4,0,0\n";
@@ -108,7 +108,7 @@ fn where_a_height_is_missing_none_is_known_in_any_format() {
     fs::write(path("plain.txt"), "0 1 2 3 4\n1 1 2 3 4\n").expect("written");
     fs::write(path("rvo.txt"), "0 (1,2) (-3,4.5)\n0.25 (1.5, 2) (-3,4)\n").expect("written");
     fs::write(path("earth.csv"), "t,id,lat,lon\n0,a,47,8\n0,b,47.1,8\n").expect("written");
-    // A height of one vehicle is none of the other.
+    // One vehicle has no height.
     fs::write(path("half.csv"), "t,a.x,a.y,a.z,b.x,b.y\n0,1,2,300,3,4\n").expect("written");
     for name in ["flat.csv", "rvo.txt", "earth.csv", "half.csv"] {
         assert!(is_planar(&path(name)), "{name}");
@@ -116,8 +116,8 @@ fn where_a_height_is_missing_none_is_known_in_any_format() {
         assert!(found.samples().iter().all(|(_, _, position)| position[2] == 0.0), "{name}: {:?}", found.samples());
     }
     let half = Whole::read(&path("half.csv"), &ReadOptions::default()).expect("read");
-    has_note(&half, "no column for the height of `b`: the recording is judged in the plane");
-    // What is exported has no height either, and is the same.
+    has_note(&half, "no column gives the height of `b`: the recording is judged in the plane");
+    // Exports have no height either.
     let truth = Whole::read(&path("flat.csv"), &ReadOptions::default()).expect("read");
     for &format in export::WRITTEN {
         let to = path(&format!("exported.{}", format.name));
@@ -135,7 +135,7 @@ fn where_a_height_is_missing_none_is_known_in_any_format() {
 }
 
 #[test]
-fn a_file_without_heights_takes_them_from_its_folder() {
+fn one_file_without_heights_makes_the_folder_planar() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.csv"), "t,x,y,z\n0,1,2,300\n1,1,2,300\n").expect("written");
     fs::write(folder.path().join("b.csv"), "t,x,y\n0,1,2\n1,1,2\n").expect("written");

@@ -1,4 +1,4 @@
-//! Rows are of the vehicle that they name, or the recording is refused.
+//! Rows are assigned to the vehicle that they name, or the recording is refused.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -22,7 +22,7 @@ fn by_column(text: &str, column: &str) -> Result<Whole, ReadError> {
     read_bytes("flight.csv", text.as_bytes(), &options)
 }
 
-/// A folder of these files.
+/// Reads a folder with these files.
 fn folder(files: &[(&str, &str)]) -> Result<Whole, ReadError> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, content) in files {
@@ -31,7 +31,7 @@ fn folder(files: &[(&str, &str)]) -> Result<Whole, ReadError> {
     Whole::read(folder.path(), &ReadOptions::default())
 }
 
-/// Asserts that a recording is refused with this code, and that the message or the remedy contains these names.
+/// Asserts that a recording is refused with this code, and that the message or remedy contains these names.
 #[track_caller]
 fn is_refused(found: Result<Whole, ReadError>, code: &str, names: &[&str]) {
     let error = match found {
@@ -45,7 +45,7 @@ fn is_refused(found: Result<Whole, ReadError>, code: &str, names: &[&str]) {
     }
 }
 
-/// Rows of some vehicles, 5 m apart, one after the other in time.
+/// Returns rows of several vehicles, 5 m apart, interleaved in time.
 fn interleaved(header: &str, names: &[&str], times: usize) -> String {
     let mut text = format!("{header}\n");
     for row in 0..times * names.len() {
@@ -58,7 +58,7 @@ fn interleaved(header: &str, names: &[&str], times: usize) -> String {
 
 const ALONE: &str = "t,x,y\n0,50,50\n1,50,50\n2,50,50\n";
 
-/// What columns of vehicles are called.
+/// Names of vehicle columns.
 const NAMES: [&str; 44] = [
     "mmsi",
     "icao24",
@@ -107,7 +107,7 @@ const NAMES: [&str; 44] = [
 ];
 
 #[test]
-fn common_names_of_vehicles_are_read_as_such() {
+fn common_vehicle_column_names_are_recognised() {
     for name in NAMES {
         let header = format!("t,{name},x,y");
         let found = read(&interleaved(&header, &["205", "211"], 3)).expect(name);
@@ -122,29 +122,29 @@ fn common_names_of_vehicles_are_read_as_such() {
 }
 
 #[test]
-fn vehicles_under_a_name_that_nobody_knows_are_not_merged() {
+fn vehicles_under_unknown_columns_are_not_merged() {
     let alone = ("b.csv", ALONE);
     for times in [2, 3, 40] {
         for names in [&["1", "2"][..], &["alpha", "bravo", "charlie"], &["7", "9", "11", "13"], &["1.0", "2.0"]] {
             let file = interleaved("t,whose,x,y", names, times);
             is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["a.csv", "--column id=whose"]);
-            // The one name of all rows that is known does not hide it.
+            // A known name column with a single value does not hide it.
             let file = interleaved("t,whose,x,y,id", names, times).replace('\n', ",cf1\n").replacen(",cf1", "", 1);
             is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["`whose`"]);
         }
     }
-    // In parts of ten rows.
+    // The same in blocks of ten rows.
     let parts: Vec<_> = (0..200).map(|k| if k / 10 % 2 == 0 { "p" } else { "q" }).collect();
     let rows = parts.iter().enumerate().map(|(k, part)| format!("{k},{part},0,{}\n", if *part == "p" { 0 } else { 7 }));
     let file = format!("t_s,whose,x,y\n{}", rows.collect::<String>());
     is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["`whose`"]);
-    // One after the other: time starts again.
+    // The same in sequence, with time restarting.
     let file = "t,whose,x,y\n0,p,0,0\n1,p,0,0\n2,p,0,0\n0,q,9,0\n1,q,9,0\n2,q,9,0\n";
     is_refused(folder(&[("a.csv", file), alone]), SEVERAL, &["`whose`"]);
 }
 
 #[test]
-fn what_one_vehicle_measures_is_no_name() {
+fn measurements_are_not_vehicle_names() {
     let rows = |value: &dyn Fn(usize) -> String| {
         let place = |k: usize| (k as f64 / 9.0).sin();
         (0..200)
@@ -171,21 +171,21 @@ fn what_one_vehicle_measures_is_no_name() {
 const NUMBERED: &str = "id,timestamp,drone,x,y,z\n1,0.0,a,0,0,0\n2,0.0,b,2,0,0\n3,0.5,a,1,0,0\n4,0.5,b,1,0,0\n";
 
 #[test]
-fn a_column_that_numbers_rows_names_no_vehicle() {
+fn row_numbers_are_not_vehicle_names() {
     is_refused(read(NUMBERED), AMBIGUOUS, &["`id`", "`drone`"]);
     is_refused(read(&NUMBERED.replace("drone", "whose")), AMBIGUOUS, &["`id`", "`whose`"]);
     assert_eq!(by_column(NUMBERED, "drone").expect("read").vehicles, ["a", "b"]);
-    // One instant of several vehicles, or one that the user names.
+    // Accepted for one instant of several vehicles, or if the user names the column.
     let instant = "t,id,x,y\n0,1,0,0\n0,2,5,0\n0,3,9,0\n";
     assert_eq!(read(instant).expect("read").vehicles.len(), 3);
     assert_eq!(by_column(NUMBERED, "id").expect("read").vehicles.len(), 4);
 }
 
 #[test]
-fn two_columns_of_names_agree_or_are_asked_about() {
+fn contradictory_name_columns_are_refused() {
     let table = |rows: &[&str]| format!("t,id,callsign,x,y\n{}\n", rows.join("\n"));
     for rows in [
-        // A value of one of them is of two of the other.
+        // A value of one column belongs to two values of the other.
         &["0,1,A,0,0", "0,2,B,5,0", "1,1,B,0,0", "1,2,A,5,0"][..],
         &["0,1,A,0,0", "0.5,1,B,5,0", "1,1,A,0,0", "1.5,1,B,5,0"],
         &["0,1,A,0,0", "0,2,A,5,0", "0,3,B,9,0", "1,1,A,0,0"],
@@ -203,7 +203,7 @@ fn two_columns_of_names_agree_or_are_asked_about() {
 }
 
 #[test]
-fn a_name_that_is_spelled_in_two_ways_is_refused() {
+fn two_spellings_of_a_name_are_refused() {
     for [first, second] in
         [["1", "1.0"], ["Cf1", "cf1"], ["7", "007"], ["UAV-a", "uav-A"], ["cf1", "cf01"], ["cf-1", "cf_1"]]
     {
@@ -218,7 +218,7 @@ fn a_name_that_is_spelled_in_two_ways_is_refused() {
         }
         let (a, b) = (format!("{first}.csv"), format!("{second}.csv"));
         is_refused(folder(&[(&a, ALONE), (&b, ALONE)]), TWICE, &[]);
-        // By what the rows of files say.
+        // The same by the names in the rows of joined files.
         let file = |name: &str| format!("t,id,x,y\n0,{name},0,0\n1,{name},0,0\n");
         let files = [("p.csv", file(first)), ("q.csv", file(second)), ("r.csv", file("other"))];
         let files: Vec<_> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
@@ -228,18 +228,18 @@ fn a_name_that_is_spelled_in_two_ways_is_refused() {
         let rows = format!("t,id,x,y\n0,{first},0,0\n0,{second},5,0\n1,{first},0,0\n1,{second},5,0\n");
         assert_eq!(read(&rows).expect("read").vehicles.len(), 2, "{first} {second}");
     }
-    // What all files say of their rows is no name of one of them.
+    // A name shared by all files is not a vehicle name.
     let file = "t,child_frame_id,x,y\n0,base_link,0,0\n1,base_link,0,0\n";
     assert_eq!(folder(&[("r1.csv", file), ("r2.csv", file)]).expect("read").vehicles, ["r1", "r2"]);
 }
 
 #[test]
-fn rows_that_go_back_may_be_of_several_vehicles_or_of_a_clock_that_was_set() {
+fn decreasing_time_may_mean_several_vehicles_or_a_clock_change() {
     let options = ["--column id=NAME", "--sort"];
     is_refused(read("t,id,x,y\n0,a,0,0\n2,a,2,0\n1,a,1,0\n"), "recording/time-backwards", &options);
     let files = [("a.csv", "t,x,y\n0,0,0\n2,2,0\n1,1,0\n"), ("b.csv", ALONE)];
     is_refused(folder(&files), "recording/time-backwards", &options);
-    // Sorting does not hide vehicles that a column tells apart; the user may know that it does not.
+    // Sorting does not hide vehicles that a column distinguishes, unless the user overrides it.
     let merged = "t,whose,x,y\n0,p,0,0\n1,p,0,0\n2,p,0,0\n0,q,9,0\n1,q,9,0\n2,q,9,0\n";
     let files = tempfile::tempdir().expect("a folder");
     fs::write(files.path().join("a.csv"), merged).expect("written");
@@ -252,7 +252,7 @@ fn rows_that_go_back_may_be_of_several_vehicles_or_of_a_clock_that_was_set() {
     assert_eq!(Whole::read(files.path(), &known).expect("read").vehicles, ["a", "b"]);
 }
 
-/// Rows of team 1, in which two vehicles cross, and of team 2, which is alone and far away.
+/// Returns rows of team 1, with two crossing vehicles, and of team 2, with one vehicle far away.
 fn teams(column: &str, serials: [&str; 2]) -> String {
     let mut text = format!("t,id,{column},x,y,z\n");
     for k in 0..=20 {
@@ -265,19 +265,19 @@ fn teams(column: &str, serials: [&str; 2]) -> String {
 }
 
 #[test]
-fn a_name_that_several_vehicles_share_is_refused_beside_other_names() {
+fn shared_vehicle_name_is_refused() {
     for (column, serials) in [("drone_serial", ["a", "b"]), ("whose", ["11", "12"]), ("whose", ["1.5", "2.5"])] {
         let table = teams(column, serials);
         is_refused(read(&table), SEVERAL, &["vehicle `1`", &format!("`{column}`")]);
         assert_eq!(by_column(&table, "id").expect("the user says so").vehicles.len(), 2);
     }
-    // One vehicle of each name, with a measurement that changes as often.
+    // One vehicle per name, with a measurement that changes at the same rate.
     let steady = teams("whose", ["a", "b"]).lines().filter(|line| !line.contains(",b,")).collect::<Vec<_>>().join("\n");
     assert_eq!(read(&steady).expect("read").vehicles.len(), 2);
 }
 
 #[test]
-fn a_column_that_repeats_another_is_refused_in_wide_tables_too() {
+fn repeated_columns_of_wide_tables_are_refused() {
     for header in ["t,A_x,A_y,A_z,A_x.1,A_y.1,A_z.1,C_x,C_y,C_z", "t,A.x,A.y,A.z,A.x.1,A.y.1,A.z.1,C.x,C.y,C.z"] {
         let table = format!("{header}\n0,-5,0,1,5,0,1,50,0,0\n1,0,0,1,0,0,1,50,0,0\n2,5,0,1,-5,0,1,50,0,0\n");
         is_refused(read(&table), "recording/ambiguous-column", &[]);
@@ -287,7 +287,7 @@ fn a_column_that_repeats_another_is_refused_in_wide_tables_too() {
 }
 
 #[test]
-fn vehicles_of_a_file_that_have_fractional_names_are_told_apart() {
+fn fractional_vehicle_names_are_distinguished() {
     for count in [2, 3, 5, 10] {
         let names: Vec<_> = (1..=count).map(|k| format!("{k}.5")).collect();
         let names: Vec<_> = names.iter().map(String::as_str).collect();
@@ -297,7 +297,7 @@ fn vehicles_of_a_file_that_have_fractional_names_are_told_apart() {
 }
 
 #[test]
-fn groups_of_columns_that_are_named_in_each_row_are_vehicles_by_these_names() {
+fn column_groups_with_name_columns_use_these_names() {
     let head_on = |header: &str| {
         let rows = (0..10).map(|k| {
             let [low, high] = if k < 5 { [("a", k), ("b", 9 - k)] } else { [("b", 9 - k), ("a", k)] };
@@ -325,7 +325,7 @@ fn groups_of_columns_that_are_named_in_each_row_are_vehicles_by_these_names() {
 }
 
 #[test]
-fn columns_of_a_further_vehicle_are_not_dropped() {
+fn columns_of_a_further_vehicle_are_refused() {
     for more in ["x 3,y 3,z 3", "x-3,y-3,z-3", "3x,3y,3z", "p3x,p3y,p3z", "xc,yc,zc", "x_c,y_c,z_c", "c:x,c:y,c:z"] {
         let error = read(&format!("t,x1,y1,z1,x2,y2,z2,{more}\n0,1,2,3,4,5,6,7,8,9\n")).expect_err(more);
         assert_refused(&error, "recording/ambiguous-column", "line 1");
@@ -340,15 +340,15 @@ fn columns_of_a_further_vehicle_are_not_dropped() {
 }
 
 #[test]
-fn quantities_of_a_vehicle_are_no_names_and_no_further_vehicles() {
-    // A course over ground, a type of vehicle, attitudes and accelerations beside positions.
+fn quantities_are_neither_names_nor_vehicles() {
+    // Course over ground, vehicle type, attitudes and accelerations beside positions.
     for [first, second] in [["track", "model"], ["ax", "ay"], ["qx", "qy"], ["tx", "ty"], ["xdot", "ydot"]] {
         let header = format!("t_s,m.x,m.y,m.{first},m.{second},n.x,n.y,n.{first},n.{second}");
         let rows: Vec<_> = (0..4).map(|k| format!("{k},{k},0,{k}.5,1,9,{k},{k}.25,1")).collect();
         let found = read(&format!("{header}\n{}\n", rows.join("\n"))).expect(first);
         assert_eq!(found.vehicles, ["m", "n"], "{first}");
     }
-    // Words that may be names are refused where their values change places, and so are names that never come again.
+    // Possible names are refused if they are exchanged between rows, or never repeat.
     let moved = "t_s,m.x,m.y,m.track,n.x,n.y,n.track\n0,0,0,a,9,0,b\n1,8,0,b,1,0,a\n";
     assert_refused(&read(moved).expect_err("change places"), AMBIGUOUS, "line 3");
     let new = "t_s,m.x,m.y,m.id,n.x,n.y,n.id\n0,0,0,1,9,0,2\n1,8,0,3,1,0,4\n2,8,0,5,1,0,6\n";

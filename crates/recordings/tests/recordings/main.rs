@@ -1,27 +1,27 @@
-//! Recordings of any origin read, written and exported.
+//! Tests of reading, writing and exporting recordings.
 
 mod recording;
 
-mod any_bytes;
+mod ambiguous_messages;
 mod axes;
-mod beside;
 mod capture;
+mod channels;
 mod clocks;
 mod columns;
 mod containers;
-mod doors;
+mod data_sets;
 mod earth;
 mod exports;
 mod formats;
+mod fuzz;
 mod heights;
 mod identity;
 mod messages;
-mod own;
-mod own_channels;
 mod parquet;
 mod refusals;
 mod ros;
+mod run_channels;
+mod run_recording;
 mod stored_audit;
-mod told_apart;
 mod ulog;
 mod vehicles;

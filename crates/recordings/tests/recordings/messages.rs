@@ -1,4 +1,4 @@
-//! Messages of others, as bytes of an MCAP file.
+//! Builders of messages and MCAP files.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,7 +22,7 @@ pub(crate) fn whole(name: &str, bytes: &[u8]) -> Whole {
     read_bytes(name, bytes, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A message: topic, schema, encoding, time of logging \[ns\], content.
+/// Message: topic, schema, encoding, log time \[ns\], content.
 pub(crate) type Message = (&'static str, &'static str, &'static str, u64, Vec<u8>);
 
 pub(crate) fn mcap_of(messages: &[Message]) -> Vec<u8> {
@@ -41,7 +41,7 @@ pub(crate) fn mcap_with(options: mcap::WriteOptions, messages: &[Message]) -> Ve
     out.into_inner().into_inner()
 }
 
-/// CDR as ROS 2 writes it, in either byte order.
+/// Encodes CDR as ROS 2 does, in either byte order.
 pub(crate) fn cdr(message: &impl Serialize, little: bool) -> Vec<u8> {
     let mut bytes = vec![0, u8::from(little), 0, 0];
     if little {
@@ -54,7 +54,7 @@ pub(crate) fn cdr(message: &impl Serialize, little: bool) -> Vec<u8> {
 
 pub(crate) type Stamp = (i32, u32);
 pub(crate) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
-/// A time that a double in nanoseconds would not keep.
+/// Time \[s\] at which a double in nanoseconds would lose digits.
 pub(crate) const SEC: i32 = 1_700_000_000;
 
 pub(crate) fn header(nanosec: u32) -> (Stamp, &'static str) {

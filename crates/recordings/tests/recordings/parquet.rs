@@ -1,4 +1,4 @@
-//! Columns of Parquet are read as what their types say they are, or refused.
+//! Parquet columns are read by their logical types, or refused.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,7 +13,7 @@ use tautline_recordings::read::{ReadError, ReadOptions};
 
 use crate::recording::{Whole, assert_refused};
 
-/// The cells of a column.
+/// Cells of a column.
 enum Cells {
     Real([f64; 2]),
     Int([i32; 2]),
@@ -43,7 +43,7 @@ fn write(path: &Path, columns: &[(&str, Cells)], packed: Compression) {
     writer.close().expect("closed");
 }
 
-/// Two rows with this time, vehicle and x.
+/// Reads two rows with this time, vehicle and x.
 fn read(time: (&str, Cells), id: (&str, Cells), x: (&str, Cells)) -> Result<Whole, ReadError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("flight.parquet");
@@ -57,7 +57,7 @@ fn seconds() -> (&'static str, Cells) {
 }
 
 #[test]
-fn whole_numbers_without_a_sign_have_none() {
+fn unsigned_integers_are_read_unsigned() {
     let x = || ("double x", Real([1.0, 2.0]));
     let wide = ("int64 id (INTEGER(64,false))", Long([-1, -1]));
     assert_eq!(read(seconds(), wide, x()).expect("read").vehicles, ["18446744073709551615"]);
@@ -65,7 +65,7 @@ fn whole_numbers_without_a_sign_have_none() {
     assert_eq!(read(seconds(), narrow, x()).expect("read").vehicles, ["7", "4294967295"]);
     let signed = ("int32 id (INTEGER(32,true))", Int([-1, -1]));
     assert_eq!(read(seconds(), signed, x()).expect("read").vehicles, ["-1"]);
-    // Milliseconds across 2^31, where a sign would turn time back.
+    // Milliseconds across 2^31, where signed values would decrease.
     let time = ("int32 t_ms (INTEGER(32,false))", Int([i32::MAX, i32::MIN]));
     let found = read(time, ("int64 id", Long([1, 1])), x()).expect("read");
     let times: Vec<_> = found.samples().iter().map(|sample| sample.0).collect();
@@ -73,7 +73,7 @@ fn whole_numbers_without_a_sign_have_none() {
 }
 
 #[test]
-fn numbers_that_mean_something_else_are_refused() {
+fn decimals_dates_and_times_of_day_are_refused() {
     let id = || ("int64 id", Long([1, 1]));
     for column in [
         ("int32 x (DECIMAL(9,2))", Int([50, 51])),
@@ -90,14 +90,14 @@ fn numbers_that_mean_something_else_are_refused() {
 }
 
 #[test]
-fn a_codec_that_is_not_read_is_named() {
+fn unsupported_codec_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("flight.parquet");
     let columns = [seconds(), ("int64 id", Long([1, 1])), ("double x", Real([0.0; 2])), ("double y", Real([0.0; 2]))];
     write(&path, &columns, Compression::UNCOMPRESSED);
     let whole = fs::read(&path).expect("read");
     assert!(Whole::read(&path, &ReadOptions::default()).is_ok());
-    // The codec of a column stands in the footer behind the path of its name: UNCOMPRESSED is 0, BROTLI 4.
+    // The codec of a column follows its path in the footer: UNCOMPRESSED is 0, BROTLI 4.
     let mut packed = whole.clone();
     let names: Vec<_> = memmem(&whole, b"\x18\x03t_s").collect();
     let codec = names.last().expect("a column") + b"\x18\x03t_s".len();
@@ -106,10 +106,10 @@ fn a_codec_that_is_not_read_is_named() {
     fs::write(&path, packed).expect("written");
     let refused = Whole::read(&path, &ReadOptions::default()).expect_err("refused");
     assert_refused(&refused, "recording/unsupported-compression", "");
-    assert!(refused.to_string().ends_with("column `t_s` is packed by brotli, which is not read"), "{refused}");
+    assert!(refused.to_string().ends_with("column `t_s` is packed by brotli, which is not supported"), "{refused}");
 }
 
-/// Where a text stands in another.
+/// Returns the offsets of a byte string.
 fn memmem<'a>(text: &'a [u8], part: &'a [u8]) -> impl Iterator<Item = usize> + 'a {
     text.windows(part.len()).enumerate().filter(move |(_, window)| *window == part).map(|(at, _)| at)
 }

@@ -1,4 +1,4 @@
-//! Recordings read whole.
+//! Reads recordings as a whole.
 #![allow(dead_code, reason = "each test uses its part")]
 
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use tautline_core::track::{Clock, Item, Sample};
 use tautline_recordings::read::{self, ReadError, ReadOptions};
 
-/// Asserts the code of a refusal and its place in the file, which is empty for a file as a whole.
+/// Asserts the code and the place of an error; the place is empty for a file as a whole.
 #[track_caller]
 pub(crate) fn assert_refused(error: &ReadError, code: &str, place: &str) {
     let found = error.place.as_ref().map(ToString::to_string).unwrap_or_default();
@@ -14,7 +14,7 @@ pub(crate) fn assert_refused(error: &ReadError, code: &str, place: &str) {
     assert!(!error.help().is_empty() && !error.is_machine(), "{error}");
 }
 
-/// Everything that a recording gives.
+/// All items and metadata of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Whole {
     pub(crate) vehicles: Vec<String>,
@@ -34,7 +34,7 @@ impl Whole {
         Ok(Self { vehicles, items, clock, notes, assumed: tracks.assumed().map(str::to_owned) })
     }
 
-    /// The samples as (time, name, position).
+    /// Returns the samples as (time, name, position).
     pub(crate) fn samples(&self) -> Vec<(f64, &str, [f64; 3])> {
         self.items
             .iter()

@@ -1,4 +1,4 @@
-//! Wrong recordings are refused with the file, the place, the value and the remedy.
+//! Invalid recordings are refused with the file, the place, the value and the remedy.
 
 use std::fs::{self, File};
 use std::io::{Cursor, Write as _};
@@ -37,7 +37,7 @@ fn refused_with(name: &str, bytes: &[u8], options: &ReadOptions) -> ReadError {
 const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,1,2,3\n0.5,1,1,2,3\n0.5,2,1,2,3\n";
 
 #[test]
-fn every_wrong_table_is_refused_where_it_is_wrong() {
+fn invalid_tables_are_refused_with_their_place() {
     let change = |from: &str, to: &str| LONG.replacen(from, to, 1);
     let last = |to: &str| change("0.5,2,1,2,3", to);
     for (content, place, code) in [
@@ -84,10 +84,10 @@ fn every_wrong_table_is_refused_where_it_is_wrong() {
 }
 
 #[test]
-fn a_message_names_the_file_the_place_the_value_and_the_remedy() {
+fn messages_name_file_place_value_and_remedy() {
     let text = "t,id,x,y,z,radius\n0,a,1,2,3,1\n1,a,1,2,3,\n";
     let error = refused("flight.csv", text.as_bytes());
-    assert!(error.to_string().ends_with("flight.csv, line 3: vehicle `a` has no radius here and one at line 2"));
+    assert!(error.to_string().ends_with("flight.csv, line 3: vehicle `a` has no radius here, but one at line 2"));
     let error = refused("flight.csv", LONG.replacen("0.5,2,1,2,3", "0.5,2,one,2,3", 1).as_bytes());
     assert!(error.to_string().ends_with("line 5: column `x` holds `one`, which is not a number"), "{error}");
     assert_eq!(error.help(), "write a number with a decimal point");
@@ -96,13 +96,13 @@ fn a_message_names_the_file_the_place_the_value_and_the_remedy() {
 }
 
 #[test]
-fn the_table_that_the_wrong_ones_are_made_of_is_read() {
+fn unmodified_table_is_read() {
     let (_folder, path) = written("flight.csv", LONG.as_bytes());
     assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("read").items.len(), 4);
 }
 
 #[test]
-fn what_is_no_recording_is_refused() {
+fn other_files_are_refused() {
     assert!(matches!(refused("nothing.csv", b"").fault, Fault::Empty));
     assert!(matches!(refused("picture.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").fault, Fault::UnknownFormat));
     assert!(matches!(refused("wide.txt", b"\xff\xfet\0,\0").fault, Fault::NotUtf8));
@@ -116,7 +116,7 @@ fn what_is_no_recording_is_refused() {
 }
 
 #[test]
-fn a_line_of_ten_megabytes_is_refused_and_one_below_the_limit_is_not() {
+fn line_length_is_limited() {
     let mut long = b"t,id,x,y,z\n0,1,1,2,".to_vec();
     long.resize(10_000_000, b'3');
     let error = refused("long.csv", &long);
@@ -135,7 +135,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
     out.finish().expect("finished")
 }
 
-/// One long recording in every format that can be cut.
+/// Returns one long recording in every format with detection of truncation.
 fn in_every_format() -> Vec<(&'static str, Vec<u8>)> {
     let rows: Vec<_> = (0..2000).map(|k| format!("{},{},{k}.5,2,3\n", f64::from(k / 2), k % 2 + 1)).collect();
     let csv = format!("t_s,id,x,y,z\n{}", rows.concat());
@@ -156,7 +156,7 @@ fn in_every_format() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
-fn a_file_that_breaks_off_anywhere_is_refused() {
+fn truncated_files_are_refused() {
     for (name, bytes) in in_every_format() {
         let (_folder, path) = written(name, &bytes);
         assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("whole").items.len(), 2000, "{name}");
@@ -171,7 +171,7 @@ fn a_file_that_breaks_off_anywhere_is_refused() {
 }
 
 #[test]
-fn a_changed_byte_is_seen_where_there_is_a_checksum() {
+fn changed_byte_is_detected_by_checksums() {
     for (name, mut bytes) in in_every_format().into_iter().filter(|(name, _)| *name != "flight.parquet") {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 0x10;
@@ -180,7 +180,7 @@ fn a_changed_byte_is_seen_where_there_is_a_checksum() {
     }
 }
 
-/// An archive whose entry is much larger than the file.
+/// Returns an archive with an entry much larger than the file.
 fn bomb(name: &str, begin: &[u8]) -> Vec<u8> {
     const INFLATED_BYTES: usize = 80 * 1024 * 1024;
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
@@ -203,7 +203,7 @@ fn bomb(name: &str, begin: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn archives_that_grow_beyond_all_measure_are_refused() {
+fn decompression_bombs_are_refused() {
     let header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 4000000, 3), }\n";
     let mut array = b"\x93NUMPY\x01\x00".to_vec();
     array.extend_from_slice(&[u8::try_from(header.len()).expect("short"), 0]);
@@ -224,8 +224,8 @@ fn archives_that_grow_beyond_all_measure_are_refused() {
 }
 
 #[test]
-fn lengths_that_lie_cost_nothing() {
-    // A header that promises 10^15 numbers, and no number behind it.
+fn false_lengths_allocate_no_memory() {
+    // The header declares 10^15 numbers, but no data follow.
     let array = |shape: &str| {
         let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -245,7 +245,7 @@ fn lengths_that_lie_cost_nothing() {
 }
 
 #[test]
-fn a_show_is_refused_where_it_is_wrong() {
+fn invalid_shows_are_refused_with_their_place() {
     let show = |points: &str| {
         format!(r#"{{"swarm": {{"drones": [{{"settings": {{"name": "A", "trajectory": {{"points": {points}}}}}}}]}}}}"#)
     };
@@ -265,7 +265,7 @@ fn a_show_is_refused_where_it_is_wrong() {
 }
 
 #[test]
-fn polynomials_are_refused_where_they_are_wrong() {
+fn invalid_polynomials_are_refused_with_their_place() {
     let header = "duration,x^0,x^1,y^0,y^1,z^0,z^1\n";
     for (rows, place, code) in [
         ("1,0,0,0,0,0,0\n1,0,zero,0,0,0,0\n", "line 3", "recording/not-a-number"),
@@ -285,7 +285,7 @@ fn polynomials_are_refused_where_they_are_wrong() {
 }
 
 #[test]
-fn a_format_that_is_forced_on_other_content_is_refused() {
+fn forced_format_must_match_the_content() {
     let forced = |format| ReadOptions { format: Some(format), ..ReadOptions::default() };
     for format in [Format::PARQUET, Format::NPZ, Format::MCAP, Format::CRAZYFLIE, Format::SKYBRUSH] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &forced(format));
@@ -301,7 +301,7 @@ fn a_format_that_is_forced_on_other_content_is_refused() {
         (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
     ] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &options);
-        assert_eq!(error.help(), format!("leave {option} away"), "{error}");
+        assert_eq!(error.help(), format!("omit {option}"), "{error}");
     }
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let options = ReadOptions { scale: Some(scale.into()), ..ReadOptions::default() };

@@ -1,4 +1,4 @@
-//! What people record with ROS 2: poses of every kind, bags, frames in frames.
+//! ROS 2 recordings: pose messages, bags, and transforms between frames.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,13 +9,13 @@ use tempfile::TempDir;
 use crate::messages::{Message, NO_TURN, SEC, cdr, header, mcap_of, read_bytes, whole};
 use crate::recording::{Whole, assert_refused};
 
-/// What is done to a folder that was whole.
+/// Change of a valid folder.
 type Spoil = Box<dyn FnOnce(&Path)>;
 
-/// The quaternion of a quarter turn to the left.
+/// Quaternion of a quarter turn to the left.
 const QUARTER: [f64; 4] = [0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2];
 
-/// Rounding of a rotation of lengths of some metres.
+/// Rounding error of a rotation of lengths of some metres.
 const ROUNDING_M: f64 = 1e-14;
 
 const TF: &str = "tf2_msgs/msg/TFMessage";
@@ -44,7 +44,7 @@ fn bag(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/bags").join(name)
 }
 
-/// A transform at a time \[ns\].
+/// Encodes a transform at a time \[ns\].
 fn transform(ns: u32, parent: &'static str, child: &'static str, at: [f64; 3], turn: [f64; 4]) -> Vec<u8> {
     cdr(&(vec![(((SEC, ns), parent), child, (at, turn))],), true)
 }
@@ -58,7 +58,7 @@ fn odometry(ns: u32, frame: &'static str, child: &'static str, at: [f64; 3]) -> 
 }
 
 #[test]
-fn poses_of_every_kind_are_read_in_both_byte_orders() {
+fn all_pose_messages_are_read_in_both_byte_orders() {
     let (at, covariance) = ([1.0, 2.0, 3.0], [[0.5; 6]; 6]);
     for little in [true, false] {
         let odometry = (header(5), "base_link", ((at, NO_TURN), covariance), (([9.0; 3], [9.0; 3]), covariance));
@@ -85,7 +85,7 @@ fn poses_of_every_kind_are_read_in_both_byte_orders() {
 }
 
 #[test]
-fn velocities_of_odometry_are_not_used_and_it_is_said() {
+fn odometry_velocities_are_ignored_with_a_note() {
     let found =
         whole("odom.mcap", &mcap_of(&[("/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3]))]));
     assert!(
@@ -98,7 +98,7 @@ fn velocities_of_odometry_are_not_used_and_it_is_said() {
     assert_refused(&error, "recording/not-finite", "message 1 on topic `/poses`");
 }
 
-/// Two vehicles that pass each other, as `bags.py` flies them.
+/// Returns two vehicles that pass each other, as in `bags.py`.
 fn passing() -> Vec<(f64, &'static str, [f64; 3])> {
     let at = |k: u32| f64::from(k) / 10.0;
     let both = |k| [(at(k), "cf1", [at(k) - 1.0, 0.0, 1.0]), (at(k), "cf2", [1.0 - at(k), 0.5, 1.0])];
@@ -106,31 +106,35 @@ fn passing() -> Vec<(f64, &'static str, [f64; 3])> {
 }
 
 #[test]
-fn a_bag_of_crazyswarm_names_each_vehicle_once() {
+fn crazyswarm_bag_has_each_vehicle_once() {
     let found = Whole::read(&bag("crazyswarm"), &ReadOptions::default()).expect("read");
     assert_eq!(found.samples(), passing());
-    assert!(found.notes.iter().any(|note| note.contains("which are not read: cf1, cf2")), "{:?}", found.notes);
+    assert!(
+        found.notes.iter().any(|note| note.contains("topics of poses describe them: cf1, cf2")),
+        "{:?}",
+        found.notes
+    );
     let by_transforms = Whole::read(&bag("crazyswarm"), &options(None, &["/tf"])).expect("read");
     assert_eq!(by_transforms.items, found.items);
     let error = Whole::read(&bag("crazyswarm"), &options(None, &["/pose"])).expect_err("refused");
     assert_refused(&error, "recording/unknown-topic", "");
-    assert!(error.to_string().ends_with("those that it has are /poses, /tf"), "{error}");
+    assert!(error.to_string().ends_with("such topics are /poses, /tf"), "{error}");
 }
 
 #[test]
-fn packed_splits_of_a_bag_are_one_recording() {
+fn compressed_splits_form_one_recording() {
     let found = Whole::read(&bag("split"), &ReadOptions::default()).expect("read");
     assert_eq!((found.samples(), found.clock.epoch_ns), (passing(), i64::from(SEC) * 1_000_000_000));
 }
 
 #[test]
-fn poses_with_covariance_are_called_by_their_topics() {
+fn poses_with_covariance_are_named_by_topic() {
     let found = Whole::read(&bag("covariance"), &ReadOptions::default()).expect("read");
     assert_eq!(found.vehicles, ["/r1/pose", "/r2/pose"]);
     assert_eq!(found.samples()[5], (0.2, "/r2/pose", [2.0, 0.2, 0.0]));
 }
 
-/// A copy of the bag of two packed splits, changed.
+/// Changes a copy of the bag with two compressed splits, and reads it.
 fn changed(change: impl FnOnce(&Path)) -> (TempDir, Result<Whole, ReadError>) {
     let folder = tempfile::tempdir().expect("a folder");
     for entry in fs::read_dir(bag("split")).expect("a bag") {
@@ -148,7 +152,7 @@ fn edit(file: &Path, change: impl FnOnce(String) -> String) {
 }
 
 #[test]
-fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
+fn incomplete_bags_are_refused() {
     let remove = |name: &'static str| move |folder: &Path| fs::remove_file(folder.join(name)).expect("removed");
     let text = |from: &'static str, to: &'static str| {
         move |folder: &Path| edit(&folder.join("metadata.yaml"), |text| text.replace(from, to))
@@ -196,11 +200,11 @@ fn a_bag_that_is_not_whole_is_refused_and_never_shorter() {
 }
 
 #[test]
-fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
+fn allow_unfinished_reads_a_truncated_bag() {
     let cut = |folder: &Path| {
         let path = folder.join("split_1.mcap.zstd");
         let bytes = zstd::decode_all(fs::File::open(&path).expect("a file")).expect("unpacked");
-        // The last bytes are those of the end and of the index, which a recorder that is killed does not write.
+        // A recorder that is killed does not write the footer and the index, the last bytes of a file.
         let index = mcap::Summary::read(&bytes).expect("an index").expect("an index");
         let end = usize::try_from(index.chunk_indexes[0].chunk_start_offset).expect("an offset");
         fs::write(&path, &bytes[..end]).expect("written");
@@ -214,17 +218,17 @@ fn a_bag_that_was_cut_off_is_read_for_what_it_holds_where_that_is_accepted() {
         "{:?}",
         found.samples()
     );
-    let counted = format!("its files have {} messages, and metadata.yaml counts 21", found.samples().len() / 2);
+    let counted = format!("its files have {} messages, but metadata.yaml counts 21", found.samples().len() / 2);
     for note in ["the recording was not closed", &counted] {
         assert!(found.notes.iter().any(|said| said.starts_with(note)), "{:?}", found.notes);
     }
-    // A bag whose files were all closed has lost messages elsewhere.
+    // A bag with closed files and a wrong message count has lost messages.
     let short = changed(|folder| edit(&folder.join("metadata.yaml"), |text| text.replace("t: 21", "t: 22"))).0;
     assert!(Whole::read(short.path(), &accepting).is_err());
 }
 
 #[test]
-fn splits_are_read_in_the_order_that_the_bag_lists_and_given_in_that_of_time() {
+fn splits_are_read_in_listed_order_and_sorted_by_time() {
     let (_folder, swapped) = changed(|folder| {
         edit(&folder.join("metadata.yaml"), |text| {
             let (head, tail) = text.split_once("relative_file_paths:").expect("a list");
@@ -241,11 +245,12 @@ fn splits_are_read_in_the_order_that_the_bag_lists_and_given_in_that_of_time() {
 }
 
 #[test]
-fn a_robot_known_through_a_chain_of_transforms_is_brought_into_the_map() {
+fn transform_chain_leads_to_the_map_frame() {
     let alone = Whole::read(&bag("robot"), &ReadOptions::default()).expect("read");
     assert_eq!((alone.vehicles.clone(), alone.assumed), (vec!["/odom".to_owned()], None));
     assert_eq!(alone.items.len(), 21);
-    // Odometry goes along x of a frame that is turned by a quarter and moves along y of the map as fast.
+    // Odometry moves along x of a frame that is rotated by a quarter turn and moves along y of the map at the same
+    // speed.
     for (topics, name) in [(vec![], "/odom"), (vec!["/tf"], "base_link")] {
         let found = Whole::read(&bag("robot"), &options(Some("map"), &topics)).expect("read");
         assert_eq!(found.vehicles, [name]);
@@ -253,8 +258,9 @@ fn a_robot_known_through_a_chain_of_transforms_is_brought_into_the_map() {
         for (time_s, _, [x, y, z]) in found.samples() {
             assert!(x.abs() < ROUNDING_M && (y - 2.0 * time_s).abs() < ROUNDING_M && z == 0.0, "{time_s}: {x} {y} {z}");
         }
-        assert_eq!(found.assumed.as_deref(), Some("transforms even between their samples"));
-        let counted = "5 by those of their very time, 16 by some between two samples at most 1 s apart; 0 left out";
+        assert_eq!(found.assumed.as_deref(), Some("transforms uniform between their samples"));
+        let counted =
+            "5 by transforms at their time, 16 by interpolation between two samples at most 1 s apart; 0 omitted";
         assert!(found.notes.iter().any(|note| note.contains(counted)), "{:?}", found.notes);
     }
     let direct = Whole::read(&bag("robot"), &options(None, &["/tf"])).expect("read");
@@ -262,7 +268,7 @@ fn a_robot_known_through_a_chain_of_transforms_is_brought_into_the_map() {
 }
 
 #[test]
-fn transforms_that_stand_still_are_exact_and_nothing_is_assumed() {
+fn constant_transforms_are_exact() {
     let messages = [
         ("/tf_static", TF, "cdr", 1, transform(0, "map", "room", [10.0, 0.0, 0.0], QUARTER)),
         ("/room/pose", POSE, "cdr", 2, pose(1, "room", [1.0, 2.0, 3.0])),
@@ -276,22 +282,26 @@ fn transforms_that_stand_still_are_exact_and_nothing_is_assumed() {
     assert_eq!((found.vehicles.len(), samples[1], &found.assumed), (2, (1e-9, "/hall/pose", [5.0; 3]), &None));
     let error = [8.0, 1.0, 3.0].iter().zip(samples[0].2).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(error < ROUNDING_M, "{samples:?}");
-    assert!(found.notes.iter().any(|note| note.ends_with("into `map`: /far/pose in elsewhere")), "{:?}", found.notes);
-    // The way back is as good.
+    assert!(
+        found.notes.iter().any(|note| note.ends_with("lead to `map`: /far/pose in elsewhere")),
+        "{:?}",
+        found.notes
+    );
+    // The inverse transform is equally accurate.
     let back = read(&mcap_of(&messages), &in_frame("room")).samples()[1].2;
     assert!([5.0, 5.0, 5.0].iter().zip(back).all(|(a, b)| (a - b).abs() < ROUNDING_M), "{back:?}");
 }
 
 #[test]
-fn where_a_moving_transform_is_not_known_there_is_no_position() {
+fn position_is_omitted_if_a_transform_is_unknown() {
     let moving = |ns, x| ("/tf", TF, "cdr", 1, transform(ns, "map", "odom", [x, 0.0, 0.0], NO_TURN));
     let at = |ns| ("/odom", ODOMETRY, "cdr", 2, odometry(ns, "odom", "base_link", [0.0; 3]));
     let messages = [moving(100, 1.0), moving(200, 2.0), at(50), at(100), at(150), at(201)];
     let found = read(&mcap_of(&messages), &in_frame("map"));
     let samples: Vec<_> = found.samples().iter().map(|(t, _, [x, ..])| (*t, *x)).collect();
     assert_eq!(samples, [(100e-9, 1.0), (150e-9, 1.5)]);
-    assert!(found.notes.iter().any(|note| note.contains("1 by some between") && note.contains("2 left out")));
-    // Samples too far apart say nothing of what is between them.
+    assert!(found.notes.iter().any(|note| note.contains("1 by interpolation") && note.contains("2 omitted")));
+    // Samples more than 1 s apart are not interpolated.
     let late = ("/tf", TF, "cdr", 9, cdr(&(vec![(((SEC + 2, 0), "map"), "odom", ([0.0; 3], NO_TURN))],), true));
     assert_refused(&refused(&[moving(0, 1.0), late, at(150)], &in_frame("map")), "recording/unusable-frame", "");
     let message = "message 4 on topic `/tf`";
@@ -307,7 +317,7 @@ fn where_a_moving_transform_is_not_known_there_is_no_position() {
 }
 
 #[test]
-fn a_vehicle_that_is_told_of_twice_is_refused_until_a_topic_is_named() {
+fn vehicle_on_two_topics_requires_the_topic_option() {
     let named = cdr(&(header(1), vec![("cf1", ([1.0, 0.0, 0.0], NO_TURN))]), true);
     let poses = ("/poses", NAMED, "cdr", 1, named);
     for other in
@@ -324,13 +334,13 @@ fn a_vehicle_that_is_told_of_twice_is_refused_until_a_topic_is_named() {
         ("/r1/pose", POSE, "cdr", 1, pose(1, "map", [0.0; 3])),
     ];
     assert_refused(&refused(&robot, &ReadOptions::default()), "recording/ambiguous-topics", "");
-    // A vehicle that transforms alone tell of is never left out in silence.
+    // A vehicle described only by transforms is not omitted silently.
     let stranger = ("/tf", TF, "cdr", 1, transform(1, "map", "cf2", [0.0; 3], NO_TURN));
     assert_refused(&refused(&[poses, stranger], &ReadOptions::default()), "recording/ambiguous-topics", "");
 }
 
 #[test]
-fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
+fn local_frames_of_several_robots_are_refused() {
     let both = [
         ("/r1/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
         ("/r2/odom", ODOMETRY, "cdr", 1, odometry(1, "odom", "base_link", [0.0; 3])),
@@ -344,7 +354,7 @@ fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
 }
 
 #[test]
-fn transforms_on_topics_of_any_name_speak_of_one_tree() {
+fn transforms_of_all_topics_form_one_tree() {
     let kind = "geometry_msgs/msg/TransformStamped";
     let at = |topic, child: &'static str| (topic, kind, "cdr", 1, cdr(&(header(1), child, ([1.0; 3], NO_TURN)), true));
     let found = whole("vicon.mcap", &mcap_of(&[at("/vicon/cf1/cf1", "cf1"), at("/vicon/cf2/cf2", "vicon/cf2/cf2")]));
@@ -352,7 +362,7 @@ fn transforms_on_topics_of_any_name_speak_of_one_tree() {
 }
 
 #[test]
-fn bodies_of_robots_in_namespaces_are_called_by_both() {
+fn robots_in_namespaces_are_named_by_namespace_and_frame() {
     let robot = |topic, x| {
         [
             (topic, TF, "cdr", 1, transform(1, "map", "odom", [x, 0.0, 0.0], NO_TURN)),

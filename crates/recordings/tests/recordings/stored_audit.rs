@@ -1,4 +1,4 @@
-//! The run's own audit counts only in a file that is as the run wrote it.
+//! The audit of a run is valid only in an unchanged file.
 
 use std::borrow::Cow;
 use std::fs;
@@ -15,7 +15,7 @@ fn audit() -> RunAudit {
     RunAudit { status: "clear".to_owned(), limit_m: 2.0, closest: vec![closest], ..RunAudit::default() }
 }
 
-/// A recording that was closed with the audit.
+/// Returns a recording that was closed with the audit.
 fn closed() -> Vec<u8> {
     let ((_folder, path), run) = (folder(), Run::new(5, 8));
     let mut recorder = McapRecorder::create(&path, &run.header).expect("made");
@@ -37,7 +37,7 @@ fn stored(bytes: &[u8]) -> StoredAudit {
     recording.stored_audit()
 }
 
-/// The recording with edited messages, as an editor of MCAP files writes it.
+/// Returns the recording with edited messages, as written by an MCAP editor.
 fn edited(edit: impl Fn(&mut Vec<Message<'static>>)) -> Vec<u8> {
     let bytes: &'static [u8] = closed().leak();
     let messages = mcap::MessageStream::new(bytes).expect("an MCAP file");
@@ -56,7 +56,7 @@ fn place(messages: &[Message<'_>], topic: &str) -> usize {
 }
 
 #[test]
-fn an_unaltered_file_has_the_audit_whatever_its_log_times_and_chunks_are() {
+fn audit_does_not_depend_on_log_times_and_chunks() {
     let StoredAudit::AsWritten(found) = stored(&closed()) else { panic!("{:?}", stored(&closed())) };
     assert_eq!(RunAudit { sha256: String::new(), ..(*found).clone() }, audit());
     assert_eq!(found.sha256.len(), 64);
@@ -65,7 +65,7 @@ fn an_unaltered_file_has_the_audit_whatever_its_log_times_and_chunks_are() {
 }
 
 #[test]
-fn a_file_that_was_edited_has_no_audit_that_counts() {
+fn edited_file_has_no_valid_audit() {
     type Edit = fn(&mut Vec<Message<'static>>);
     let edits: [(&str, Edit); 8] = [
         ("a number of a sample", |messages| {
@@ -110,7 +110,7 @@ fn a_file_that_was_edited_has_no_audit_that_counts() {
 }
 
 #[test]
-fn a_file_without_an_audit_and_one_that_was_cut_have_none() {
+fn missing_and_truncated_audits_are_absent() {
     assert_eq!(stored(&edited(|messages| drop(messages.pop()))), StoredAudit::None);
     let bytes = closed();
     assert_eq!(stored(&bytes[..bytes.len() - 8]), StoredAudit::None);

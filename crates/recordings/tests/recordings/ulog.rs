@@ -1,4 +1,4 @@
-//! Logs of PX4: positions of one vehicle a file, at one place and by one clock.
+//! PX4 logs: one vehicle per file, with a common origin and clock.
 
 use std::fs;
 
@@ -7,13 +7,13 @@ use tautline_recordings::read::{ReadError, ReadOptions};
 use crate::messages::read_bytes;
 use crate::recording::{Whole, assert_refused};
 
-const GLOBAL: &str = "vehicle_global_position:uint64_t timestamp;uint64_t timestamp_sample;double lat;double lon;float alt;\
-                      float[2] spare;uint8_t[4] _padding0;";
+const GLOBAL: &str = "vehicle_global_position:uint64_t timestamp;uint64_t timestamp_sample;double lat;double lon;\
+                      float alt;float[2] spare;uint8_t[4] _padding0;";
 const LOCAL: &str = "vehicle_local_position:uint64_t timestamp;float x;float y;float z;bool xy_valid;bool z_valid;\
                      uint8_t[2] _padding0;double ref_lat;double ref_lon;float ref_alt;";
 const GPS: &str = "sensor_gps:uint64_t timestamp;uint64_t time_utc_usec;";
 
-/// A log as it is written, message by message.
+/// Log, built message by message.
 pub(crate) struct Log(Vec<u8>);
 
 impl Log {
@@ -76,7 +76,7 @@ fn global_positions_are_read() {
 }
 
 #[test]
-fn local_positions_are_north_east_and_down_of_their_reference() {
+fn local_positions_are_north_east_down_of_their_reference() {
     let here = [47.0, 8.0];
     let log = Log::new().local(1_000_000, [1.0, 2.0, -3.0], 1, here).local(1_020_000, [9.0; 3], 0, here);
     let log = log.local(1_040_000, [9.0; 3], 1, [0.0; 2]).local(1_060_000, [9.0; 3], 1, [f64::NAN; 2]).bytes();
@@ -91,10 +91,10 @@ fn local_positions_are_north_east_and_down_of_their_reference() {
 }
 
 #[test]
-fn logs_of_a_folder_are_at_one_place_by_one_clock() {
+fn joined_logs_share_origin_and_clock() {
     let folder = tempfile::tempdir().expect("a folder");
     let utc = 1_700_000_000_000_000;
-    // The computers start 5 s apart; the shortest delay of a message of GPS is 0.1 s.
+    // The computers start 5 s apart; the shortest delay of a GPS message is 0.1 s.
     let a =
         Log::new().gps(1_300_000, utc + 1_000_000).gps(2_100_000, utc + 2_000_000).global(3_100_000, 47.0, 8.0, 400.0);
     let b = Log::new().gps(7_100_000, utc + 2_000_000).global(8_100_000, 47.0, 8.0, 401.0);
@@ -112,7 +112,7 @@ fn logs_of_a_folder_are_at_one_place_by_one_clock() {
 }
 
 #[test]
-fn logs_that_are_wrong_are_refused() {
+fn invalid_logs_are_refused() {
     let whole = Log::new().global(1_000_000, 47.0, 8.0, 400.0).global(1_100_000, 47.0, 8.0, 402.5).bytes();
     let broken = read(&whole[..whole.len() - 5]).expect_err("broken off");
     assert_refused(&broken, "recording/unfinished", "");

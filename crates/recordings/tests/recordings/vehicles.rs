@@ -1,4 +1,4 @@
-//! One file for each vehicle is one recording, and files that are not read name the way in.
+//! Folders of vehicle files form one recording; unsupported files have a remedy.
 
 use std::fs;
 use std::io::{Cursor, Write as _};
@@ -11,7 +11,7 @@ use zip::write::SimpleFileOptions;
 
 use crate::recording::{Whole, assert_refused};
 
-/// A folder with these files.
+/// Creates a folder with these files.
 fn folder(files: &[(&str, &str)]) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, content) in files {
@@ -47,13 +47,13 @@ const BOTH: [(f64, &str, [f64; 3]); 5] = [
 ];
 
 #[test]
-fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
+fn folder_or_archive_of_vehicle_files_is_one_recording() {
     let files = [("cf10.txt", B), ("cf2.csv", A), ("readme.md", "nothing"), (".hidden.csv", "nothing")];
     let folder = folder(&files);
     let found = whole(folder.path()).expect("read");
     assert_eq!((found.vehicles.clone(), found.samples()), (vec!["cf2".to_owned(), "cf10".to_owned()], BOTH.to_vec()));
-    assert!(found.notes.iter().any(|note| note == "a file is a vehicle: cf2, cf10"), "{:?}", found.notes);
-    let not_read = "not read, being no tables: readme.md";
+    assert!(found.notes.iter().any(|note| note == "each file is one vehicle: cf2, cf10"), "{:?}", found.notes);
+    let not_read = "not read, as they are not tables: readme.md";
     assert!(found.notes.iter().any(|note| note == not_read), "{:?}", found.notes);
 
     for name in ["flight", "flight.zip"] {
@@ -72,7 +72,7 @@ fn a_folder_or_archive_with_a_file_for_each_vehicle_is_one_recording() {
 }
 
 #[test]
-fn tables_whose_bytes_are_read_in_any_order_may_be_packed() {
+fn seekable_formats_may_be_packed() {
     let folder = folder(&[("a.csv", A)]);
     let source = folder.path().join("a.csv");
     let expected = whole(&source).expect("read");
@@ -111,7 +111,7 @@ fn tables_whose_bytes_are_read_in_any_order_may_be_packed() {
 }
 
 #[test]
-fn tables_of_any_format_are_joined_by_one_clock() {
+fn joined_tables_of_any_format_share_one_clock() {
     let early = "timestamp,x,y\n1700000000.5,1,2\n1700000001.5,1,3\n";
     let late = "timestamp,x,y\n1700000003.25,4,5\n";
     let folder = folder(&[("a.csv", early), ("b.csv", late)]);
@@ -130,7 +130,7 @@ fn tables_of_any_format_are_joined_by_one_clock() {
 }
 
 #[test]
-fn files_that_are_not_of_one_recording_are_refused() {
+fn files_of_different_recordings_are_refused() {
     for (files, file, code, place) in [
         (&[("a.csv", A), ("b.csv", "t,x1,y1,x2,y2\n0,1,2,3,4\n")][..], "b.csv", "recording/several-vehicles", ""),
         (&[("a.csv", A), ("b.csv", "t,model_name,x,y\n0,p,1,2\n1,q,3,4\n")], "b.csv", "recording/several-vehicles", ""),
@@ -150,7 +150,7 @@ fn files_that_are_not_of_one_recording_are_refused() {
 const CURVE: &str = "Duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,0,1,0,0,1,0\n";
 
 #[test]
-fn relative_curves_start_where_it_is_said() {
+fn start_option_shifts_relative_curves() {
     let folder = folder(&[("cf1.csv", CURVE), ("cf2.csv", CURVE)]);
     let found = whole(folder.path()).expect("read");
     assert!(found.notes.iter().any(|note| note.contains("--start")), "{:?}", found.notes);
@@ -166,18 +166,18 @@ fn relative_curves_start_where_it_is_said() {
     options.starts.insert("cf3".to_owned(), [0.0; 3]);
     let refused = Whole::read(folder.path(), &options).expect_err("refused");
     assert_refused(&refused, "recording/unknown-vehicle", "");
-    // The archive of the same folder says the same.
+    // An archive of the same folder is equivalent.
     let path = folder.path().join("curves.zip");
     fs::write(&path, zipped(&[("cf1.csv", CURVE), ("cf2.csv", CURVE)])).expect("written");
     assert_eq!(whole(&path).expect("read").vehicles, ["cf1", "cf2"]);
-    // Samples are where they are.
+    // The option does not apply to samples.
     fs::write(folder.path().join("flight.csv"), A).expect("written");
     let refused = Whole::read(&folder.path().join("flight.csv"), &options).expect_err("refused");
     assert_refused(&refused, "recording/unused-option", "");
 }
 
 #[test]
-fn a_show_says_itself_how_close_drones_may_come() {
+fn skybrush_show_defines_its_minimum_distance() {
     let show = |settings: &str| format!(r#"{{"version": 1, {settings} "swarm": {{"drones": []}}}}"#);
     let folder = folder(&[
         ("said.json", &show(r#""settings": {"validation": {"minDistance": 2.5, "maxAltitude": 100}},"#)),
@@ -192,7 +192,7 @@ fn a_show_says_itself_how_close_drones_may_come() {
 }
 
 #[test]
-fn strangers_are_told_the_way_in() {
+fn unsupported_formats_have_a_remedy() {
     let folder = folder(&[]);
     for (bytes, said, way) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag", "rosbags-convert"),
@@ -204,8 +204,8 @@ fn strangers_are_told_the_way_in() {
         (b"<?xml version=\"1.0\"?>\n<gpx creator=\"x\">", "GPX", "lat,lon,alt"),
         (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "lat,lon,alt"),
         (b"  <?xml version=\"1.0\"?><flight/>", "XML", "t,id,x,y,z"),
-        (b"{\"type\": \"FeatureCollection\", \"features\": []}", "no Skybrush show", "t,id,x,y,z"),
-        (b"[{\"t\": 0, \"x\": 1}]", "no Skybrush show", "t,id,x,y,z"),
+        (b"{\"type\": \"FeatureCollection\", \"features\": []}", "not a Skybrush show", "t,id,x,y,z"),
+        (b"[{\"t\": 0, \"x\": 1}]", "not a Skybrush show", "t,id,x,y,z"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5", "numpy.savez"),
         (b"7z\xbc\xaf\x27\x1c\0\x04", "7z archive", "give the folder"),
         (&[&[b'a'; 257][..], b"ustar\x0000"].concat(), "tar archive", "give the folder"),

@@ -1,4 +1,4 @@
-//! ROS 2 bags: a folder with `metadata.yaml` and files in MCAP, which follow each other and may be packed by zstd.
+//! Reads ROS 2 bags: a folder with `metadata.yaml` and consecutive MCAP files, optionally packed by zstd.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,15 +13,15 @@ use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::readers::BAG;
 use super::super::source::{Source, ZSTD_MAGIC};
-use super::foreign::{self, Splits};
+use super::foreign::{self, SplitFiles};
 
-/// What a bag says of itself.
+/// File name of the index of a bag.
 const METADATA: &str = "metadata.yaml";
 
-/// Longest that it may be \[bytes\]: a bag of a thousand topics has a tenth of it.
+/// Largest accepted index \[bytes\]: ten times the size for a thousand topics.
 const METADATA_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
 
-const REINDEX: &str = "copy the whole folder again, or have `ros2 bag reindex` write metadata.yaml anew";
+const REINDEX: &str = "copy the whole folder again, or rewrite metadata.yaml with `ros2 bag reindex`";
 
 #[derive(Deserialize)]
 struct Metadata {
@@ -41,7 +41,7 @@ struct Bag {
     compression_format: Option<String>,
 }
 
-/// Whether a folder is a bag.
+/// Returns whether a folder is a bag.
 pub(in crate::read) fn is_bag(folder: &Path) -> bool {
     let path = folder.join(METADATA);
     path.is_file()
@@ -57,7 +57,8 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
     let packed = |path: &PathBuf| {
         let mut source = Source::file(path);
         if path.exists() && !path.is_file() {
-            let fault = Fault::coded("recording/bag-index", "the bag lists this file, and it is none", REINDEX);
+            let fault =
+                Fault::coded("recording/bag-index", "the bag lists this file, but it is not a regular file", REINDEX);
             return Err(ReadError::new(path, fault));
         }
         let (mut begin, mut bytes) =
@@ -71,7 +72,7 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
         Ok(source)
     };
     let files = files.iter().map(packed).collect::<Result<_, ReadError>>()?;
-    foreign::open(&Source::file(folder), Splits::new(files, bag.message_count, options), options)
+    foreign::open(&Source::file(folder), SplitFiles::new(files, bag.message_count, options), options)
 }
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
@@ -88,8 +89,8 @@ fn read(path: &Path) -> Result<Bag, ReadError> {
     let text = std::str::from_utf8(&bytes).map_err(|_| Fault::NotUtf8)?;
     let metadata: Metadata = serde_saphyr::from_str(text).map_err(|error| {
         let place = error.location().map(|location| Place::Line(location.line()));
-        let said = error.to_string();
-        let problem = format!("it is not what a ROS 2 bag says of itself: {}", said.lines().next().unwrap_or_default());
+        let message = error.to_string();
+        let problem = format!("it is not the index of a ROS 2 bag: {}", message.lines().next().unwrap_or_default());
         ReadError { place, ..Fault::coded("recording/bag-index", problem, REINDEX).into() }
     })?;
     Ok(metadata.bag)
@@ -97,38 +98,39 @@ fn read(path: &Path) -> Result<Bag, ReadError> {
 
 fn missing(error: std::io::Error) -> Fault {
     if error.kind() == std::io::ErrorKind::NotFound {
-        return Fault::coded("recording/bag-index", "the bag lists this file, and it is not there", REINDEX);
+        return Fault::coded("recording/bag-index", "the bag lists this file, but it is missing", REINDEX);
     }
     error.into()
 }
 
-/// The files that a bag lists, in their order.
+/// Returns the files that a bag lists, in order.
 fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if bag.storage_identifier != "mcap" {
-        let problem = format!("the bag is stored as {}, which is not read", quoted(&bag.storage_identifier));
+        let problem = format!("the storage of the bag is {}, which is not supported", quoted(&bag.storage_identifier));
         return refuse("recording/unsupported-format", problem, BAG);
     }
     let mode = bag.compression_mode.as_deref().unwrap_or_default().to_uppercase();
     let format = bag.compression_format.as_deref().unwrap_or_default();
     if mode == "MESSAGE" || !(format.is_empty() || format == "zstd") {
-        let problem = format!("the bag is packed by {} in mode {}", quoted(format), quoted(&mode));
+        let problem =
+            format!("the bag is packed by {} in mode {}, which is not supported", quoted(format), quoted(&mode));
         return refuse(
             "recording/unsupported-compression",
             problem,
-            "have `ros2 bag convert` write it without compression, or with that of files",
+            "rewrite it with `ros2 bag convert`, uncompressed or with compression mode `file`",
         );
     }
     if bag.relative_file_paths.is_empty() {
-        return refuse("recording/bag-index", "the bag lists no file", REINDEX);
+        return refuse("recording/bag-index", "the bag lists no files", REINDEX);
     }
     let (mut files, mut known) = (Vec::new(), BTreeSet::new());
     for listed in &bag.relative_file_paths {
         let path = Path::new(listed);
         let odd = |part| !matches!(part, Component::Normal(_) | Component::CurDir);
-        // Bags of version 3 and before name themselves in front.
+        // Bags up to version 3 prefix the paths with their own name.
         let name = path.file_name().filter(|_| !path.components().any(odd));
         let Some(name) = name else {
-            let problem = format!("the bag lists {}, which is no file in its folder", quoted(listed));
+            let problem = format!("the bag lists {}, which is not a file in its folder", quoted(listed));
             return refuse("recording/bag-index", problem, REINDEX);
         };
         let file = folder.join(name);
@@ -140,7 +142,7 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     Ok(files)
 }
 
-/// Refuses files in the folder that the bag does not list: they may be parts of it.
+/// Refuses files in the folder that the bag does not list, because they may belong to it.
 fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
     let (listed, mut others): (BTreeSet<_>, Vec<_>) = (files.iter().collect(), Vec::new());
     for entry in fs::read_dir(folder)? {
@@ -155,9 +157,9 @@ fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
     match others.first() {
         None => Ok(()),
         Some(other) => {
-            let problem = format!("{other} lies beside the files of the bag, which does not list it");
+            let problem = format!("{other} is in the folder of the bag, but the bag does not list it");
             let remedy =
-                "take the file away if it is none of the bag; else have `ros2 bag reindex` write metadata.yaml anew";
+                "remove the file if it does not belong to the bag, else rewrite metadata.yaml with `ros2 bag reindex`";
             refuse("recording/bag-index", problem, remedy)
         }
     }

@@ -1,4 +1,4 @@
-//! MCAP recordings of other programs: files that follow each other, and poses brought into one frame.
+//! Reads MCAP recordings of other programs: consecutive files, and poses transformed to one frame.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,39 +7,39 @@ use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, ReadOptions};
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
-use super::messages::{EARTH, Seen, What, Who, is_list, reader_of_topic};
+use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
 use super::outline::{is_static, place, space};
-use super::plan::{Plan, Way};
-use super::tree::{Known, Placed};
+use super::plan::{Conversion, ReadPlan};
+use super::tree::{FramePose, TransformAt};
 use crate::mcap::topic::{Message, Part, TopicReader};
 
-/// Opens a recording in some files that follow each other; `whole` is what is called so.
-pub(super) fn open(whole: &Source, mut splits: Splits, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let plan = Plan::of(&mut splits, options)?;
+/// Opens a recording in consecutive files; `whole` is the source named in errors.
+pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let plan = ReadPlan::of(&mut splits, options)?;
     let none = plan.none();
-    let mut about = About::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
-    about.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
-    // Messages that are there twice are those of a bag that is.
-    about.duplicates = about.duplicates.or(Some(Duplicates::Refuse));
-    let foreign = Foreign { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
-    Ok(Box::new(Ordered::open(foreign, about)?))
+    let mut info = RecordingInfo::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
+    info.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
+    // Duplicates of messages indicate overlapping files and are refused by default.
+    info.duplicates = info.duplicates.or(Some(Duplicates::Refuse));
+    let foreign = ForeignRows { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
+    Ok(Box::new(Ordered::open(foreign, info)?))
 }
 
-/// A recording of others.
-struct Foreign {
-    splits: Splits,
+/// Rows of a foreign recording.
+struct ForeignRows {
+    splits: SplitFiles,
     poses: Poses,
     /// Whether all topics hold lists of poses.
     listed: bool,
-    /// The names of the vehicles as they are shown.
+    /// Displayed names of the vehicles.
     shown: Vec<String>,
-    /// Messages before each file.
+    /// Number of messages before each file.
     starts: Vec<u64>,
 }
 
-impl Rows for Foreign {
+impl Rows for ForeignRows {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
         let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
         let mut more = true;
@@ -71,7 +71,7 @@ impl Rows for Foreign {
         &self.shown
     }
 
-    /// Poses of a single topic are called by their numbers alone.
+    /// Names the poses of a single topic by their numbers alone.
     fn settle_names(&mut self) {
         let names = &mut self.poses.names;
         let plain: Option<Vec<(&str, u64)>> = names
@@ -111,46 +111,46 @@ impl Rows for Foreign {
     }
 }
 
-/// The parts of some files, in their order. One that is packed is unpacked while it is read.
-pub(super) struct Splits {
+/// Parts of consecutive files, in order. Compressed files are unpacked one at a time.
+pub(super) struct SplitFiles {
     files: Vec<Source>,
-    /// Number of the next file.
+    /// Index of the next file.
     next: usize,
-    /// The current file, and what it is read from.
+    /// Reader and source of the current file.
     open: Option<(TopicReader, Source)>,
     options: ReadOptions,
     /// Lower bound of the number of messages.
     least_messages: u64,
-    /// What is to be said of files that were not closed, which the user accepts.
+    /// Notes on unclosed files that the user accepts.
     pub(super) notes: Vec<String>,
 }
 
-impl Splits {
+impl SplitFiles {
     pub(super) fn new(files: Vec<Source>, least_messages: u64, options: &ReadOptions) -> Self {
         Self { files, next: 0, open: None, options: options.clone(), least_messages, notes: Vec::new() }
     }
 
-    /// How many files have been opened since the start.
+    /// Returns the number of files opened since the start.
     pub(super) fn opened_files(&self) -> usize {
         self.next
     }
 
-    /// Starts again with the first file.
+    /// Restarts at the first file.
     pub(super) fn rewind(&mut self) {
         (self.next, self.open) = (0, None);
     }
 
-    /// Takes the next part; `false` behind the last one.
+    /// Passes the next part to `take`; returns `false` after the last one.
     pub(super) fn visit(&mut self, take: impl FnOnce(Part<'_>) -> Result<(), ReadError>) -> Result<bool, ReadError> {
         loop {
             if let Some((topics, source)) = &mut self.open {
-                let part = topics.next().map_err(|error| ReadError::from(error).of(&source.shown()))?;
+                let part = topics.next().map_err(|error| ReadError::from(error).of(&source.display_path()))?;
                 if let Some(part) = part {
-                    return take(part).map(|()| true).map_err(|error| error.of(&source.shown()));
+                    return take(part).map(|()| true).map_err(|error| error.of(&source.display_path()));
                 }
             }
             let Some(file) = self.files.get(self.next).cloned() else { return Ok(false) };
-            let shown = file.shown();
+            let shown = file.display_path();
             self.open = Some(self.opened(file).map_err(|error| error.of(&shown))?);
             self.next += 1;
         }
@@ -171,8 +171,8 @@ impl Splits {
         }
     }
 
-    /// Takes every part, from the first one on, and starts again. Fewer messages than there should be are an error, unless a
-    /// file was not closed and the user accepts what it holds.
+    /// Passes every part to `take`, from the first one on, and restarts. Missing messages are an error, unless the user
+    /// accepts an unclosed file.
     pub(super) fn visit_all(
         &mut self,
         mut take: impl FnMut(Part<'_>) -> Result<(), ReadError>,
@@ -187,7 +187,7 @@ impl Splits {
         self.rewind();
         if messages < self.least_messages {
             let problem =
-                format!("its files have {messages} messages, and metadata.yaml counts {}", self.least_messages);
+                format!("its files have {messages} messages, but metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
                 return refuse("recording/bag-index", problem, "copy the whole folder again");
             }
@@ -197,119 +197,128 @@ impl Splits {
     }
 }
 
-/// Positions out of messages.
+/// Converter of messages to positions.
 pub(super) struct Poses {
-    plan: Plan,
-    /// The frame of all positions so far, and the topic that it was met on.
+    plan: ReadPlan,
+    /// Frame of all positions so far, and the topic of its first occurrence.
     frame: Option<(String, String)>,
-    /// Topic and place, or frame, of each vehicle.
+    /// Name of each vehicle: topic and index, or frame.
     pub(super) names: Names,
     /// Vehicle of the last row.
     vehicle: usize,
     pub(super) messages: u64,
-    /// Fixes that are none.
+    /// Number of positions without a fix.
     no_fixes: u64,
-    brought: Brought,
+    conversions: ConversionCounts,
 }
 
-/// How many positions were brought into the frame that is asked for, and how.
+/// Number of positions transformed to the requested frame, by accuracy.
 #[derive(Clone, Copy, Default)]
-struct Brought {
-    /// By transforms of their very time.
-    exactly: u64,
-    /// By a transform between two of its samples.
-    guessed: u64,
-    /// Not at all, because a transform is not known then.
+struct ConversionCounts {
+    /// By transforms at the time of the position.
+    exact: u64,
+    /// By a transform interpolated between two samples.
+    interpolated: u64,
+    /// Omitted, because a transform is unknown at that time.
     unknown: u64,
 }
 
 impl Poses {
-    pub(super) fn new(plan: Plan) -> Self {
-        let brought = Brought::default();
-        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, brought }
+    pub(super) fn new(plan: ReadPlan) -> Self {
+        let conversions = ConversionCounts::default();
+        Self { plan, frame: None, names: Names::default(), vehicle: 0, messages: 0, no_fixes: 0, conversions }
     }
 
-    /// Starts again with the first message.
+    /// Restarts at the first message.
     pub(super) fn rewind(&mut self) {
-        (self.messages, self.no_fixes, self.brought) = (0, 0, Brought::default());
+        (self.messages, self.no_fixes, self.conversions) = (0, 0, ConversionCounts::default());
     }
 
     /// Appends the rows of a message.
     pub(super) fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), ReadError> {
-        for seen in self.plan.outline.seen_in(message, &mut self.messages)? {
-            self.append(seen, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
+        for observation in self.plan.outline.observations_in(message, &mut self.messages)? {
+            self.append(observation, message, rows).map_err(|fault| fault.at(place(self.messages, message)))?;
         }
         Ok(())
     }
 
-    fn append(&mut self, seen: Seen, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
+    fn append(&mut self, observation: Observation, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        let time_ns = self.plan.time_of(topic, seen.stamp_ns, message.log_ns);
-        if let What::Transform(turn) = seen.what {
-            return if is_static(topic) { Ok(()) } else { self.append_bodies(&seen, turn, topic, time_ns, rows) };
+        let time_ns = self.plan.time_of(topic, observation.stamp_ns, message.log_ns);
+        if let PoseKind::Transform(turn) = observation.kind {
+            return if is_static(topic) {
+                Ok(())
+            } else {
+                self.append_bodies(&observation, turn, topic, time_ns, rows)
+            };
         }
-        check_finite(&seen.position)?;
-        if seen.frame == EARTH && is_no_fix(&seen.position) {
+        check_finite(&observation.position)?;
+        if observation.frame == EARTH && is_no_fix(&observation.position) {
             self.no_fixes += 1;
             return Ok(());
         }
-        let Some(position) = self.position(&seen, topic, time_ns)? else { return Ok(()) };
-        let name = match seen.who {
-            Who::Topic => topic.clone(),
-            Who::Listed(number) => format!("{topic}/{number}"),
-            Who::Named(name) => name,
+        let Some(position) = self.position(&observation, topic, time_ns)? else { return Ok(()) };
+        let name = match observation.vehicle {
+            VehicleKey::Topic => topic.clone(),
+            VehicleKey::Listed(number) => format!("{topic}/{number}"),
+            VehicleKey::Named(name) => name,
         };
         self.push(&name, time_ns, position, rows)
     }
 
-    /// A pose in the frame that all is brought into; none where it cannot be brought there.
-    fn position(&mut self, seen: &Seen, topic: &str, time_ns: i64) -> Result<Option<Vector3<f64>>, Fault> {
-        let Some(wanted) = &self.plan.wanted else {
-            self.check_frame(&seen.frame, topic)?;
-            let local = self.plan.earth.filter(|_| seen.frame == EARTH);
-            return local.map_or(Ok(seen.position), |local| local.place(seen.position)).map(Some);
+    /// Returns a pose in the requested frame; `None` if it cannot be transformed.
+    fn position(
+        &mut self,
+        observation: &Observation,
+        topic: &str,
+        time_ns: i64,
+    ) -> Result<Option<Vector3<f64>>, Fault> {
+        let Some(target_frame) = &self.plan.target_frame else {
+            self.check_frame(&observation.frame, topic)?;
+            let local = self.plan.earth.filter(|_| observation.frame == EARTH);
+            return local.map_or(Ok(observation.position), |local| local.place(observation.position)).map(Some);
         };
-        if wanted == EARTH {
-            let problem = format!("{EARTH} is no frame of metres: places in it are latitudes and longitudes");
+        if target_frame == EARTH {
+            let problem = format!("{EARTH} is not a metric frame: its positions are latitudes and longitudes");
             return refuse(
                 "recording/unusable-frame",
                 problem,
-                "leave --frame out, or name a frame of poses; --topic says which topics are read",
+                "omit --frame, or name a frame of poses; choose topics with --topic",
             );
         }
-        if *wanted == seen.frame {
-            return Ok(Some(seen.position));
+        if *target_frame == observation.frame {
+            return Ok(Some(observation.position));
         }
-        let way = self.plan.bring(topic, &seen.frame, time_ns)?;
-        let known = self.brought.count(&way);
-        Ok(known.map(|known| known.transform.transform_point(&Point3::from(seen.position)).coords))
+        let way = self.plan.conversion_of(topic, &observation.frame, time_ns)?;
+        let known = self.conversions.count(&way);
+        Ok(known.map(|known| known.transform.transform_point(&Point3::from(observation.position)).coords))
     }
 
-    /// Appends the vehicles that are seen with a transform.
+    /// Appends the vehicles whose poses follow from a transform.
     fn append_bodies(
         &mut self,
-        seen: &Seen,
+        observation: &Observation,
         turn: [f64; 4],
         topic: &str,
         time_ns: i64,
         rows: &mut Vec<Row>,
     ) -> Result<(), Fault> {
         let space = space(topic);
-        let Who::Named(driver) = &seen.who else { return Ok(()) };
+        let VehicleKey::Named(driver) = &observation.vehicle else { return Ok(()) };
         let Some(bodies) = self.plan.bodies_of(space, driver).cloned() else { return Ok(()) };
-        check_finite(&seen.position)?;
-        if self.plan.wanted.is_none() {
-            self.check_frame(&seen.frame, topic)?;
+        check_finite(&observation.position)?;
+        if self.plan.target_frame.is_none() {
+            self.check_frame(&observation.frame, topic)?;
         }
         for body in bodies {
-            let is_there =
-                body.frame == *driver && self.plan.wanted.as_ref().is_none_or(|wanted| *wanted == seen.frame);
+            let is_there = body.frame == *driver
+                && self.plan.target_frame.as_ref().is_none_or(|target_frame| *target_frame == observation.frame);
             let position = if is_there {
-                Some(seen.position)
+                Some(observation.position)
             } else {
-                let placed = Placed { position: seen.position, turn }.rigid()?;
-                let way = self.plan.bring_body(space, &body, placed, time_ns)?;
-                self.brought.count(&way).map(|known| known.transform.translation.vector)
+                let placed = FramePose { position: observation.position, turn }.rigid()?;
+                let way = self.plan.conversion_of_vehicle(space, &body, placed, time_ns)?;
+                self.conversions.count(&way).map(|known| known.transform.translation.vector)
             };
             let Some(position) = position else { continue };
             let several = self.plan.outline.trees.len() > 1;
@@ -326,7 +335,7 @@ impl Poses {
         Ok(())
     }
 
-    /// Refuses a position in another frame than those before.
+    /// Refuses a position in another frame than the earlier ones.
     fn check_frame(&mut self, frame: &str, topic: &str) -> Result<(), Fault> {
         match &self.frame {
             None => self.frame = Some((frame.to_owned(), topic.to_owned())),
@@ -334,45 +343,46 @@ impl Poses {
             Some((known, first)) => {
                 let (known, first, frame) = (quoted(known), quoted(first), quoted(frame));
                 let problem =
-                    format!("positions are given in the frame {known} on topic {first} and in the frame {frame} here");
-                let remedy = "name the frame that transforms bring all into, or that alone is meant, with --frame";
+                    format!("positions are in the frame {known} on topic {first}, but in the frame {frame} here");
+                let remedy = "name the frame to which all are transformed, or the only one to read, with --frame";
                 return refuse("recording/several-frames", problem, remedy);
             }
         }
         Ok(())
     }
 
-    /// What was assumed to know positions, if anything was.
+    /// Returns the assumption behind interpolated transforms, if there are any.
     pub(super) fn assumed(&self) -> Option<String> {
-        (self.brought.guessed > 0).then(|| "transforms even between their samples".to_owned())
+        (self.conversions.interpolated > 0).then(|| "transforms uniform between their samples".to_owned())
     }
 
-    /// What a person should know.
+    /// Returns the notes for the user.
     pub(super) fn notes(&self) -> Vec<String> {
         let mut notes = self.plan.notes();
         notes.extend(no_fixes(self.no_fixes, ""));
-        let Brought { exactly, guessed, unknown } = self.brought;
-        if exactly + guessed + unknown > 0 {
-            let into = self.plan.wanted.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
+        let ConversionCounts { exact, interpolated, unknown } = self.conversions;
+        if exact + interpolated + unknown > 0 {
+            let into =
+                self.plan.target_frame.as_deref().map_or_else(String::new, |frame| format!(" into {}", quoted(frame)));
             notes.push(format!(
-                "positions brought{into} by transforms: {exactly} by those of their very time, {guessed} by some between \
-                 two samples at most 1 s apart; {unknown} left out where a transform is not known"
+                "positions transformed{into}: {exact} by transforms at their time, {interpolated} by interpolation \
+                 between two samples at most 1 s apart; {unknown} omitted because a transform is unknown"
             ));
         }
         notes
     }
 }
 
-impl Brought {
-    /// Counts a position, and gives what brings it.
-    fn count(&mut self, way: &Way) -> Option<Known> {
+impl ConversionCounts {
+    /// Counts a position; returns its transform.
+    fn count(&mut self, way: &Conversion) -> Option<TransformAt> {
         match way {
-            Way::None => return None,
-            Way::NotThen => self.unknown += 1,
-            Way::By(Known { guessed: true, .. }) => self.guessed += 1,
-            Way::By(_) => self.exactly += 1,
+            Conversion::None => return None,
+            Conversion::Unknown => self.unknown += 1,
+            Conversion::By(TransformAt { interpolated: true, .. }) => self.interpolated += 1,
+            Conversion::By(_) => self.exact += 1,
         }
-        if let Way::By(known) = way { Some(*known) } else { None }
+        if let Conversion::By(known) = way { Some(*known) } else { None }
     }
 }
 

@@ -1,5 +1,4 @@
-//! Positions of a message, and the schemas whose messages hold positions: those of ROS 2 in CDR, and those of Foxglove in
-//! protobuf and JSON.
+//! Decodes positions from messages: ROS 2 in CDR, and Foxglove in protobuf and JSON.
 
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -7,48 +6,48 @@ use serde::de::DeserializeOwned;
 
 use crate::mcap::topic::{CDR, Declared, decode};
 
-/// Reads a message in an encoding; the error says what is wrong with it.
-pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Seen>, String>;
+/// Decoder of messages in an encoding; the error describes the damage.
+pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Observation>, String>;
 
-/// The frame of positions on the Earth: latitude and longitude \[degrees\], and height \[m\].
+/// Frame name of positions on the Earth: latitude, longitude \[degrees\] and height \[m\].
 pub(super) const EARTH: &str = "WGS 84";
 
-/// The schema of these positions.
+/// Schema of positions on the Earth.
 pub(super) const FIXES: &str = "sensor_msgs/msg/NavSatFix";
 
-/// The quaternion that turns nothing.
+/// Quaternion of no rotation.
 pub(super) const NO_TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
-/// A position as a message says it.
+/// Position in a message.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
-    pub(super) who: Who,
-    /// The frame that the position is given in.
+pub(super) struct Observation {
+    pub(super) vehicle: VehicleKey,
+    /// Frame of the position.
     pub(super) frame: String,
-    /// Since the clock's zero \[ns\]; 0 where the message does not say.
+    /// Time since the epoch of the clock \[ns\]; 0 if the message has none.
     pub(super) stamp_ns: i64,
     pub(super) position: Vector3<f64>,
-    pub(super) what: What,
+    pub(super) kind: PoseKind,
 }
 
-/// Which vehicle a message speaks of.
+/// Identification of the vehicle of a position.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Who {
-    /// The topic itself is the vehicle.
+pub(super) enum VehicleKey {
+    /// The topic is the vehicle.
     Topic,
-    /// The place in a list of poses, from 1.
+    /// Index in a list of poses, from 1.
     Listed(usize),
-    /// A name in the message.
+    /// Name in the message.
     Named(String),
 }
 
-/// What a position is.
+/// Kind of a position.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum What {
+pub(super) enum PoseKind {
     Pose,
-    /// The pose of a robot's own frame.
+    /// Pose of a robot's own frame, with the name of that frame.
     Odometry(String),
-    /// Where a frame lies in its parent, with the quaternion x, y, z, w that turns it into the parent.
+    /// Pose of a frame in its parent, with the quaternion x, y, z, w of its rotation.
     Transform([f64; 4]),
 }
 
@@ -56,66 +55,66 @@ pub(super) fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
     seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
 }
 
-/// What reads the messages of a schema, where they hold positions.
+/// Returns the decoder of a schema with positions.
 pub(super) fn reader_of(schema: &str) -> Option<Reader> {
     let reader: Reader = match schema {
         "foxglove.PoseInFrame" => {
-            |encoding, bytes| decode_foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.seen()])
+            |encoding, bytes| decode_foxglove(encoding, bytes).map(|pose: PoseInFrame| vec![pose.observation()])
         }
-        "foxglove.PosesInFrame" => |encoding, bytes| decode_foxglove(encoding, bytes).map(PosesInFrame::seen),
-        "foxglove.FrameTransform" => {
-            |encoding, bytes| decode_foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.seen()])
-        }
+        "foxglove.PosesInFrame" => |encoding, bytes| decode_foxglove(encoding, bytes).map(PosesInFrame::observation),
+        "foxglove.FrameTransform" => |encoding, bytes| {
+            decode_foxglove(encoding, bytes).map(|transform: FrameTransform| vec![transform.observation()])
+        },
         "foxglove.FrameTransforms" => |encoding, bytes| {
             let transforms = decode_foxglove(encoding, bytes).map(|message: FrameTransforms| message.transforms);
-            Ok(transforms?.into_iter().map(FrameTransform::seen).collect())
+            Ok(transforms?.into_iter().map(FrameTransform::observation).collect())
         },
         "geometry_msgs/msg/PoseStamped" | "geometry_msgs/msg/PoseWithCovarianceStamped" => |encoding, bytes| {
-            // The covariance is behind the pose.
+            // The covariance follows the pose.
             let (header, pose): (Header, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(Who::Topic, pose)])
+            Ok(vec![header.observation(VehicleKey::Topic, pose)])
         },
         "geometry_msgs/msg/PointStamped" => |encoding, bytes| {
             let (header, point): (Header, [f64; 3]) = decode_ros(encoding, bytes)?;
-            Ok(vec![header.seen(Who::Topic, CdrPose(point, [0.0; 4]))])
+            Ok(vec![header.observation(VehicleKey::Topic, CdrPose(point, [0.0; 4]))])
         },
         "geometry_msgs/msg/PoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<CdrPose>) = decode_ros(encoding, bytes)?;
-            Ok((1..).zip(poses).map(|(number, pose)| header.seen(Who::Listed(number), pose)).collect())
+            Ok((1..).zip(poses).map(|(number, pose)| header.observation(VehicleKey::Listed(number), pose)).collect())
         },
         "motion_capture_tracking_interfaces/msg/NamedPoseArray" => |encoding, bytes| {
             let (header, poses): (Header, Vec<(String, CdrPose)>) = decode_ros(encoding, bytes)?;
-            Ok(poses.into_iter().map(|(name, pose)| header.seen(Who::Named(name), pose)).collect())
+            Ok(poses.into_iter().map(|(name, pose)| header.observation(VehicleKey::Named(name), pose)).collect())
         },
-        // The velocity behind the pose is not read: publishers differ on the frame that it is given in.
+        // The velocity after the pose is not read: publishers differ on its frame.
         "nav_msgs/msg/Odometry" => |encoding, bytes| {
             let (header, child, pose): (Header, String, CdrPose) = decode_ros(encoding, bytes)?;
-            Ok(vec![Seen { what: What::Odometry(child), ..header.seen(Who::Topic, pose) }])
+            Ok(vec![Observation { kind: PoseKind::Odometry(child), ..header.observation(VehicleKey::Topic, pose) }])
         },
-        FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::seen),
+        FIXES => |encoding, bytes| decode_ros(encoding, bytes).map(Fix::observation),
         "geometry_msgs/msg/TransformStamped" => {
-            |encoding, bytes| decode_ros(encoding, bytes).map(|transform: Transform| vec![transform.seen()])
+            |encoding, bytes| decode_ros(encoding, bytes).map(|transform: Transform| vec![transform.observation()])
         }
         "tf2_msgs/msg/TFMessage" => |encoding, bytes| {
             let (transforms,): (Vec<Transform>,) = decode_ros(encoding, bytes)?;
-            Ok(transforms.into_iter().map(Transform::seen).collect())
+            Ok(transforms.into_iter().map(Transform::observation).collect())
         },
         _ => return None,
     };
     Some(reader)
 }
 
-/// The same of a topic, where it is in an encoding that is read.
+/// Returns the decoder of a topic with positions in a supported encoding.
 pub(super) fn reader_of_topic(topic: &Declared) -> Option<Reader> {
     reader_of(&topic.schema).filter(|_| matches!(&*topic.encoding, "protobuf" | "json" | CDR))
 }
 
-/// Whether the messages of a schema are lists of poses without names.
+/// Returns whether the messages of a schema are lists of poses without names.
 pub(super) fn is_list(schema: &str) -> bool {
     matches!(schema, "foxglove.PosesInFrame" | "geometry_msgs/msg/PoseArray")
 }
 
-/// Whether the messages of a schema are transforms between frames.
+/// Returns whether the messages of a schema are transforms between frames.
 pub(super) fn is_of_transforms(schema: &str) -> bool {
     matches!(
         schema,
@@ -127,7 +126,7 @@ pub(super) fn is_of_transforms(schema: &str) -> bool {
 }
 
 fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
-    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are read in CDR alone".to_owned()) }
+    if encoding == CDR { decode(bytes) } else { Err("ROS 2 messages are supported in CDR only".to_owned()) }
 }
 
 /// Seconds and nanoseconds, and the frame.
@@ -135,40 +134,40 @@ fn decode_ros<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, St
 struct Header((i32, u32), String);
 
 impl Header {
-    fn seen(&self, who: Who, CdrPose(position, _): CdrPose) -> Seen {
+    fn observation(&self, vehicle: VehicleKey, CdrPose(position, _): CdrPose) -> Observation {
         let Self((sec, nanosec), frame) = self;
         let stamp_ns = nanoseconds((*sec).into(), (*nanosec).into());
-        Seen { who, frame: frame.clone(), stamp_ns, position: position.into(), what: What::Pose }
+        Observation { vehicle, frame: frame.clone(), stamp_ns, position: position.into(), kind: PoseKind::Pose }
     }
 }
 
-/// A position and a quaternion, of poses and transforms alike.
+/// Position and quaternion of a pose or transform.
 #[derive(Deserialize)]
 struct CdrPose([f64; 3], [f64; 4]);
 
-/// The name is that of the child frame.
+/// Header, name of the child frame, and transform.
 #[derive(Deserialize)]
 struct Transform(Header, String, CdrPose);
 
 impl Transform {
-    fn seen(self) -> Seen {
+    fn observation(self) -> Observation {
         let Self(header, child, pose) = self;
-        Seen { what: What::Transform(pose.1), ..header.seen(Who::Named(child), pose) }
+        Observation { kind: PoseKind::Transform(pose.1), ..header.observation(VehicleKey::Named(child), pose) }
     }
 }
 
-/// Whether there is a fix, by which satellites, and latitude, longitude and height.
+/// Header, status and service of the fix, and latitude, longitude and height.
 #[derive(Deserialize)]
 struct Fix(Header, (i8, u16), [f64; 3]);
 
 impl Fix {
-    /// Where there is no fix, or none with a height, nothing was seen.
-    fn seen(self) -> Vec<Seen> {
+    /// Returns the position, or nothing without a fix or a height.
+    fn observation(self) -> Vec<Observation> {
         let Self(header, (status, _), place) = self;
         if status < 0 || place[2].is_nan() {
             return Vec::new();
         }
-        vec![Seen { frame: EARTH.to_owned(), ..header.seen(Who::Topic, CdrPose(place, [0.0; 4])) }]
+        vec![Observation { frame: EARTH.to_owned(), ..header.observation(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
     }
 }
 
@@ -176,7 +175,7 @@ fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &st
     match encoding {
         "protobuf" => T::decode(bytes).map_err(|error| error.to_string()),
         "json" => serde_json::from_slice(bytes).map_err(|error| error.to_string()),
-        _ => Err("Foxglove messages are read in protobuf and JSON, not in CDR".to_owned()),
+        _ => Err("Foxglove messages are supported in protobuf and JSON only".to_owned()),
     }
 }
 
@@ -222,11 +221,16 @@ struct Pose {
     position: Option<Vec3>,
 }
 
-/// What a Foxglove message does not say is 0.
-fn foxglove_seen(who: Who, frame: String, timestamp: Option<Timestamp>, position: Option<Vec3>) -> Seen {
+/// Returns the position of a Foxglove message, whose absent values are 0.
+fn foxglove_observation(
+    vehicle: VehicleKey,
+    frame: String,
+    timestamp: Option<Timestamp>,
+    position: Option<Vec3>,
+) -> Observation {
     let stamp_ns = timestamp.map_or(0, |stamp| nanoseconds(stamp.seconds, stamp.nanos.into()));
     let position = position.map_or_else(Vector3::zeros, |point| Vector3::new(point.x, point.y, point.z));
-    Seen { who, frame, stamp_ns, position, what: What::Pose }
+    Observation { vehicle, frame, stamp_ns, position, kind: PoseKind::Pose }
 }
 
 #[derive(Clone, PartialEq, prost::Message, Deserialize)]
@@ -241,8 +245,8 @@ struct PoseInFrame {
 }
 
 impl PoseInFrame {
-    fn seen(self) -> Seen {
-        foxglove_seen(Who::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
+    fn observation(self) -> Observation {
+        foxglove_observation(VehicleKey::Topic, self.frame_id, self.timestamp, self.pose.and_then(|pose| pose.position))
     }
 }
 
@@ -258,9 +262,9 @@ struct PosesInFrame {
 }
 
 impl PosesInFrame {
-    fn seen(self) -> Vec<Seen> {
+    fn observation(self) -> Vec<Observation> {
         let one = |(number, pose): (usize, &Pose)| {
-            foxglove_seen(Who::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
+            foxglove_observation(VehicleKey::Listed(number), self.frame_id.clone(), self.timestamp, pose.position)
         };
         (1..).zip(&self.poses).map(one).collect()
     }
@@ -282,11 +286,15 @@ struct FrameTransform {
 }
 
 impl FrameTransform {
-    fn seen(self) -> Seen {
+    fn observation(self) -> Observation {
         let turn = self.rotation.map_or(NO_TURN, |q| [q.x, q.y, q.z, q.w]);
-        let seen =
-            foxglove_seen(Who::Named(self.child_frame_id), self.parent_frame_id, self.timestamp, self.translation);
-        Seen { what: What::Transform(turn), ..seen }
+        let observation = foxglove_observation(
+            VehicleKey::Named(self.child_frame_id),
+            self.parent_frame_id,
+            self.timestamp,
+            self.translation,
+        );
+        Observation { kind: PoseKind::Transform(turn), ..observation }
     }
 }
 

@@ -1,4 +1,4 @@
-//! MCAP recordings: our own, exported ones, Foxglove and ROS 2 messages.
+//! Reads MCAP recordings: runs and exports of tautline, Foxglove and ROS 2 messages.
 //!
 //! | schema | encoding | vehicle |
 //! | --- | --- | --- |
@@ -9,9 +9,8 @@
 //! | `motion_capture_tracking_interfaces/msg/NamedPoseArray` | cdr | the name of the pose |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
-//! Times are those of the messages; where no message of a topic has one, those when they were logged. All positions must be
-//! given in one frame, or be brought there by transforms. A file that was not closed is refused, unless the user accepts
-//! what it holds.
+//! Times are those in the messages, or the log times if no message of a topic has one. All positions must be in one
+//! frame, or be transformed to it. A file that was not closed is refused, unless the user accepts its complete part.
 
 pub(super) mod bag;
 mod foreign;
@@ -28,11 +27,11 @@ use std::path::Path;
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, Packing, Reader, Takes};
+use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
-use foreign::Splits;
+use foreign::SplitFiles;
 use tautline_core::record::{ReadFault, RecordError};
 
 pub(in crate::read) const READER: Reader = Reader {
@@ -43,11 +42,18 @@ pub(in crate::read) const READER: Reader = Reader {
     magic: &[b"\x89MCAP0\r\n"],
     sniff: |head| head.begins_with_any(READER.magic),
     open,
-    takes: &[Takes::Rows, Takes::Origin, Takes::Frame, Takes::Topics, Takes::Axes, Takes::Unfinished],
+    supports: &[
+        FormatOption::Rows,
+        FormatOption::Origin,
+        FormatOption::Frame,
+        FormatOption::Topics,
+        FormatOption::Axes,
+        FormatOption::Unfinished,
+    ],
     packing: Packing::None,
 };
 
-/// What wrote the positions of a file.
+/// Program that wrote the positions of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Origin {
     Run,
@@ -55,7 +61,7 @@ enum Origin {
     Foreign,
 }
 
-/// Returns the origin of a file by the first schema that is known.
+/// Returns the origin of a file by its first known schema.
 fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
     while let Some(part) = topics.next()? {
         let Part::Schema(name) = part else { continue };
@@ -72,27 +78,28 @@ fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
     Ok(None)
 }
 
-/// Opens a recording of `tautline run` where [`open`] reads the file as one; `None` for any other file.
+/// Opens a recording of `tautline run` if [`open`] would read the file as one; `None` for any other file.
 pub(super) fn open_run(path: &Path) -> Option<McapRecording> {
     let origin = origin(&mut TopicReader::open(path).ok()?).ok()?;
     McapRecording::open(path).ok().filter(|_| origin == Some(Origin::Run))
 }
 
-/// Opens a recording, going by the first schema that is known.
+/// Opens a recording by its first known schema.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
     match origin(&mut topics)? {
         Some(Origin::Run) => return own::open_samples(source, options),
         Some(Origin::Export) => return own::open_export(source, options),
         Some(Origin::Foreign) => {
-            return foreign::open(source, Splits::new(vec![source.clone()], 0, options), options);
+            return foreign::open(source, SplitFiles::new(vec![source.clone()], 0, options), options);
         }
         None => {}
     }
     options.accept_unfinished(topics.is_complete())?;
-    let remedy = "topics of foxglove.PosesInFrame, foxglove.FrameTransforms, geometry_msgs/msg/PoseStamped, \
-                  geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, sensor_msgs/msg/NavSatFix, \
-                  motion_capture_tracking_interfaces/msg/NamedPoseArray or tf2_msgs/msg/TFMessage are read";
+    let remedy = "record one of the topics foxglove.PosesInFrame, foxglove.FrameTransforms, \
+                  geometry_msgs/msg/PoseStamped, geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, \
+                  sensor_msgs/msg/NavSatFix, motion_capture_tracking_interfaces/msg/NamedPoseArray or \
+                  tf2_msgs/msg/TFMessage";
     refuse("recording/no-positions", "it has no topic with positions", remedy)
 }
 
@@ -108,7 +115,7 @@ impl From<RecordError> for ReadError {
             ReadFault::Empty => Fault::Empty.into(),
             ReadFault::NotMcap => Fault::WrongFormat(Format::MCAP).into(),
             ReadFault::TooLong { offset, bytes, limit } => {
-                let reason = format!("a record claims {bytes} bytes, more than the limit of {limit}");
+                let reason = format!("a record declares {bytes} bytes, more than the limit of {limit}");
                 Fault::Damaged(reason).at(Place::Byte(offset))
             }
             ReadFault::Damaged { offset, reason } => Fault::Damaged(reason).at(Place::Byte(offset)),

@@ -1,5 +1,4 @@
-//! Outline of an MCAP recording of another program: topics with positions and their names, frames, and vehicles that several
-//! topics describe.
+//! Outline of a foreign MCAP recording: topics with positions, their frames, and vehicles described by several topics.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,83 +7,87 @@ use nalgebra::Vector3;
 use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
-use super::foreign::Splits;
-use super::messages::{EARTH, FIXES, Seen, What, Who, is_of_transforms, reader_of_topic};
-use super::tree::{Body, Placed, Tree};
+use super::foreign::SplitFiles;
+use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
+use super::tree::{FramePose, Tree, VehicleFrame};
 use crate::mcap::topic::{Declared, Message, Part};
 
-/// Most parts of a topic that may be namespaces of transforms.
+/// Largest number of topic parts searched for a namespace of transforms.
 const DEEPEST: usize = 16;
 
-/// What helps where it is not known which topics are vehicles.
-const CHOOSE: &str = "say which is read with --topic NAME, once for each topic that is";
+/// Remedy for an ambiguous choice of topics.
+const CHOOSE: &str = "choose the topics to read with --topic NAME, once per topic";
 
-/// A topic with positions.
+/// Topic with positions.
 #[derive(Debug, Default)]
-pub(super) struct Told {
+pub(super) struct PoseTopic {
     pub(super) schema: String,
-    /// Frames that its positions are given in.
+    /// Frames of its positions.
     pub(super) frames: BTreeSet<String>,
-    /// The vehicles that its messages name.
+    /// Names of vehicles in its messages.
     names: BTreeSet<String>,
-    /// The robot's own frame, in odometry.
+    /// Robot frame of odometry.
     child: Option<String>,
-    /// Whether the topic itself is a vehicle.
+    /// Whether the topic is a vehicle.
     is_vehicle: bool,
-    /// How many poses its lists have, where vehicles are known by their place in a list.
+    /// Number of poses in its lists, whose vehicles are identified by index.
     listed: usize,
 }
 
-/// What a first look at all messages that are read finds.
+/// Result of a first pass over all messages.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
-    /// The topics that the user names; all are read where he names none.
+    /// Topics named by the user; if empty, all are read.
     pub(super) named: Vec<String>,
-    /// Frames, by the namespace of the topics that tell of them.
+    /// Frames, by the namespace of their transform topics.
     pub(super) trees: BTreeMap<String, Tree>,
-    /// Topics with positions that are read, without those of transforms.
-    pub(super) topics: BTreeMap<String, Told>,
+    /// Topics with positions that are read, except transforms.
+    pub(super) topics: BTreeMap<String, PoseTopic>,
     /// Topics with positions that are not read, because the user names others.
     unread: BTreeSet<String>,
-    /// Topics of transforms that move.
+    /// Topics of moving transforms.
     transforms: BTreeSet<String>,
-    /// Topics with a message that says its time.
+    /// Topics with a message that has a time.
     pub(super) stamped: BTreeSet<String>,
-    /// The first position on the Earth, in degrees and metres.
+    /// First position on the Earth \[degrees, m\].
     pub(super) first_fix: Option<Vector3<f64>>,
 }
 
-/// Where a message is.
+/// Returns the place of a message.
 pub(super) fn place(number: u64, message: &Message<'_>) -> Place {
     Place::Part(format!("message {number} on topic `{}`", message.of.topic))
 }
 
 impl Outline {
-    /// Looks at all messages of the topics that are named, or of all where none is, and at those of transforms.
-    pub(super) fn of(splits: &mut Splits, named: &[String]) -> Result<Self, ReadError> {
+    /// Reads all messages of the topics in `named`, or of all topics if it is empty, and all transforms.
+    pub(super) fn of(splits: &mut SplitFiles, named: &[String]) -> Result<Self, ReadError> {
         let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
             if !outline.reads(message.of) && reader_of_topic(message.of).is_some() {
                 outline.unread.insert(message.of.topic.clone());
             }
-            let all = outline.seen_in(&message, &mut number)?;
-            let listed = all.iter().filter(|seen| matches!(seen.who, Who::Listed(_))).count();
+            let all = outline.observations_in(&message, &mut number)?;
+            let listed = all.iter().filter(|observation| matches!(observation.vehicle, VehicleKey::Listed(_))).count();
             let learnt = outline
                 .count(&message, listed)
-                .and_then(|()| all.into_iter().try_for_each(|seen| outline.learn(&message, seen)));
+                .and_then(|()| all.into_iter().try_for_each(|observation| outline.learn(&message, observation)));
             learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
         Ok(outline)
     }
 
-    /// Whether the messages of a topic are looked at: where the user names others, only transforms are, which frames may need.
+    /// Returns whether the messages of a topic are read: transforms are always read, because frames may require them.
     fn reads(&self, topic: &Declared) -> bool {
         self.named.is_empty() || self.named.contains(&topic.topic) || is_of_transforms(&topic.schema)
     }
 
-    /// What is read of a message; `number` counts those that could be.
-    pub(super) fn seen_in(&self, message: &Message<'_>, number: &mut u64) -> Result<Vec<Seen>, ReadError> {
+    /// Decodes the positions of a message; `number` counts the messages that can have some.
+    pub(super) fn observations_in(
+        &self,
+        message: &Message<'_>,
+        number: &mut u64,
+    ) -> Result<Vec<Observation>, ReadError> {
         let Some(reader) = reader_of_topic(message.of) else { return Ok(Vec::new()) };
         *number += 1;
         if !self.reads(message.of) {
@@ -93,102 +96,104 @@ impl Outline {
         reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
     }
 
-    /// Records the number of poses of a list. A list of another length does not tell which vehicle appeared or left. In an
-    /// empty list no vehicle is seen.
+    /// Records the number of poses in a list. Lists of different lengths do not identify vehicles and are refused. An
+    /// empty list contains no vehicle.
     fn count(&mut self, message: &Message<'_>, listed: usize) -> Result<(), Fault> {
         if listed == 0 {
             return Ok(());
         }
-        let told = self.topics.entry(message.of.topic.clone()).or_default();
-        if told.listed != 0 && told.listed != listed {
+        let described = self.topics.entry(message.of.topic.clone()).or_default();
+        if described.listed != 0 && described.listed != listed {
             let problem = format!(
-                "it lists {listed} poses, and those before {}: places in a list are then no vehicles",
-                told.listed
+                "it lists {listed} poses, but earlier messages {}: indices then do not identify vehicles",
+                described.listed
             );
             return refuse(
                 "recording/list-length",
                 problem,
-                "record a pose for every vehicle in every list, or messages that name them; name the other topics with \
-                 --topic if the list is of no vehicles",
+                "record a pose of every vehicle in every list, or messages with names; if the list contains no \
+                 vehicles, choose other topics with --topic",
             );
         }
-        told.listed = listed;
+        described.listed = listed;
         Ok(())
     }
 
-    fn learn(&mut self, message: &Message<'_>, seen: Seen) -> Result<(), Fault> {
+    fn learn(&mut self, message: &Message<'_>, observation: Observation) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        if seen.stamp_ns != 0 && !self.stamped.contains(topic) {
+        if observation.stamp_ns != 0 && !self.stamped.contains(topic) {
             self.stamped.insert(topic.clone());
         }
-        if let (What::Transform(turn), Who::Named(child)) = (&seen.what, &seen.who) {
-            let still = is_static(topic).then_some(Placed { position: seen.position, turn: *turn });
-            if still.is_none() && !self.transforms.contains(topic) {
+        if let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (&observation.kind, &observation.vehicle) {
+            let fixed_pose = is_static(topic).then_some(FramePose { position: observation.position, turn: *turn });
+            if fixed_pose.is_none() && !self.transforms.contains(topic) {
                 self.transforms.insert(topic.clone());
             }
-            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &seen.frame, still);
+            self.trees.entry(space(topic).to_owned()).or_default().learn(child, &observation.frame, fixed_pose);
             return Ok(());
         }
-        if seen.frame == EARTH && message.of.schema != FIXES {
-            let problem = format!("its frame is called {}, as that of latitudes and longitudes is", quoted(EARTH));
-            return refuse("recording/unusable-frame", problem, "give the frame another name");
+        if observation.frame == EARTH && message.of.schema != FIXES {
+            let problem = format!("its frame has the reserved name {}", quoted(EARTH));
+            return refuse("recording/unusable-frame", problem, "rename the frame");
         }
-        let told = self.topics.entry(topic.clone()).or_default();
-        told.schema.clone_from(&message.of.schema);
-        if seen.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&seen.position) {
-            self.first_fix = Some(seen.position);
+        let described = self.topics.entry(topic.clone()).or_default();
+        described.schema.clone_from(&message.of.schema);
+        if observation.frame == EARTH && self.first_fix.is_none() && !is_no_fix(&observation.position) {
+            self.first_fix = Some(observation.position);
         }
-        if !told.frames.contains(&seen.frame) {
-            told.frames.insert(seen.frame);
+        if !described.frames.contains(&observation.frame) {
+            described.frames.insert(observation.frame);
         }
-        match seen.who {
-            Who::Topic => told.is_vehicle = true,
-            Who::Named(name) => drop(told.names.insert(name)),
-            Who::Listed(_) => {}
+        match observation.vehicle {
+            VehicleKey::Topic => described.is_vehicle = true,
+            VehicleKey::Named(name) => drop(described.names.insert(name)),
+            VehicleKey::Listed(_) => {}
         }
-        let What::Odometry(child) = seen.what else { return Ok(()) };
-        if let Some(known) = told.child.as_ref().filter(|known| **known != child) {
-            let problem = format!("it is the odometry of {}, and of {} before", quoted(&child), quoted(known));
-            return refuse("recording/several-vehicles", problem, "record each robot on a topic of its own");
+        let PoseKind::Odometry(child) = observation.kind else { return Ok(()) };
+        if let Some(known) = described.child.as_ref().filter(|known| **known != child) {
+            let problem =
+                format!("it is the odometry of {}, but earlier messages of {}", quoted(&child), quoted(known));
+            return refuse("recording/several-vehicles", problem, "record each robot on its own topic");
         }
-        told.child = Some(child);
+        described.child = Some(child);
         Ok(())
     }
 
-    /// The frames that a topic speaks of, and their namespace: the nearest one that is around the topic.
+    /// Returns the transform tree for a topic, and its namespace: the innermost one that contains the topic.
     pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
         let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
         let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }
 
-    /// Names of all topics with positions, those of transforms last.
+    /// Returns the names of all topics with positions, transforms last.
     pub(super) fn names(&self) -> Vec<String> {
         self.topics.keys().chain(&self.unread).chain(&self.transforms).cloned().collect()
     }
 
-    /// Whether topics that the user names tell of the frames of a namespace.
-    pub(super) fn is_told_by_named(&self, wanted: &str) -> bool {
-        self.transforms.iter().any(|topic| space(topic) == wanted && self.named.contains(topic))
+    /// Returns whether a topic named by the user has transforms of a namespace.
+    pub(super) fn is_read_from_named(&self, target_frame: &str) -> bool {
+        self.transforms.iter().any(|topic| space(topic) == target_frame && self.named.contains(topic))
     }
 
-    /// Refuses topics that tell of one vehicle twice. What their names alone say counts for nothing where the user names them.
+    /// Refuses two topics with one vehicle. Vehicles inferred from topic names are not compared if the user names the
+    /// topics.
     pub(super) fn refuse_twice(&self) -> Result<(), Fault> {
         let is_chosen = !self.named.is_empty();
-        let twice = |first: &str, second: &str, who: &str| {
-            let problem = format!("topics {} and {} both tell of {who}", quoted(first), quoted(second));
-            let remedy = if is_chosen { "name one of the two alone with --topic" } else { CHOOSE };
+        let twice = |first: &str, second: &str, vehicle: &str| {
+            let problem = format!("topics {} and {} both describe {vehicle}", quoted(first), quoted(second));
+            let remedy = if is_chosen { "name only one of the two with --topic" } else { CHOOSE };
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
-        for (topic, told) in &self.topics {
-            for name in &told.names {
+        for (topic, described) in &self.topics {
+            for name in &described.names {
                 if let Some(first) = named.insert(name.as_str(), topic) {
                     return Err(twice(first, topic, &quoted(name)));
                 }
             }
         }
-        for (topic, told) in self.topics.iter().filter(|(_, told)| told.is_vehicle) {
+        for (topic, described) in self.topics.iter().filter(|(_, described)| described.is_vehicle) {
             if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
                 return Err(twice(first, topic, &quoted(name)));
             }
@@ -196,129 +201,132 @@ impl Outline {
                 continue;
             }
             let robot = namespace(topic);
-            let (first, schema) = *robots.entry(robot).or_insert((topic, &told.schema));
-            if *schema != told.schema || (first != topic && [first, topic].iter().any(|topic| is_wish(last(topic)))) {
-                let who = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
-                return Err(twice(first, topic, &who));
+            let (first, schema) = *robots.entry(robot).or_insert((topic, &described.schema));
+            if *schema != described.schema
+                || (first != topic && [first, topic].iter().any(|topic| is_setpoint(last(topic))))
+            {
+                let vehicle = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
+                return Err(twice(first, topic, &vehicle));
             }
         }
         Ok(())
     }
 
-    /// Refuses topics of setpoints beside topics of measured positions, unless the user names the topics that are read. A
-    /// setpoint is never judged in place of a measured position.
-    pub(super) fn refuse_wishes(&self) -> Result<(), Fault> {
-        let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_wish(topic));
-        let Some((wish, other)) = self.wishes().next().zip(others.next()) else { return Ok(()) };
-        let (wish, other) = (quoted(wish), quoted(other));
-        let problem = format!(
-            "topic {wish} tells by its name where somebody is asked to be, and stands beside {other}, which does not"
-        );
+    /// Refuses setpoint topics beside topics of measured positions, unless the user names the topics. Setpoints must
+    /// not replace measured positions.
+    pub(super) fn refuse_setpoints(&self) -> Result<(), Fault> {
+        let mut others = self.topics.keys().chain(&self.transforms).filter(|topic| !is_setpoint(topic));
+        let Some((setpoint, other)) = self.setpoints().next().zip(others.next()) else { return Ok(()) };
+        let (setpoint, other) = (quoted(setpoint), quoted(other));
+        let problem = format!("topic {setpoint} has the name of a setpoint, but {other} beside it does not");
         refuse("recording/ambiguous-topics", problem, CHOOSE)
     }
 
-    /// Topics of setpoints by their names, unless the user names the topics that are read.
-    pub(super) fn wishes(&self) -> impl Iterator<Item = &str> {
-        let guessed = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
-        guessed.map(String::as_str).filter(|topic| is_wish(topic))
+    /// Returns the topics with names of setpoints, unless the user names the topics.
+    pub(super) fn setpoints(&self) -> impl Iterator<Item = &str> {
+        let interpolated = self.topics.keys().chain(&self.transforms).filter(|_| self.named.is_empty());
+        interpolated.map(String::as_str).filter(|topic| is_setpoint(topic))
     }
 
-    /// Topics that are vehicles, with each frame that they are given in.
+    /// Returns the topics that are vehicles, with each frame of their positions.
     pub(super) fn given_in(&self) -> impl Iterator<Item = (&str, &str)> {
-        let vehicles = self.topics.iter().filter(|(_, told)| told.is_vehicle);
-        vehicles.flat_map(|(topic, told)| told.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
+        let vehicles = self.topics.iter().filter(|(_, described)| described.is_vehicle);
+        vehicles
+            .flat_map(|(topic, described)| described.frames.iter().map(move |frame| (topic.as_str(), frame.as_str())))
     }
 
-    /// What topics of poses tell of the vehicles of transforms.
-    pub(super) fn cover(&self) -> Cover<'_> {
-        let mut cover = Cover::default();
-        for (topic, told) in &self.topics {
-            cover.names.extend(told.names.iter().map(String::as_str));
-            cover.names.extend(Some(last(namespace(topic))).filter(|name| told.is_vehicle && !name.is_empty()));
-            let Some((child, (space, tree))) = told.child.as_deref().zip(self.tree_of(topic)) else { continue };
-            cover.children.insert((space, child));
-            cover.carriers.extend(tree.way_up(child).into_iter().flatten().map(|frame| (space, frame)));
+    /// Returns the vehicles that pose topics describe, for comparison with transforms.
+    pub(super) fn coverage(&self) -> Coverage<'_> {
+        let mut coverage = Coverage::default();
+        for (topic, described) in &self.topics {
+            coverage.names.extend(described.names.iter().map(String::as_str));
+            coverage.names.extend(Some(last(namespace(topic))).filter(|name| described.is_vehicle && !name.is_empty()));
+            let Some((child, (space, tree))) = described.child.as_deref().zip(self.tree_of(topic)) else { continue };
+            coverage.children.insert((space, child));
+            coverage.carriers.extend(tree.ancestry(child).into_iter().flatten().map(|frame| (space, frame)));
         }
-        cover
+        coverage
     }
 }
 
-/// Vehicles that topics of poses describe.
+/// Vehicles that pose topics describe.
 #[derive(Default)]
-pub(super) struct Cover<'a> {
-    /// Names in messages and of the namespaces of topics.
+pub(super) struct Coverage<'a> {
+    /// Names in messages, and names of the namespaces of topics.
     names: BTreeSet<&'a str>,
-    /// Frames of odometry by their namespace, and those with all that carries them.
+    /// Odometry frames with their namespaces, and these frames with all frames above them.
     children: BTreeSet<(&'a str, &'a str)>,
     carriers: BTreeSet<(&'a str, &'a str)>,
 }
 
-impl Cover<'_> {
-    /// Whether a vehicle of the transforms in a namespace is among them.
-    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &Body) -> bool {
+impl Coverage<'_> {
+    /// Returns whether a vehicle of the transforms in a namespace is among these.
+    pub(super) fn holds(&self, space: &str, tree: &Tree, body: &VehicleFrame) -> bool {
         let robot = body.frame.rsplit_once('/').map_or("", |(robot, _)| last(robot));
         let is_named = [robot, &body.frame, last(space)].iter().any(|name| self.names.contains(name));
-        let way = tree.way_up(&body.frame);
+        let way = tree.ancestry(&body.frame);
         is_named
             || self.carriers.contains(&(space, &body.frame))
             || way.is_ok_and(|way| way.iter().any(|frame| self.children.contains(&(space, frame))))
     }
 }
 
-/// Refuses positions of several robots, by whom they are told, in frames of the same name that each robot has of its own, as
-/// a rule.
-pub(super) fn refuse_own_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
+/// Refuses positions of several robots in frames that are usually local to each robot, such as `odom`. `given` holds
+/// topics or frames with the frames of their positions.
+pub(super) fn refuse_local_frames<'a>(given: impl Iterator<Item = (&'a str, &'a str)>) -> Result<(), Fault> {
     let has_odom = |frame: &str| frame.to_lowercase().split(|c: char| !c.is_alphanumeric()).any(|word| word == "odom");
-    // Autopilots count local positions from where each was switched on, and call the frame `map`.
-    let is_own = |teller: &str, frame: &str| has_odom(frame) || teller.contains("local_position");
+    // Autopilots count local positions from the place of their start, and name the frame `map`.
+    let is_own = |source_name: &str, frame: &str| has_odom(frame) || source_name.contains("local_position");
     let mut known: BTreeMap<&str, &str> = BTreeMap::new();
-    for (teller, frame) in given.filter(|(teller, frame)| is_own(teller, frame)) {
-        let Some(first) = known.insert(frame, teller).filter(|first| *first != teller) else { continue };
-        let (first, teller, shown) = (quoted(first), quoted(teller), quoted(frame));
+    for (source_name, frame) in given.filter(|(source_name, frame)| is_own(source_name, frame)) {
+        let Some(first) = known.insert(frame, source_name).filter(|first| *first != source_name) else { continue };
+        let (first, source_name, shown) = (quoted(first), quoted(source_name), quoted(frame));
         let problem = format!(
-            "{first} and {teller} give positions in a frame {shown}, of which each robot has one of its own as a rule"
+            "{first} and {source_name} give positions in a frame {shown}, which is usually local to each robot"
         );
-        let remedy = format!("say --frame {frame} if it is one frame, or name one that transforms lead into");
+        let remedy = format!("confirm a common frame with --frame {frame}, or name a frame that transforms lead to");
         return refuse("recording/several-frames", problem, remedy);
     }
     Ok(())
 }
 
-/// Words in topics of setpoints, which hold commanded instead of measured positions: of MAVROS
+/// Words in names of setpoint topics, which hold commanded instead of measured positions. Sources: MAVROS
 /// (`setpoint_position/local`), PX4 (`trajectory_setpoint`), Crazyswarm2 (`cmd_full_state`), Aerostack2
-/// (`motion_reference/pose`), planners, and what is clicked in a viewer.
-const WISHES: Words = Words(
+/// (`motion_reference/pose`), planners, and clicks in viewers.
+const SETPOINT_WORDS: Words = Words(
     "clicked cmd command commanded des desired goal initialpose plan planned planner planning predicted ref \
      reference setpoint sp target waypoint wp",
 );
 
-/// Whether a topic holds transforms that never change.
+/// Returns whether a topic holds constant transforms.
 pub(super) fn is_static(topic: &str) -> bool {
     last(topic) == "tf_static"
 }
 
-/// The namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
+/// Returns the namespace of a topic, without its last part: `/cf1` of `/cf1/pose`.
 pub(super) fn namespace(topic: &str) -> &str {
     topic.rsplit_once('/').map_or("", |(before, _)| before)
 }
 
-/// The last part of a name.
+/// Returns the last part of a name.
 pub(super) fn last(path: &str) -> &str {
     path.rsplit('/').next().unwrap_or_default()
 }
 
-/// The namespace that a topic of transforms speaks of: `/r1` of `/r1/tf`, and the common one of a topic called otherwise.
+/// Returns the namespace of a transform topic: `/r1` of `/r1/tf`, and the root for other names.
 pub(super) fn space(topic: &str) -> &str {
     if matches!(last(topic), "tf" | "tf_static") { namespace(topic) } else { "" }
 }
 
 /// Returns whether a name contains a word for setpoints, in the singular or the plural.
-pub(super) fn is_wish(name: &str) -> bool {
-    let is_one = |word: &str| WISHES.contains(word) || word.strip_suffix('s').is_some_and(|one| WISHES.contains(one));
+pub(super) fn is_setpoint(name: &str) -> bool {
+    let is_one = |word: &str| {
+        SETPOINT_WORDS.contains(word) || word.strip_suffix('s').is_some_and(|one| SETPOINT_WORDS.contains(one))
+    };
     words(name).split(' ').any(is_one)
 }
 
-/// The words of a name in small letters, with a blank between two: of `/cf1/goalPose` these are `cf1 goal pose`.
+/// Splits a name into words in lower case, separated by blanks: `cf1 goal pose` for `/cf1/goalPose`.
 fn words(name: &str) -> String {
     let (mut words, mut before) = (String::new(), ' ');
     for c in name.chars() {
@@ -336,8 +344,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_that_each_robot_has_of_its_own_are_not_taken_as_one() {
-        let refused = |given: &[(&'static str, &'static str)]| refuse_own_frames(given.iter().copied()).is_err();
+    fn local_frames_of_several_robots_are_refused() {
+        let refused = |given: &[(&'static str, &'static str)]| refuse_local_frames(given.iter().copied()).is_err();
         assert!(refused(&[("/r1/pose", "odom"), ("/r2/pose", "odom")]));
         assert!(refused(&[("/uav1/mavros/local_position/pose", "map"), ("/uav2/mavros/local_position/pose", "map")]));
         assert!(!refused(&[("/r1/pose", "map"), ("/r2/pose", "map")]));
@@ -347,11 +355,11 @@ mod tests {
 
 #[cfg(test)]
 mod topic_name_tests {
-    use super::is_wish;
+    use super::is_setpoint;
 
     #[test]
-    fn a_wish_is_no_vehicle_and_a_vehicle_no_wish() {
-        let wishes = [
+    fn setpoint_topics_are_recognised_by_name() {
+        let setpoints = [
             "/cf1/goal_pose",
             "/cf1/cmd_full_state",
             "/uav/Setpoint",
@@ -366,8 +374,8 @@ mod topic_name_tests {
             "/move_base_simple/goal",
             "/target/pose",
         ];
-        for name in wishes {
-            assert!(is_wish(name), "{name}");
+        for name in setpoints {
+            assert!(is_setpoint(name), "{name}");
         }
         let vehicles = [
             "/cf1/pose",
@@ -381,7 +389,7 @@ mod topic_name_tests {
             "/spot/odometry",
         ];
         for name in vehicles {
-            assert!(!is_wish(name), "{name}");
+            assert!(!is_setpoint(name), "{name}");
         }
     }
 }

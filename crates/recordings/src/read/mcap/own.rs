@@ -1,4 +1,4 @@
-//! Recordings of tautline: `run.mcap`, what was exported as MCAP with its messages, and channels beside positions.
+//! Reads recordings of tautline: `run.mcap`, MCAP exports, and channels.
 //!
 //! ```text
 #![doc = include_str!("vehicles.msg")]
@@ -18,27 +18,27 @@ use super::super::clock::{Stamp, TimeUnit};
 use super::super::error::{Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{About, BATCH, Ordered, Recording, Row, Rows};
+use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
 use tautline_core::record::{Channel, ReadFault};
 
-/// Where the vehicles are named.
+/// Topic of the vehicle names.
 pub(crate) const VEHICLES: Topic<'_> =
     Topic::cdr("/vehicles", "tautline_msgs/msg/Vehicles", include_str!("vehicles.msg"));
 
-/// Where the motion is.
+/// Topic of the motion.
 pub(crate) const TRACKS: Topic<'_> = Topic::cdr("/tracks", "tautline_msgs/msg/Tracks", include_str!("tracks.msg"));
 
-/// The fields of `vehicles.msg`, in order.
+/// Fields of `vehicles.msg`, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Vehicles {
     pub(crate) names: Vec<String>,
     pub(crate) epoch_ns: i64,
 }
 
-/// The fields of `tracks.msg`, in order.
+/// Fields of `tracks.msg`, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Instant {
     pub(crate) time_s: f64,
@@ -56,20 +56,20 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     exported.next(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
     let none = Fault::coded("recording/empty", "it holds no instant", "export again");
-    let mut about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    (about.epoch_ns, about.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
+    let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    (info.epoch_ns, info.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
-    Ok(Box::new(Ordered::open(exported, about)?))
+    Ok(Box::new(Ordered::open(exported, info)?))
 }
 
-/// An exported recording.
+/// Exported recording.
 struct Exported {
     path: PathBuf,
     topics: TopicReader,
     instants: Instants,
 }
 
-/// What the messages so far amount to.
+/// State of the reader after the messages so far.
 struct Instants {
     names: Names,
     /// Number of axes of all positions.
@@ -79,21 +79,21 @@ struct Instants {
 }
 
 impl Instants {
-    /// Appends the rows of a message; the error says what is wrong with it.
+    /// Appends the rows of a message; the error describes the fault of the message.
     fn take(&mut self, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), String> {
         if message.of.schema == TRACKS.schema_name {
             self.count += 1;
             let instant: Instant = decode(message.bytes)?;
             let axes = if instant.positions_m.len() == 2 * instant.vehicles.len() { 2 } else { 3 };
             if !instant.vehicles.is_empty() && *self.axes.get_or_insert(axes) != axes {
-                return Err("some of its positions have heights and some have none".to_owned());
+                return Err("only some of its positions have heights".to_owned());
             }
             return take(&instant, axes, self.names.all().len(), (self.count, rows));
         }
         if message.of.schema == VEHICLES.schema_name {
             let Vehicles { names, epoch_ns } = decode(message.bytes)?;
             if !names.starts_with(self.names.all()) {
-                return Err("the vehicles are not those of before".to_owned());
+                return Err("the list of vehicles contradicts an earlier one".to_owned());
             }
             self.names = Names::from_list(names).map_err(|fault| fault.to_string())?;
             self.epoch_ns = epoch_ns;
@@ -102,7 +102,7 @@ impl Instants {
     }
 }
 
-/// Appends the rows of an instant with this number and number of axes; the error is the fault of the message.
+/// Appends the rows of an instant; `number` is the number of its message. The error describes the fault of the message.
 fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &mut Vec<Row>)) -> Result<(), String> {
     let count = instant.vehicles.len();
     let fits = |length: usize, each: usize| length == each * count;
@@ -112,7 +112,7 @@ fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &
         && (!velocities || fits(instant.velocities_m_s.len(), axes))
         && (!radii || fits(instant.radii_m.len(), 1)))
     {
-        return Err(format!("its arrays do not belong to {count} vehicles"));
+        return Err(format!("the lengths of its arrays do not fit {count} vehicles"));
     }
     let vector = |numbers: &[f64], k: usize| {
         let of = &numbers[axes * k..axes * (k + 1)];
@@ -120,7 +120,7 @@ fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &
     };
     for (k, &vehicle) in instant.vehicles.iter().enumerate() {
         let vehicle = usize::try_from(vehicle).ok().filter(|&vehicle| vehicle < vehicles);
-        let vehicle = vehicle.ok_or("it speaks of a vehicle without a name")?;
+        let vehicle = vehicle.ok_or("it contains a vehicle without a name")?;
         let velocity = velocities.then(|| vector(&instant.velocities_m_s, k)).filter(|v| !v.x.is_nan());
         let radius = radii.then(|| instant.radii_m[k]).filter(|radius| !radius.is_nan());
         let stamp = Stamp::Real(instant.time_s);
@@ -160,36 +160,36 @@ impl Rows for Exported {
     }
 }
 
-/// A message as it is read.
+/// Decoded message of a channel.
 type Read = ChannelMessage<String, Vec<String>, Vec<f64>>;
 
-/// The channels of a recording of ours, instant by instant, in the order of its tracks.
+/// Channels of a recording of tautline, instant by instant, in the order of its tracks.
 pub struct Channels {
     path: PathBuf,
     topics: TopicReader,
-    /// Those of the next instant, where it has been looked at.
+    /// Channels of the next instant, if already read.
     next: Option<Vec<Read>>,
 }
 
 impl Channels {
-    /// Those of a file in MCAP, where its first instant has some.
+    /// Opens the channels of an MCAP file; `None` if its first instant has none.
     pub(in crate::read) fn open(path: &Path) -> Result<Option<Self>, ReadError> {
         let mut channels = Self { path: path.to_owned(), topics: TopicReader::open(path)?, next: None };
-        let first = channels.look()?;
+        let first = channels.read_instant()?;
         let has_some = !first.is_empty();
         channels.next = Some(first);
         Ok(has_some.then_some(channels))
     }
 
-    /// The channels of the next instant, which is of `vehicles` vehicles, a row for each in the order of the instant; none
-    /// behind the last one.
+    /// Returns the channels of the next instant, one row per vehicle in the order of the instant; empty after the last
+    /// instant.
     ///
     /// # Errors
-    /// [`ReadError`] when the recording is damaged.
+    /// [`ReadError`] if the recording is damaged.
     pub fn next(&mut self, vehicles: usize) -> Result<Vec<Channel>, ReadError> {
         let found = match self.next.take() {
             Some(found) => Ok(found),
-            None => self.look(),
+            None => self.read_instant(),
         };
         let channels = found.and_then(|found| {
             let channels: Result<_, ReadFault> = found.into_iter().map(|found| found.into_channel(vehicles)).collect();
@@ -198,8 +198,8 @@ impl Channels {
         channels.map_err(|error| error.of(&self.path))
     }
 
-    /// The messages of channels before the next instant.
-    fn look(&mut self) -> Result<Vec<Read>, ReadError> {
+    /// Reads the channel messages before the next instant.
+    fn read_instant(&mut self) -> Result<Vec<Read>, ReadError> {
         let mut found: Vec<Read> = Vec::new();
         while let Some(part) = self.topics.next()? {
             let Part::Message(Message { of, bytes, .. }) = part else { continue };
@@ -226,14 +226,14 @@ pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Rec
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::coded("recording/empty", "it holds no sample", "record again");
-    let about = About::new(source, options, Some(TimeUnit::Seconds), notes, none);
-    Ok(Box::new(Ordered::open(run, about)?))
+    let info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    Ok(Box::new(Ordered::open(run, info)?))
 }
 
-/// The samples of a run.
+/// Samples of a run.
 struct Run {
     recording: McapRecording,
-    /// Number of vehicles, as the header claims.
+    /// Number of vehicles in the header.
     vehicles: usize,
     names: Names,
     samples: u64,
@@ -246,7 +246,7 @@ impl Rows for Run {
             let Some(entry) = self.recording.next() else { break };
             let Entry::Sample(sample) = entry? else { continue };
             if self.names.all().is_empty() {
-                // The sample really holds as many: the number is no longer a claim.
+                // A sample has confirmed the number of vehicles in the header.
                 self.names = Names::numbered(self.vehicles);
             }
             self.samples += 1;

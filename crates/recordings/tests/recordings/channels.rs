@@ -1,4 +1,4 @@
-//! What a run says of every vehicle beside its motion is exported with it, and is nobody's position when it is read back.
+//! Channels of a run are exported with it, and readers of motion ignore them.
 
 use std::fs::{self, File};
 use std::io::Read as _;
@@ -18,13 +18,13 @@ use crate::recording::Whole;
 const VEHICLES: usize = 3;
 const SAMPLES: usize = 40;
 
-/// A number that uses all its bits; the last column of the last vehicle is not known at first.
+/// Returns a number that uses all its bits; the last column of the last vehicle is unknown at first.
 fn number(k: usize, vehicle: usize, column: usize) -> f64 {
     let unknown = k == 0 && vehicle == 2 && column == 3;
     if unknown { f64::INFINITY } else { ((k * 12 + vehicle * 4 + column) as f64 + 0.1).sin() / 3.0 }
 }
 
-/// A run whose channels are an attitude and one whose columns are called as those of a position.
+/// Returns a run with an attitude channel and a channel whose columns have names of position columns.
 fn run() -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
@@ -79,7 +79,7 @@ const HEADER: [&str; 16] = [
 ];
 
 #[test]
-fn motion_is_read_back_from_every_format_as_if_there_were_no_channels() {
+fn channels_do_not_affect_the_motion() {
     let (_folder, run) = run();
     let truth = whole(&run);
     assert_eq!((truth.vehicles.len(), truth.items.len()), (VEHICLES, VEHICLES * SAMPLES));
@@ -90,7 +90,7 @@ fn motion_is_read_back_from_every_format_as_if_there_were_no_channels() {
 }
 
 #[test]
-fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is_known() {
+fn tables_have_channel_columns_with_empty_cells_for_unknown_values() {
     let (_folder, run) = run();
     let text = fs::read_to_string(exported(&run, Format::CSV)).expect("a table");
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
@@ -105,7 +105,7 @@ fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is
         }
     }
     assert_eq!(empty, 2);
-    // The same columns in Parquet.
+    // Parquet has the same columns.
     let file = File::open(exported(&run, Format::PARQUET)).expect("a file");
     let rows = SerializedFileReader::new(file).expect("Parquet").into_iter();
     for (n, row) in rows.map(|row| row.expect("a row")).enumerate() {
@@ -118,7 +118,7 @@ fn a_table_has_a_column_for_each_of_a_channel_and_an_empty_cell_where_nothing_is
 }
 
 #[test]
-fn an_archive_has_an_array_for_each_channel_and_the_names_of_its_columns() {
+fn npz_has_arrays_of_channels_and_column_names() {
     let (_folder, run) = run();
     let file = File::open(exported(&run, Format::NPZ)).expect("a file");
     let mut archive = zip::ZipArchive::new(file).expect("an archive");
@@ -141,7 +141,7 @@ fn an_archive_has_an_array_for_each_channel_and_the_names_of_its_columns() {
 }
 
 #[test]
-fn what_was_exported_in_mcap_is_exported_again_with_its_channels() {
+fn channels_survive_repeated_mcap_export() {
     let (_folder, run) = run();
     let once = fs::read(exported(&run, Format::CSV)).expect("a table");
     let mcap = exported(&run, Format::MCAP);
@@ -151,6 +151,6 @@ fn what_was_exported_in_mcap_is_exported_again_with_its_channels() {
     export::export(&open, Format::CSV, &ExportOptions::default(), &mut File::create(&bare).expect("a file"))
         .expect("exported");
     let bare_text = fs::read_to_string(&bare).expect("a table");
-    assert_eq!(bare_text.lines().next(), Some("t_s,id,x,y,z,vx,vy,vz"), "nobody asked for channels");
+    assert_eq!(bare_text.lines().next(), Some("t_s,id,x,y,z,vx,vy,vz"), "exported without channels");
     assert!(read::open_channels(&bare).expect("no channels").is_none());
 }

@@ -1,4 +1,4 @@
-//! `run.mcap` holds what was recorded, bit for bit, and what it cannot hold it says.
+//! `run.mcap` round-trips bit for bit and reports damage.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 const RECORD_HZ: f64 = 60.0;
 
-/// A made-up run with every kind of event, numbers that use all bits, and samples with and without a summary.
+/// Synthetic run with all kinds of events, numbers that use all bits, and samples with and without a summary.
 pub(crate) struct Run {
     pub(crate) header: Header,
     pub(crate) samples: Vec<OwnedSample>,
@@ -108,7 +108,7 @@ pub(crate) fn hash(samples: &[OwnedSample]) -> String {
     hash.finish()
 }
 
-/// Where the chunks begin and end, going by the framing alone: type, length, content.
+/// Returns the byte ranges of the chunks, by the framing alone: type, length, content.
 fn chunks(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
     let (mut at, mut found) = (mcap::MAGIC.len(), Vec::new());
     while bytes[at] != op::DATA_END {
@@ -123,7 +123,7 @@ fn chunks(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
 }
 
 #[test]
-fn what_is_read_back_has_the_same_bits_as_what_was_recorded() {
+fn round_trip_preserves_all_bits() {
     let run = Run::new(5, 150);
     let (header, samples, events, complete) = read(&recorded(&run)).expect("read back");
     assert!(complete);
@@ -137,7 +137,7 @@ fn what_is_read_back_has_the_same_bits_as_what_was_recorded() {
 }
 
 #[test]
-fn samples_and_events_come_back_in_the_order_of_recording() {
+fn samples_and_events_keep_their_order() {
     let run = Run::new(5, 4);
     let (_folder, path) = folder();
     run.record(&path, |_| ()).expect("recorded");
@@ -158,7 +158,7 @@ fn two_recordings_of_one_run_are_equal_byte_for_byte() {
 }
 
 #[test]
-fn the_messages_are_those_of_the_mcap_crate_s_own_reader() {
+fn messages_agree_with_the_reader_of_the_mcap_crate() {
     let run = Run::new(5, 90);
     let bytes = recorded(&run);
     let mut topics = std::collections::BTreeMap::new();
@@ -168,7 +168,7 @@ fn the_messages_are_those_of_the_mcap_crate_s_own_reader() {
         assert_eq!((message.channel.message_encoding.as_str(), schema.encoding.as_str()), ("cdr", "ros2msg"));
         assert_eq!(message.log_time, message.publish_time);
         if message.channel.topic == "/swarm" {
-            // After 4 bytes of CDR head: time, step, then the length of the first array.
+            // CDR header of 4 bytes, time and step precede the length of the first array.
             assert_eq!(message.data[..4], [0, 1, 0, 0]);
             let time_s = f64::from_le_bytes(message.data[4..12].try_into().expect("8 bytes"));
             assert!((message.log_time as f64 - time_s * 1e9).abs() <= 0.5, "{} ns at {time_s} s", message.log_time);
@@ -182,7 +182,7 @@ fn the_messages_are_those_of_the_mcap_crate_s_own_reader() {
 }
 
 #[test]
-fn a_file_cut_anywhere_gives_every_chunk_that_was_flushed_before_the_cut() {
+fn truncated_file_yields_all_flushed_chunks() {
     let run = Run::new(5, 200);
     let (_folder, path) = folder();
     let mut flushed = vec![(0, 0)];
@@ -213,7 +213,7 @@ fn a_file_cut_anywhere_gives_every_chunk_that_was_flushed_before_the_cut() {
 }
 
 #[test]
-fn no_more_than_a_second_of_flight_or_a_full_chunk_is_ever_waiting() {
+fn chunks_are_flushed_by_time_and_by_size() {
     for (vehicles, samples) in [(5, 200), (1000, 40)] {
         let run = Run::new(vehicles, samples);
         let (_folder, path) = folder();
@@ -233,7 +233,7 @@ fn no_more_than_a_second_of_flight_or_a_full_chunk_is_ever_waiting() {
 }
 
 #[test]
-fn samples_rarer_than_the_flush_period_are_flushed_one_by_one() {
+fn rare_samples_are_flushed_individually() {
     let (_folder, path) = folder();
     let mut recorder = McapRecorder::create(&path, &Run::new(5, 0).header).expect("creates");
     let mut length = 0;
@@ -246,7 +246,7 @@ fn samples_rarer_than_the_flush_period_are_flushed_one_by_one() {
 }
 
 #[test]
-fn a_recorder_that_is_dropped_leaves_everything_readable() {
+fn dropped_recorder_leaves_a_readable_file() {
     let run = Run::new(5, 10);
     let (_folder, path) = folder();
     let mut recorder = McapRecorder::create(&path, &run.header).expect("creates");
@@ -260,7 +260,7 @@ fn a_recorder_that_is_dropped_leaves_everything_readable() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_full_disk_is_an_error_with_the_path_and_stays_one() {
+fn full_disk_is_a_persistent_error_with_the_path() {
     let run = Run::new(5, 2);
     let mut recorder = McapRecorder::create(Path::new("/dev/full"), &run.header).expect("opens");
     let full = |result: Result<(), RecordError>| match result {
@@ -279,7 +279,7 @@ fn a_full_disk_is_an_error_with_the_path_and_stays_one() {
 }
 
 #[test]
-fn a_folder_that_does_not_exist_is_an_error_with_the_path() {
+fn missing_folder_is_an_error_with_the_path() {
     let (folder, _) = folder();
     let path = folder.path().join("missing/run.mcap");
     let error = McapRecorder::create(&path, &Run::new(5, 0).header).err().expect("an error");
@@ -290,14 +290,14 @@ fn a_folder_that_does_not_exist_is_an_error_with_the_path() {
 }
 
 #[test]
-fn files_that_are_no_recording_are_named_for_what_they_are() {
+fn other_files_are_identified_in_the_error() {
     assert_eq!(fault(b""), ReadFault::Empty);
     assert_eq!(fault(b"time,x,y\n0,1,2\n"), ReadFault::NotMcap);
     assert_eq!(fault(&mcap::MAGIC[..5]), ReadFault::NotMcap);
     assert_eq!(fault(mcap::MAGIC), ReadFault::NoChannel { topic: "/swarm" });
 }
 
-/// An MCAP file with one channel and one message, by the format's own writer.
+/// Returns an MCAP file with one channel and one message, written by the `mcap` crate.
 fn foreign(topic: &str, schema: &str, encoding: &str) -> Vec<u8> {
     let mut out = mcap::Writer::new(std::io::Cursor::new(Vec::new())).expect("writes");
     let schema = out.add_schema(schema, "ros2msg", b"float64 x").expect("a schema");
@@ -309,7 +309,7 @@ fn foreign(topic: &str, schema: &str, encoding: &str) -> Vec<u8> {
 }
 
 #[test]
-fn mcap_files_of_others_are_named_for_what_they_lack() {
+fn foreign_mcap_files_are_refused_with_the_missing_channel() {
     assert_eq!(fault(&foreign("/odom", "nav_msgs/msg/Odometry", "cdr")), ReadFault::NoChannel { topic: "/swarm" });
     assert_eq!(
         fault(&foreign("/swarm", "tautline_msgs/msg/Swarm", "cdr")),
@@ -322,7 +322,7 @@ fn mcap_files_of_others_are_named_for_what_they_lack() {
 }
 
 #[test]
-fn a_chunk_with_one_wrong_bit_is_refused_and_the_chunks_before_it_are_read() {
+fn damaged_chunk_is_refused_after_the_intact_chunks() {
     let run = Run::new(5, 200);
     let bytes = recorded(&run);
     let chunks = chunks(&bytes);
@@ -341,7 +341,7 @@ fn a_chunk_with_one_wrong_bit_is_refused_and_the_chunks_before_it_are_read() {
 }
 
 #[test]
-fn a_record_that_claims_more_than_a_recording_needs_is_refused_before_it_is_read() {
+fn oversized_record_is_refused_before_reading() {
     let mut bytes = recorded(&Run::new(5, 10));
     let chunk = chunks(&bytes)[0].clone();
     bytes[chunk.start + 1..chunk.start + 9].copy_from_slice(&u64::MAX.to_le_bytes());
@@ -349,7 +349,7 @@ fn a_record_that_claims_more_than_a_recording_needs_is_refused_before_it_is_read
 }
 
 #[test]
-fn a_closed_file_with_a_record_beyond_its_end_is_damaged_and_not_merely_unfinished() {
+fn record_past_the_end_of_a_closed_file_is_damage() {
     let mut bytes = recorded(&Run::new(5, 10));
     let chunk = chunks(&bytes)[0].clone();
     let beyond = bytes.len() as u64;
@@ -360,19 +360,19 @@ fn a_closed_file_with_a_record_beyond_its_end_is_damaged_and_not_merely_unfinish
 }
 
 #[test]
-fn two_recordings_joined_in_one_file_are_refused() {
+fn concatenated_recordings_are_refused() {
     let bytes = recorded(&Run::new(5, 10));
     assert!(matches!(fault(&[&bytes[..], &bytes[..]].concat()), ReadFault::Damaged { .. }));
 }
 
 #[test]
-fn samples_of_another_number_of_vehicles_are_refused() {
+fn samples_with_a_wrong_vehicle_count_are_refused() {
     let mut run = Run::new(5, 3);
     run.samples[2] = sample(6, 2);
     assert!(matches!(fault(&recorded(&run)), ReadFault::Message { topic, .. } if topic == "/swarm"));
 }
 
-/// Sets the checksums of all chunks to "none", so that damage inside reaches the parsers behind the check.
+/// Sets the checksums of all chunks to "none", so that damage inside reaches the parsers.
 fn without_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
     for chunk in chunks(&bytes) {
         bytes[chunk.start + 9 + 24..chunk.start + 9 + 28].fill(0);
@@ -390,7 +390,7 @@ proptest! {
     }
 
     #[test]
-    fn a_damaged_recording_never_panics(
+    fn damaged_recording_never_panics(
         checked in any::<bool>(),
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
     ) {

@@ -1,4 +1,4 @@
-//! Who is who in messages of others, and where: what does not say it is refused, and never judged as somebody else.
+//! Messages of foreign recordings with ambiguous vehicles, frames or setpoints are refused.
 
 use tautline_recordings::read::ReadOptions;
 
@@ -25,7 +25,7 @@ fn list(topic: &'static str, nanosec: u32, xs: &[f64]) -> Message {
     (topic, POSES, "cdr", u64::from(nanosec), cdr(&(header(nanosec), poses), true))
 }
 
-/// Asserts the code and the place of the refusal.
+/// Asserts the code and the place of an error.
 #[track_caller]
 fn refused(messages: &[Message], options: &ReadOptions, code: &str, place: &str) {
     assert_refused(&read_bytes("ros.mcap", &mcap_of(messages), options).expect_err("refused"), code, place);
@@ -45,17 +45,17 @@ fn framed(frame: &str) -> ReadOptions {
 }
 
 #[test]
-fn a_list_that_gets_shorter_does_not_say_who_was_lost() {
+fn pose_lists_of_changing_length_are_refused() {
     let shorter = [list("/poses", 1, &[0.0, 3.0, 6.0]), list("/poses", 2, &[3.0, 6.0])];
     refused(&shorter, &ReadOptions::default(), "recording/list-length", "message 2 on topic `/poses`");
-    // An empty one says that nobody was seen.
+    // An empty list contains no vehicle.
     let lists = [(1, &[0.0, 3.0][..]), (2, &[]), (3, &[0.0, 3.0])].map(|(ns, xs)| list("/poses", ns, xs));
     let found = whole("ros.mcap", &mcap_of(&lists));
     assert_eq!(found.samples().len(), 4);
 }
 
 #[test]
-fn a_goal_is_no_vehicle() {
+fn goal_is_not_a_vehicle() {
     let goal = [pose("/cf1/pose", "world", 1, 0.0), pose("/cf1/goal_pose", "world", 1, 0.1)];
     refused(&goal, &ReadOptions::default(), AMBIGUOUS, "");
     assert_eq!(read_bytes("ros.mcap", &mcap_of(&goal), &naming(&["/cf1/pose"])).expect("read").vehicles, ["/cf1/pose"]);
@@ -64,8 +64,8 @@ fn a_goal_is_no_vehicle() {
 }
 
 #[test]
-fn where_somebody_is_asked_to_be_is_no_vehicle_whatever_part_of_the_topic_says_it() {
-    for [position, wish] in [
+fn setpoint_in_any_topic_part_is_not_a_vehicle() {
+    for [position, setpoint] in [
         ["/uav1/mavros/local_position/pose", "/uav1/mavros/setpoint_position/local"],
         ["/uav1/pose", "/uav1/setpoint/pose"],
         ["/drone0/self_localization/pose", "/drone0/motion_reference/pose"],
@@ -73,26 +73,26 @@ fn where_somebody_is_asked_to_be_is_no_vehicle_whatever_part_of_the_topic_says_i
         ["/optitrack/cf1", "/planner/cf1/goals"],
         ["/robot/pose", "/clicked_point"],
     ] {
-        let both = [pose(position, "world", 1, 0.0), pose(wish, "world", 1, 9.0)];
-        let error = read_bytes("ros.mcap", &mcap_of(&both), &ReadOptions::default()).expect_err(wish);
+        let both = [pose(position, "world", 1, 0.0), pose(setpoint, "world", 1, 9.0)];
+        let error = read_bytes("ros.mcap", &mcap_of(&both), &ReadOptions::default()).expect_err(setpoint);
         assert_refused(&error, AMBIGUOUS, "");
         let found = read_bytes("ros.mcap", &mcap_of(&both), &naming(&[position])).expect("read");
         assert_eq!(found.vehicles, [position]);
     }
-    // Lists and transforms are told apart from wishes as well.
-    let wish = || pose("/swarm/cf1/setpoint/pose", "world", 1, 0.0);
+    // The same holds for lists and transforms beside setpoints.
+    let setpoint = || pose("/swarm/cf1/setpoint/pose", "world", 1, 0.0);
     for other in [list("/swarm/poses", 1, &[0.0, 3.0]), transform("/tf", 1, "world", "cf1", 0.0)] {
-        refused(&[wish(), other], &ReadOptions::default(), AMBIGUOUS, "");
+        refused(&[setpoint(), other], &ReadOptions::default(), AMBIGUOUS, "");
     }
-    // Where nothing else is told, that is what is judged.
+    // Setpoints are judged if there are no other positions.
     let targets = ["/target_1/pose", "/target_2/pose"];
     let found = whole("ros.mcap", &mcap_of(&targets.map(|topic| pose(topic, "world", 1, 0.0))));
     assert_eq!(found.vehicles, targets);
-    assert!(found.notes.iter().any(|note| note.ends_with("not where a vehicle is: /target_1/pose, /target_2/pose")));
+    assert!(found.notes.iter().any(|note| note.ends_with("not of measured positions: /target_1/pose, /target_2/pose")));
 }
 
 #[test]
-fn topics_that_are_named_are_vehicles_whatever_they_are_called() {
+fn topic_option_accepts_setpoint_names() {
     for topics in [["/chaser", "/target"], ["/chaser/pose", "/goal/pose"], ["/uav1/pose", "/uav1/ref"]] {
         let both = topics.map(|topic| pose(topic, "world", 1, 0.0));
         assert!(read_bytes("ros.mcap", &mcap_of(&both), &ReadOptions::default()).is_err());
@@ -107,7 +107,7 @@ fn topics_that_are_named_are_vehicles_whatever_they_are_called() {
 }
 
 #[test]
-fn a_topic_that_is_not_read_spoils_nothing() {
+fn ignored_topics_have_no_effect() {
     let vehicles = ["/uav1/pose", "/uav2/pose"];
     let of_others = [
         [list("/people", 1, &[0.0, 3.0]), list("/people", 2, &[0.0])],
@@ -131,7 +131,7 @@ fn a_topic_that_is_not_read_spoils_nothing() {
 }
 
 #[test]
-fn degrees_are_never_metres() {
+fn degrees_and_metres_are_not_mixed() {
     let fixes = [fix("/r1/fix", 1, [47.0, 8.0, 400.0]), fix("/r2/fix", 2, [47.0, 8.0001, 400.0])];
     refused(&fixes, &framed("WGS 84"), "recording/unusable-frame", "message 1 on topic `/r1/fix`");
     let found = whole("ros.mcap", &mcap_of(&fixes));
@@ -142,14 +142,14 @@ fn degrees_are_never_metres() {
 }
 
 #[test]
-fn the_origin_is_a_place_that_is_read() {
+fn origin_is_the_first_place_that_is_read() {
     let fixes = [fix("/base/fix", 1, [f64::NAN, 8.0, 400.0]), fix("/r2/fix", 2, [47.0, 8.0, 400.0])];
     let found = read_bytes("ros.mcap", &mcap_of(&fixes), &naming(&["/r2/fix"])).expect("the other is not read");
     assert_eq!(found.samples()[0].2, [0.0; 3]);
 }
 
 #[test]
-fn local_positions_of_autopilots_are_each_counted_from_its_own_start() {
+fn local_positions_of_several_autopilots_are_refused() {
     let local = ["/uav1/mavros/local_position/pose", "/uav2/mavros/local_position/pose"];
     let messages = local.map(|topic| pose(topic, "map", 1, 0.0));
     refused(&messages, &ReadOptions::default(), "recording/several-frames", "");
@@ -157,7 +157,7 @@ fn local_positions_of_autopilots_are_each_counted_from_its_own_start() {
 }
 
 #[test]
-fn a_frame_that_stands_still_and_moves_is_nobodys_place() {
+fn frame_with_constant_and_moving_poses_is_refused() {
     let torn = [("/tf_static", 1, 0.0), ("/tf", 2, 1.0), ("/tf", 3, 2.0)];
     let torn = torn.map(|(topic, nanosec, x)| transform(topic, nanosec, "map", "r1/base_link", x));
     refused(&torn, &ReadOptions::default(), "recording/transforms", "");

@@ -1,17 +1,17 @@
-//! Channels of our own recordings, whatever they are of.
+//! Channels of run recordings round-trip, whatever their content.
 
 use tautline_core::record::{Channel, OwnedSample, ReadFault};
 
 use super::own::{Run, fault, hash, read, recorded};
 
-/// A channel of a made-up sensor that measures `columns` of every vehicle.
+/// Returns a channel of a synthetic sensor that measures `columns` of every vehicle.
 fn channel(name: &str, columns: &[&str], vehicles: usize, seed: f64) -> Channel {
     let values = (0..vehicles * columns.len()).map(|k| (seed + k as f64).sin() / 3.0).collect();
     Channel { values, ..Channel::new(name, columns) }
 }
 
 #[test]
-fn channels_come_back_bit_for_bit_whichever_they_are() {
+fn channels_round_trip_bit_for_bit() {
     let mut run = Run::new(5, 150);
     for (k, sample) in run.samples.iter_mut().enumerate() {
         let mut odour = channel("odour", &["rose_mol_m3", "tar_mol_m3"], 5, k as f64);
@@ -48,7 +48,7 @@ fn channels_come_back_bit_for_bit_whichever_they_are() {
 }
 
 #[test]
-fn a_channel_with_another_number_of_values_is_refused() {
+fn channel_with_a_wrong_value_count_is_refused() {
     let mut run = Run::new(5, 3);
     run.samples[2].channels = vec![channel("odour", &["rose_mol_m3", "tar_mol_m3"], 4, 0.0)];
     let reason = "it has 8 numbers, which is not 2 for each of 5 vehicles".to_owned();

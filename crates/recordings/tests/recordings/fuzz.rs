@@ -1,6 +1,6 @@
-//! Whatever bytes a file holds, reading it ends: with motion or with an error, without a panic, in little memory.
+//! Readers end with motion or an error for arbitrary bytes, without a panic and with little memory.
 //!
-//! The cases are few by default; `TAUTLINE_FUZZ_CASES` sets how many there are of each kind.
+//! The number of cases is small by default; `TAUTLINE_FUZZ_CASES` sets the number of each kind.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -19,13 +19,13 @@ use crate::messages::{cdr, mcap_with};
 use crate::recording::Whole;
 use crate::ulog::Log;
 
-/// Cases of each kind where nobody says otherwise.
+/// Default number of cases of each kind.
 const CASES: u32 = 60;
 
-/// Longer than any file of a few kilobytes takes, on a slow and busy machine.
+/// Time limit for a file of a few kilobytes, on a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// More items than any file of a few kilobytes holds.
+/// Limit of the number of items in a file of a few kilobytes.
 const MANY: usize = 10_000_000;
 
 fn cases() -> u32 {
@@ -42,15 +42,36 @@ const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5
 const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
     {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"#;
-const VVIZ: &str = r#"{"defaultPositionRate": 2, "timeOffsetSecs": 1, "performances": [{"id": 0, "agentDescription":
-    {"homeX": 1, "homeY": 2, "homeZ": 3, "agentTraversal": [{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 1,
-    "dz": 0}, {"dx": 1, "dy": 0, "dz": 2}]}}]}"#;
-const MOTIVE: &str = "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n\n\
-    ,Type,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n,Name,a,a,a,a:1,a:1,a:1\n,ID,A,A,A,B,B,B\n\
-    ,,Position,Position,Position,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z,X,Y,Z\n\
-    0,0.00,1,2,3,1,2,3\n1,0.01,,,,1,2,3\n2,0.02,1,2,4,,,\n";
-const VICON: &str = "Trajectories\n100\n,,a:1,,,a:2,,,b,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n\
-    ,,mm,mm,mm,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6,7,8,9\n2,0,1,2,3,,,,7,8,9\n\nDevices\n1000\n";
+const VVIZ: &str = concat!(
+    r#"{"defaultPositionRate": 2, "timeOffsetSecs": 1, "performances": [{"id": 0, "agentDescription": "#,
+    r#"{"homeX": 1, "homeY": 2, "homeZ": 3, "agentTraversal": [{"dx": 0, "dy": 0, "dz": 0}, "#,
+    r#"{"dt": 1.5, "dx": 0, "dy": 1, "#,
+    r#""dz": 0}, {"dx": 1, "dy": 0, "dz": 2}]}}]}"#,
+);
+const MOTIVE: &str = concat!(
+    "Format Version,1.23,Length Units,Meters,Coordinate Space,Global\n",
+    "\n",
+    ",Type,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n",
+    ",Name,a,a,a,a:1,a:1,a:1\n",
+    ",ID,A,A,A,B,B,B\n",
+    ",,Position,Position,Position,Position,Position,Position\n",
+    "Frame,Time (Seconds),X,Y,Z,X,Y,Z\n",
+    "0,0.00,1,2,3,1,2,3\n",
+    "1,0.01,,,,1,2,3\n",
+    "2,0.02,1,2,4,,,\n",
+);
+const VICON: &str = concat!(
+    "Trajectories\n",
+    "100\n",
+    ",,a:1,,,a:2,,,b,,\n",
+    "Frame,Sub Frame,X,Y,Z,X,Y,Z,X,Y,Z\n",
+    ",,mm,mm,mm,mm,mm,mm,mm,mm,mm\n",
+    "1,0,1,2,3,4,5,6,7,8,9\n",
+    "2,0,1,2,3,,,,7,8,9\n",
+    "\n",
+    "Devices\n",
+    "1000\n",
+);
 const EARTH: &str =
     "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,47.301,8.5,400,0.1\n";
 const JSONL: &str =
@@ -58,8 +79,9 @@ const JSONL: &str =
 const PX4: &str = "timestamp,x,y,z,ref_lat,ref_lon,ref_alt,xy_valid\n0,1,2,-3,47,8,400,1\n20000,1,2,-3,nan,8,400,1\n";
 const SPLIT: &str = "sec,nanosec,id,north,east,down\ns,ns,-,m,m,m\n1,5,a,1,2,3\n1,999999999,a,1,2,4\n";
 const DATES: &str = "time,id,x,y\n2023-11-14T22:13:20.5Z,a,1,2\n2023-11-14 23:13:21+01:00,a,1,2\n";
-const METADATA: &str = "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  compression_format: ''\n\
-    \x20 compression_mode: ''\n  relative_file_paths:\n  - bag_0.mcap\n  - bag_1.mcap.zstd\n  message_count: 3\n";
+const METADATA: &str = "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n\
+    \x20 compression_format: ''\n  compression_mode: ''\n  relative_file_paths:\n\
+    \x20 - bag_0.mcap\n  - bag_1.mcap.zstd\n  message_count: 3\n";
 
 /// Valid files of every format.
 fn seeds() -> Vec<(&'static str, Vec<u8>)> {
@@ -114,8 +136,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// What a seed needs to be read; of MCAP also what was not closed. Elsewhere such an option is refused before anything is
-/// read.
+/// Returns the options that a seed requires. MCAP seeds are also read unclosed; other formats refuse that option.
 fn options_of(seed: &str) -> ReadOptions {
     let is_mcap =
         ["mcap", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"].contains(&seed);
@@ -123,7 +144,7 @@ fn options_of(seed: &str) -> ReadOptions {
     ReadOptions { frame, allow_unfinished: is_mcap, ..ReadOptions::default() }
 }
 
-/// Poses in frames that transforms lead from, every message alone.
+/// Returns poses in frames connected by transforms, one message each.
 fn frames() -> Vec<u8> {
     const TURN: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     const TF: &str = "tf2_msgs/msg/TFMessage";
@@ -148,7 +169,7 @@ fn frames() -> Vec<u8> {
     mcap_with(options, &messages)
 }
 
-/// A recording of others: JSON and CDR, its chunks packed or not.
+/// Returns a foreign recording with JSON and CDR messages, with chunks packed or not.
 fn foreign(compression: Option<&str>) -> Vec<u8> {
     let options = mcap::WriteOptions::new().compression(None).use_chunks(false);
     let mut out = options.create(Cursor::new(Vec::new())).expect("a writer");
@@ -173,7 +194,7 @@ fn foreign(compression: Option<&str>) -> Vec<u8> {
     compression.map_or_else(|| plain.clone(), |name| packed(&plain, name))
 }
 
-/// The records between the magic bytes and the end of the data section in one packed chunk.
+/// Moves the records of the data section into one compressed chunk.
 fn packed(plain: &[u8], compression: &str) -> Vec<u8> {
     let (mut at, mut header, mut records) = (mcap::MAGIC.len(), Vec::new(), Vec::new());
     while plain[at] != mcap::records::op::DATA_END {
@@ -200,8 +221,8 @@ fn packed(plain: &[u8], compression: &str) -> Vec<u8> {
     file
 }
 
-/// Reads a file to its end or to its error and looks at what it gave.
-fn survive(path: &Path, options: &ReadOptions) -> Result<(), String> {
+/// Reads a file to its end or to an error, and checks the items.
+fn check_read(path: &Path, options: &ReadOptions) -> Result<(), String> {
     let begin = Instant::now();
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         let mut items = Vec::new();
@@ -224,7 +245,7 @@ fn survive(path: &Path, options: &ReadOptions) -> Result<(), String> {
     }
 }
 
-/// What breaks the promises of a recording, if anything does.
+/// Returns a violation of the contract of `Tracks`, if there is one.
 fn fault_of(items: &[Item], vehicles: usize) -> Option<String> {
     let mut last = vec![f64::NEG_INFINITY; vehicles];
     let mut now = f64::NEG_INFINITY;
@@ -250,23 +271,23 @@ fn each(name: &str, strategy: impl Strategy<Value = Vec<u8>>, options: &ReadOpti
     each_at(&path, &path, name, strategy, options);
 }
 
-/// Writes a file in many ways, and reads what is a recording with it.
+/// Writes mutations of a file, and reads the recording that contains it.
 fn each_at(file: &Path, recording: &Path, name: &str, strategy: impl Strategy<Value = Vec<u8>>, options: &ReadOptions) {
     let config = Config { cases: cases(), failure_persistence: None, ..Config::default() };
     let done = TestRunner::new(config).run(&strategy, |bytes| {
         fs::write(file, &bytes).expect("written");
-        survive(recording, options).map_err(|fault| TestCaseError::fail(format!("{name}: {fault}")))
+        check_read(recording, options).map_err(|fault| TestCaseError::fail(format!("{name}: {fault}")))
     });
     if let Err(fault) = done {
         panic!("{name}: {fault}");
     }
 }
 
-/// A change of a file.
+/// Mutation of a file.
 #[derive(Clone, Debug)]
 enum Change {
     Set(prop::sample::Index, u8),
-    /// A number that lengths like to be.
+    /// Typical value of a length.
     Length(prop::sample::Index, u64, usize),
     Cut(prop::sample::Index),
     Remove(prop::sample::Index, usize),
@@ -323,7 +344,7 @@ fn changed(mut bytes: Vec<u8>, changes: Vec<Change>) -> Vec<u8> {
 }
 
 #[test]
-fn changed_files_of_every_format_are_survived() {
+fn mutated_files_of_every_format_never_panic() {
     for (name, seed) in seeds() {
         let strategy = prop::collection::vec(change(), 1..6).prop_map(move |changes| changed(seed.clone(), changes));
         each(name, strategy, &options_of(name));
@@ -331,7 +352,7 @@ fn changed_files_of_every_format_are_survived() {
 }
 
 #[test]
-fn changed_bags_are_survived() {
+fn mutated_bags_never_panic() {
     let folder = tempfile::tempdir().expect("a folder");
     let packed = zstd::encode_all(foreign(None).as_slice(), 1).expect("packed");
     let files =
@@ -350,7 +371,7 @@ fn changed_bags_are_survived() {
 }
 
 #[test]
-fn random_bytes_are_survived_by_every_reader() {
+fn random_bytes_never_panic_any_reader() {
     for format in Format::all() {
         let options = ReadOptions { format: Some(format), ..ReadOptions::default() };
         each(format.name, prop::collection::vec(any::<u8>(), 0..2000), &options);
@@ -362,7 +383,7 @@ fn random_bytes_are_survived_by_every_reader() {
 }
 
 #[test]
-fn the_seeds_themselves_are_read() {
+fn seeds_are_valid() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("recording");
     for (name, seed) in seeds() {
@@ -372,7 +393,7 @@ fn the_seeds_themselves_are_read() {
             while tracks.read(&mut items)? {}
             Ok(())
         });
-        // The show of plain JSON refers to a part that only the archive has.
+        // The JSON show refers to a part that only the archive contains.
         assert_eq!(read.is_ok(), name != "show", "{name}: {:?}", read.err().map(|error| error.to_string()));
     }
 }
