@@ -157,7 +157,7 @@ fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
 
     let collinear = run(folder.path(), &["pentagon-collinear", "--force"]);
     assert_eq!(collinear.exit, BAD);
-    assert!(collinear.out.starts_with("CLEAR: ") && collinear.out.contains("NOT reached"), "{}", collinear.out);
+    assert!(collinear.out.starts_with("REFUSED BY CHECK: start-on-line; not reached: largest edge error "), "{}", collinear.out);
     assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
     let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
     assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
@@ -200,7 +200,7 @@ fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
     assert_eq!(report["hulls"]["bounces"], Value::Null);
     let through = &report["hulls"]["passed_through"];
     assert!(through["min_m"].as_f64() < through["touching_m"].as_f64(), "{through}");
-    assert!(points.err.contains("passed through each other as points"), "{}", points.err);
+    assert!(points.err.contains("passed through each other: vehicles "), "{}", points.err);
     assert!(report["verdict"]["reasons"].to_string().contains("solid ones fly otherwise"));
 
     // Nothing of the kind is said of a flight without.

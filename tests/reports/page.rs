@@ -106,7 +106,7 @@ fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_n
     let folder = tempfile::tempdir().expect("a folder");
     let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2"]);
     for part in [
-        "CLEAR: never closer than",
+        "(clear: never closer than",
         "certified 2.055307 m",
         "The certified distance holds for the complete graph",
         "Everything is computed in double precision",

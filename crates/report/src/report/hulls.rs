@@ -59,7 +59,7 @@ impl Hulls {
     pub(super) fn brief(&self) -> Option<String> {
         let through = self.passed_through.map(|through| {
             let how = if self.bounces.is_none() { "as points" } else { "in one step" };
-            format!("vehicles {} passed through each other {how}", through.pair)
+            format!("passed through each other: {}, {how}", vehicles(through.pair))
         });
         let hits = self.hits();
         through.into_iter().chain(hits).reduce(|all, next| all + "; " + &next)
@@ -68,22 +68,23 @@ impl Hulls {
     fn hits(&self) -> Option<String> {
         let bounces = self.bounces.as_deref().unwrap_or_default();
         let &Bounce { pair, time_s, closing_m_s } = bounces.first()?;
-        let first = format!("vehicles {pair} at {} with {} m/s", seconds(time_s), metres(closing_m_s));
+        let first = format!("{} at {} with {} m/s", vehicles(pair), seconds(time_s), metres(closing_m_s));
         Some(match bounces.len() {
             1 => format!("hulls hit once: {first}"),
-            times => format!("hulls hit {times} times, first {first}"),
+            times => format!("hulls hit {times} times: first {first}"),
         })
     }
 
     /// In a sentence that says what it means for the flight.
     pub(super) fn reason(&self) -> Option<String> {
         let through = self.passed_through.map(|PassedThrough { pair, min_at_s, min_m, touching_m }| {
+            let [first, second] = pair.numbers();
             let why = match self.bounces {
                 None => "The ideal plant's vehicles are points",
                 Some(_) => "A step leapt over the hit: shorten time.dt_s",
             };
             format!(
-                "Vehicles {pair} passed through each other: their hulls touch at {} m, and they came to {} m at {}. {why}; from \
+                "Vehicles {first} and {second} passed through each other: their hulls touch at {} m, and they came to {} m at {}. {why}; from \
                  then on solid ones fly otherwise.",
                 metres(touching_m),
                 metres_below(min_m, touching_m),
@@ -100,6 +101,12 @@ impl Hulls {
         });
         through.into_iter().chain(hits).reduce(|all, next| all + " " + &next)
     }
+}
+
+/// The vehicles of a pair in words, such as `vehicles 2 and 3`.
+pub(super) fn vehicles(pair: Pair) -> String {
+    let [first, second] = pair.numbers();
+    format!("vehicles {first} and {second}")
 }
 
 #[cfg(test)]
@@ -136,7 +143,10 @@ mod tests {
         let through = of_points(&[1.0, 0.7, 0.1]);
         assert_eq!(through.passed_through.map(|first| (first.min_at_s, first.touching_m)), Some((1.25, 0.75)));
         let reason = through.reason().expect("a reason");
-        assert!(reason.starts_with("Vehicles 1-2 passed through each other: their hulls touch at 0.750 m"), "{reason}");
+        assert!(
+            reason.starts_with("Vehicles 1 and 2 passed through each other: their hulls touch at 0.750 m"),
+            "{reason}"
+        );
     }
 
     #[test]
@@ -145,16 +155,22 @@ mod tests {
         let solid = |bounces: &[Bounce]| Hulls { bounces: Some(bounces.to_vec()), passed_through: None };
         assert_eq!(solid(&[]).brief(), None);
         assert_eq!(solid(&[]).reason(), None);
-        assert_eq!(solid(&[first]).brief().as_deref(), Some("hulls hit once: vehicles 2-3 at 3.62 s with 1.250 m/s"));
+        assert_eq!(
+            solid(&[first]).brief().as_deref(),
+            Some("hulls hit once: vehicles 2 and 3 at 3.62 s with 1.250 m/s")
+        );
         let reason = solid(&[first, first]).reason().expect("a reason");
-        assert!(reason.starts_with("Hulls hit 2 times, first vehicles 2-3 at 3.62 s with 1.250 m/s. What"), "{reason}");
+        assert!(
+            reason.starts_with("Hulls hit 2 times: first vehicles 2 and 3 at 3.62 s with 1.250 m/s. What"),
+            "{reason}"
+        );
     }
 
     #[test]
     fn solid_hulls_that_a_step_leapt_over_are_not_said_to_have_missed() {
         let points = audit(&[0.1]);
         let leapt = Hulls::new(Some(Vec::new()), &points, &[0.25, 0.5], 0.004);
-        assert_eq!(leapt.brief().as_deref(), Some("vehicles 1-2 passed through each other in one step"));
+        assert_eq!(leapt.brief().as_deref(), Some("passed through each other: vehicles 1 and 2, in one step"));
         assert!(leapt.reason().is_some_and(|reason| reason.contains("A step leapt over the hit: shorten time.dt_s")));
         // They hit in that violation, or another pair did.
         let hit = |pair, time_s| [Bounce { pair, time_s, closing_m_s: 1.0 }];

@@ -74,6 +74,13 @@ pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
     (!said.is_empty()).then(|| said.join(" "))
 }
 
+/// The first leg that was not reached, as `not reached: detail`.
+pub(super) fn missed(legs: &[LegNumbers]) -> Option<String> {
+    let leg = legs.iter().find(|leg| leg.reached_at_s.is_none())?;
+    let until = leg.to_s.map(|to_s| format!(" until {}", seconds(to_s)));
+    Some(format!("not reached: leg {}{}", leg.leg, until.unwrap_or_default()))
+}
+
 /// How many of them were reached, in a few words; none for a flight of one leg.
 pub(super) fn brief(legs: &[LegNumbers]) -> Option<String> {
     let reached = legs.iter().filter(|leg| leg.reached_at_s.is_some()).count();

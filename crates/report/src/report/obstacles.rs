@@ -105,6 +105,20 @@ impl Obstacles {
         self.tightest().map(|(room_m, _)| format!("{} m beyond every obstacle's clearance", at_least(room_m, 3)))
     }
 
+    /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the error of
+    /// integration.
+    fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
+        let certified_m = self.certified_room_m?;
+        let (room_m, tightest) = self.tightest()?;
+        (room_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
+    }
+
+    /// The approach that breaks the certificate, in a few words.
+    pub(super) fn broken_certificate(&self) -> Option<String> {
+        let (certified_m, tightest) = self.certified_and_tightest()?;
+        Some(format!("{}, certified {} m beyond it", tightest.brief(), metres(certified_m)))
+    }
+
     /// Every reason that they give against a pass, a sentence.
     pub(super) fn reason(&self) -> Option<String> {
         let violation = self.deepest().filter(|_| self.status == Status::Violation).map(|deepest| {
@@ -115,16 +129,13 @@ impl Obstacles {
             };
             format!("A vehicle came too near to an obstacle: {}.{others}", deepest.brief())
         });
-        let broken = self.tightest().filter(|_| violation.is_none()).and_then(|(room_m, tightest)| {
-            let certified_m = self.certified_room_m?;
-            (room_m < certified_m * (1.0 - INTEGRATION)).then(|| {
-                format!(
-                    "The law certifies {} m beyond every clearance in continuous time, and {}: what was flown is not the \
-                     motion that the proof is about. Shorten time.dt_s.",
-                    metres(certified_m),
-                    tightest.brief()
-                )
-            })
+        let broken = self.certified_and_tightest().filter(|_| violation.is_none()).map(|(certified_m, tightest)| {
+            format!(
+                "The law certifies {} m beyond every clearance in continuous time, and {}: what was flown is not the \
+                 motion that the proof is about. Shorten time.dt_s.",
+                metres(certified_m),
+                tightest.brief()
+            )
         });
         let disagree = (self.disagreements > 0).then(|| {
             let times = counted(self.disagreements, "time", "times");
@@ -191,7 +202,7 @@ impl ObstacleApproach {
             let deep = metres(-min_m);
             return format!("vehicle {vehicle} was {deep} m inside `{obstacle}` at {at} (clearance {clearance} m)");
         }
-        let near = metres_below(*min_m, *clearance_m);
+        let near = if min_m < clearance_m { metres_below(*min_m, *clearance_m) } else { at_least(*min_m, 3) };
         format!("vehicle {vehicle} came to {near} m from `{obstacle}` at {at} (clearance {clearance} m)")
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::flight::{FailedVehicle, FlightResult, Report};
+use super::hulls::vehicles;
 use super::legs;
 use super::obstacles::Obstacles;
 use tautline_audit::Status;
@@ -230,10 +231,10 @@ fn broken_certificate(report: &Report) -> Option<String> {
     let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
     report.breaks_certificate().then(|| {
         format!(
-            "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
+            "The law certifies {} m in continuous time, and {} came to {} m: what was flown is not the motion that \
              the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
             metres(certified_m),
-            closest.pair,
+            vehicles(closest.pair),
             metres_below(closest.separation_m, certified_m),
         )
     })

@@ -54,7 +54,7 @@ fn without_halvings_that_step_jumps_the_barrier_which_no_motion_of_the_law_does(
     assert_eq!((flight.audit.status, flight.audit.violations.len()), (Status::Undecided, 1));
     assert_eq!(refinements(&log), []);
     let report = run::run(&scenario, &mut ()).expect("a report");
-    let said = "UNDECIDED: the step cannot resolve this, as flown vehicles 1-2 came to ";
+    let said = "UNDECIDED: the step cannot resolve this, as flown vehicles 1 and 2 came to ";
     assert!(report.headline().starts_with(said), "{}", report.headline());
     let reasons = &report.verdict.reasons;
     let has = |said: &str| reasons.iter().any(|reason| reason.contains(said));
@@ -112,7 +112,7 @@ fn steps_that_no_halving_makes_short_enough_void_the_certificate_and_never_pass(
     let report = run::run(&stiff, &mut ()).expect("a report");
     assert_eq!(report.run.overlong_steps, flight.overlong_steps);
     assert!(!report.verdict.pass && !report.breaks_certificate());
-    assert!(report.headline().contains("too long for the law"), "{}", report.headline());
+    assert!(report.headline().contains("longer than the law allows"), "{}", report.headline());
     assert!(report.verdict.reasons.iter().any(|reason| reason.contains("longer than the law allows")));
 }
 
@@ -126,6 +126,7 @@ fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law()
     let [refined, whole] = ["time.max_halvings=10", "time.max_halvings=0"].map(report);
     assert_eq!((refined.run.overlong_steps, refined.verdict.pass), (0, true));
     assert!(whole.run.overlong_steps > 0 && !whole.verdict.pass, "{:?}", whole.verdict);
+    assert!(whole.headline().starts_with("STEP TOO LONG: "), "{}", whole.headline());
     assert_eq!(whole.separation.certified_m, None);
 }
 
@@ -184,7 +185,7 @@ fn a_violation_of_a_pair_without_a_link_is_judged_as_ever_and_is_no_matter_of_th
     assert_eq!((flight.audit.status, flight.audit.steps), (Status::Violation, flight.steps));
     assert_eq!(flight.audit.violations[0].pair, Pair::new(1, 2));
     let report = run::run(&star(0.501, 0.02, "star", ""), &mut ()).expect("a report");
-    assert!(report.headline().starts_with("VIOLATION: vehicles 2-3 came to 0.9"), "{}", report.headline());
+    assert!(report.headline().starts_with("VIOLATION: vehicles 2 and 3 came to 0.9"), "{}", report.headline());
 }
 
 #[test]
