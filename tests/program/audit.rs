@@ -313,7 +313,7 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
     let junit = fs::read_to_string(folder.path().join("late.xml")).expect("JUnit");
     assert!(junit.contains("failures=\"0\"") && !late.out.contains("was not seen"), "{junit} {late:?}");
     // Nothing is said of charlie, and that is said.
-    assert!(late.out.contains("(delta 1.000 m); charlie is never there with another; from "), "{late:?}");
+    assert!(late.out.contains("(delta 1.000 m); charlie is never present with another; from "), "{late:?}");
     assert!(late.err.contains("charlie, there from 10.5 s to 19.5 s, is never there with another"), "{late:?}");
     let gap = audit(folder.path(), &["gap.csv", "--delta", "1"]);
     assert_eq!(gap.exit, Some(1), "{gap:?}");

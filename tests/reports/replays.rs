@@ -300,7 +300,7 @@ fn at_no_time_is_more_said_than_the_judge_knows_by_then() {
     let bounds = ["--delta", "1", "--motion", "bounded", "--max-accel", "300"];
     let found = states(folder.path(), &audited(folder.path(), &leap, &bounds), &[10.5]);
     assert!(
-        found[0].starts_with("undecided: a and b may come too near · nearest known so far at least 0.000 m"),
+        found[0].starts_with("undecided: a and b may come too close · nearest known so far at least 0.000 m"),
         "{found:?}"
     );
     // Of single vehicles alone nothing is said of distances.

@@ -7,8 +7,8 @@ use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::text::at_least;
 
 impl Report {
-    /// The closest approach, every violation and every time that a vehicle was too near to one of these obstacles, the weightiest
-    /// first, with the judge's distances and times.
+    /// Returns the closest approach, the violations of pairs and those of these obstacles, the gravest first. Distances
+    /// and times are those of the audit.
     #[must_use]
     pub fn moments(&self, obstacles: &[String]) -> Vec<Moment> {
         let (delta_m, unit) = (self.separation.delta_m, self.judgement().unit);
@@ -48,7 +48,7 @@ impl Report {
         moments
     }
 
-    /// What is known of all, and what distances of two vehicles are held against.
+    /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
     pub fn judgement(&self) -> Judged {
         let unit = if self.separation.ellipsoid.is_some() { "m, scaled" } else { "m" };

@@ -290,10 +290,7 @@ fn a_clear_run_that_reached_its_formation_passes_without_reasons() {
 #[test]
 fn a_violation_is_told_with_its_pair_distance_and_time() {
     let case = Case { audit: passing(1.5327), certificate: Certificate::void(Void::NoBarrier), ..Case::good() };
-    assert_eq!(
-        case.reason(),
-        "Vehicles 1 and 2 came to 1.532 m of each other at 0.50 s; the safety distance is 2.000 m."
-    );
+    assert_eq!(case.reason(), "Vehicles 1 and 2 came to 1.532 m at 0.50 s; the safety distance is 2.000 m.");
     assert_eq!(case.report().headline(), "VIOLATION: vehicles 1 and 2 came to 1.532 m (delta 2.000 m) at 0.50 s");
     let violation = &case.report().audit.violations[0];
     assert_eq!((violation.pair, violation.min_m), (Pair::new(0, 1), 1.5327));
@@ -325,8 +322,8 @@ fn a_flight_below_its_certificate_does_not_pass_even_where_it_is_clear() {
     let case = Case { audit: passing(2.04), ..Case::good() };
     assert_eq!(
         case.reason(),
-        "The law certifies 2.055 m in continuous time, and vehicles 1 and 2 came to 2.040 m: what was flown is not the motion \
-         that the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits."
+        "The law certifies 2.055 m in continuous time, but vehicles 1 and 2 came to 2.040 m: the flown motion is not the one \
+         that the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose digits."
     );
 }
 
@@ -335,8 +332,8 @@ fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
     let case = Case { summary: NOT_REACHED, ..Case::good() };
     assert_eq!(
         case.reason(),
-        "The formation was not reached: at the end a distance is still wrong by 8.570 m, and 0.01 m are allowed. The \
-         vehicles have come to rest elsewhere: ten times the duration would not be enough."
+        "The formation was not reached: at the end the largest edge error is 8.570 m (limit 0.01 m). The vehicles \
+         have come to rest elsewhere: ten times the duration would not suffice."
     );
     assert_eq!(
         case.report().headline(),
@@ -386,7 +383,7 @@ fn the_headline_names_the_number_that_fails() {
 #[test]
 fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
     let case = Case { refused: &[Code::StartOnLine, Code::DriftUnresolved], ..Case::good() };
-    assert_eq!(case.reason(), "The flight was refused before its first step: start-on-line, drift-unresolved.");
+    assert_eq!(case.reason(), "The check refuses the flight: start-on-line, drift-unresolved.");
     assert_eq!(
         case.report().headline(),
         "REFUSED BY CHECK: start-on-line, drift-unresolved (clear: never closer than 2.460 m, delta 2.000 m, formation \
@@ -398,9 +395,11 @@ fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
 #[test]
 fn a_formation_kept_too_short_or_still_moving_says_so() {
     let short = Summary { reached_at_s: None, held_s: Some(0.4), ..REACHED };
-    assert!(Case { summary: short, ..Case::good() }.reason().contains("kept for the last 0.40 s only, and 1.00 s"));
+    assert!(
+        Case { summary: short, ..Case::good() }.reason().contains("kept for the last 0.40 s only; 1.00 s is required")
+    );
     let moving = Summary { reached_at_s: None, held_s: None, disagreement_m_s: 0.5, ..REACHED };
-    assert!(Case { summary: moving, ..Case::good() }.reason().contains("differ by 0.500 m/s"));
+    assert!(Case { summary: moving, ..Case::good() }.reason().contains("the reference, is 0.500 m/s (limit 0.02 m/s)"));
 }
 
 #[test]
@@ -408,7 +407,7 @@ fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
     let case = Case { summary: NOT_REACHED, trap_dimension: Some(1), ..Case::good() };
     let reasons = case.report().verdict.reasons;
     assert_eq!(reasons.len(), 2);
-    assert!(reasons[1].starts_with("The start lies on a line and the formation needs a plane"), "{}", reasons[1]);
+    assert!(reasons[1].starts_with("The start lies on a line, but the formation needs a plane"), "{}", reasons[1]);
     assert!(Case { trap_dimension: Some(1), ..Case::good() }.report().verdict.pass);
 }
 
@@ -425,7 +424,7 @@ fn detectors_that_disagree_never_pass() {
 fn what_was_not_judged_whole_never_passes() {
     let mut case = Case::good();
     case.audit.status = Status::Undecided;
-    assert!(case.reason().starts_with("The audit could not judge everything"));
+    assert!(case.reason().starts_with("The audit could not judge every pair and step"));
     assert!(case.report().headline().starts_with("UNDECIDED: not everything could be judged"));
 }
 

@@ -1,4 +1,4 @@
-//! A report in words: one line, and a table.
+//! Report of a flight in words: a verdict line and a table.
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::obstacles::Obstacles;
@@ -8,7 +8,7 @@ use tautline_core::text::{at_least, counted, metres, metres_below, seconds, tabl
 use tautline_sim::link::Traffic;
 
 impl Report {
-    /// The verdict in one line, which begins with `CLEAR` only if the flight passes; otherwise with what failed:
+    /// Returns the verdict in one line. It begins with `CLEAR` only if the flight passes, otherwise with what failed:
     ///
     /// - `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.42 s`
     /// - `VIOLATION: vehicles 2 and 3 came to 1.532 m (delta 2.000 m) at 3.63 s`
@@ -36,7 +36,8 @@ impl Report {
         findings.join("; ") + &clear.unwrap_or_default() + &notes.collect::<String>()
     }
 
-    /// Failures beside the status of the audit, as `label: detail`, in the order of the reasons of the verdict.
+    /// Returns the failures beside the status of the audit, as `label: detail`, in the order of the reasons of the
+    /// verdict.
     fn failures(&self) -> Vec<String> {
         let is_clear = self.audit.status != Status::Violation;
         let codes = &self.verdict.refused;
@@ -77,12 +78,12 @@ impl Report {
         .collect()
     }
 
-    /// What is said behind a distance that is no distance in metres.
+    /// Returns the words that mark a scaled length.
     fn scaled(&self) -> &'static str {
         if self.separation.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
     }
 
-    /// How often slots were spread, and vehicles given others; none where neither was.
+    /// Returns how often slots were spread and vehicles were assigned anew; `None` if never.
     pub(super) fn changes(&self) -> Option<String> {
         let counts =
             [(self.breaths.len(), "breath", "breaths"), (self.assignments.len(), "new assignment", "new assignments")];
@@ -91,7 +92,7 @@ impl Report {
         (!said.is_empty()).then(|| said.join(" and "))
     }
 
-    /// Whether two vehicles came closer than the law's certificate promises, by more than integration may cost.
+    /// Returns whether a pair came closer than certified by more than the error of integration.
     #[must_use]
     pub fn breaks_certificate(&self) -> bool {
         let both = self.separation.min_m.zip(self.separation.certified_m);
@@ -99,7 +100,7 @@ impl Report {
         both.is_some_and(breaks) && self.separation.is_promised()
     }
 
-    /// Why the audit is undecided, with the arrival if the formation was reached.
+    /// Returns why the audit is undecided, and the arrival if the formation was reached.
     fn undecided_in_words(&self) -> String {
         if self.is_clear_until_its_early_end() {
             let at = seconds(self.run.duration_s);
@@ -116,7 +117,7 @@ impl Report {
         if self.formation.reached { format!("{why}, {}", self.arrival()) } else { why }
     }
 
-    /// Returns whether the flight ended early and was clear up to there.
+    /// Returns whether the flight ended early and was clear up to its end.
     pub(super) fn is_clear_until_its_early_end(&self) -> bool {
         let audit = &self.audit;
         let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
@@ -129,7 +130,7 @@ impl Report {
             && !self.is_unresolved_by_step()
     }
 
-    /// Smallest separation, delta between `brackets`, and clearance beyond obstacles.
+    /// Returns the smallest separation, delta between two brackets, and the distance beyond obstacles.
     fn clearance(&self, [open, close]: [&str; 2]) -> String {
         let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
         let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
@@ -138,21 +139,21 @@ impl Report {
         format!("{closest}{}{open}delta {} m{close}{room}", self.scaled(), metres(self.separation.delta_m))
     }
 
-    /// Whether integration may have made all violations.
+    /// Returns whether integration may have caused all violations.
     fn is_unresolved_by_step(&self) -> bool {
         let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
         let violations = self.audit.violations.len() + past_obstacles;
         is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
     }
 
-    /// When the formation was reached.
+    /// Returns the arrival in words.
     fn arrival(&self) -> String {
         let at = self.formation.reached_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         format!("formation reached{}", at.unwrap_or_default())
     }
 
-    /// What keeps the formation from being reached, as `not reached: detail`. The early end of a flight that had reached its
-    /// formation is a failure of its own.
+    /// Returns the criterion that keeps the formation from being reached, as `not reached: detail`. If the formation
+    /// had been reached before an early end, the failure is the early end alone.
     fn missing(&self) -> Option<String> {
         let formation = &self.formation;
         let (what, number, unit) = match formation.fails? {
@@ -200,14 +201,14 @@ impl Report {
         )
     }
 
-    /// The findings as a short table, a line each, with a line end.
+    /// Returns the findings as a short table, a line each, with a final line break.
     #[must_use]
     pub fn text(&self) -> String {
         let times = self.performance.map(|times| ("performance".to_owned(), times.line()));
         table(self.rows().into_iter().chain(times))
     }
 
-    /// Returns the name of each part of the flight, and the finding on it. Wall-clock times are not part of it.
+    /// Returns the name of each part of the flight and the finding on it, without wall-clock times.
     pub(super) fn rows(&self) -> Vec<(String, String)> {
         let (control, velocity) = (&self.control, &self.velocity);
         let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
@@ -305,7 +306,7 @@ impl Report {
         format!(
             "{} vehicles, {} s in {} steps of {:.3} ms, state {}",
             run.vehicles,
-            // To a microsecond, without the zeros that a fixed number of decimals would show.
+            // To a microsecond, without trailing zeros.
             (run.duration_s * 1e6).round() / 1e6,
             run.steps,
             run.dt_s * 1e3,
@@ -341,7 +342,7 @@ impl Ellipsoid {
 }
 
 impl FailedVehicle {
-    /// Those that failed within so many seconds, in one line.
+    /// Lists failed vehicles in one line.
     pub(super) fn line(failed: &[Self]) -> String {
         let one = |failed: &Self| format!("vehicle {} ({}) at {} s", failed.vehicle, failed.kind, failed.at_s);
         failed.iter().map(one).collect::<Vec<_>>().join(", ")
@@ -352,7 +353,7 @@ impl VehicleNumbers {
     fn line(&self) -> String {
         let Self { model, max_tilt_deg, thrust_share } = self;
         format!(
-            "{model}, tilted by {max_tilt_deg:.1} degrees at most, rotors at {:.0} % of their most",
+            "{model}, tilt at most {max_tilt_deg:.1} degrees, rotor thrust at most {:.0} % of the maximum",
             100.0 * thrust_share
         )
     }
@@ -375,8 +376,8 @@ impl Verification {
 
 fn network_line(&Traffic { sent, lost, age_p95_s }: &Traffic) -> String {
     let share = 100.0 * lost as f64 / sent.max(1) as f64;
-    let age =
-        age_p95_s.map_or_else(String::new, |age_s| format!("; 95 % of what was held was no older than {age_s:.3} s"));
+    let age = age_p95_s
+        .map_or_else(String::new, |age_s| format!("; 95 % of the states held were no older than {age_s:.3} s"));
     format!("{lost} of {sent} messages lost ({share:.1} %){age}")
 }
 
