@@ -106,7 +106,7 @@ fn heights_above_a_first_place_that_nobody_named_are_none() {
         &["--delta", "1", "--obstacles", "ball.toml"],
     ] {
         let ran = audit(folder.path(), &[&["adsb.csv"], question].concat());
-        let said = "measured from the first one, 47.0,8.0,11826.0";
+        let said = "relative to the first one, 47.0,8.0,11826.0";
         assert!(ran.exit == Some(2) && ran.err.contains(said) && ran.err.contains("--origin"), "{ran:?}");
         let asked = audit(folder.path(), &[&["adsb.csv", "--origin", "47,8,0"], question].concat());
         assert!(asked.exit.is_some_and(|exit| exit < 2), "{asked:?}");

@@ -111,7 +111,7 @@ fn a_formation_that_is_not_reached_names_the_number_that_fails_and_whether_time_
     };
     let (line, said) = fly(&["start.positions_m=[[3,0],[9,0],[6,0],[0,0],[12,0]]"]);
     assert_eq!((&line["fails"], &line["at_rest"]), (&json("\"max_edge_error_m\""), &json("true")));
-    assert!(said.contains(": largest edge error 8.571 m, at rest elsewhere"), "{said}");
+    assert!(said.contains(": largest edge error 8.573 m, at rest elsewhere"), "{said}");
     let (short, said) = fly(&["time.duration_s=10"]);
     assert_eq!((&short["fails"], &short["at_rest"]), (&json("\"max_edge_error_m\""), &json("false")));
     assert!(said.starts_with("NOT REACHED: ") && said.contains(", still moving (clear: "), "{said}");

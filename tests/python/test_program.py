@@ -154,7 +154,7 @@ class Recordings(Case):
             np.testing.assert_array_equal(t, f.t, format)
         self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
         tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
-        self.refuses(tl.Error, "does not tell a format", lambda: tl.export(self.folder / "run.mcap", self.folder / "a.xyz"))
+        self.refuses(tl.Error, "has no extension of a known format", lambda: tl.export(self.folder / "run.mcap", self.folder / "a.xyz"))
 
     def test_a_rate_interpolates_and_never_across_a_gap(self) -> None:
         file = self.folder / "a.csv"

@@ -105,8 +105,8 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
 }
 
 impl OwnRecording {
-    /// Returns the contents for a flight in memory, with the reason of its early end and the name of its law where the law
-    /// is not the scenario's.
+    /// Returns the contents for a flight in memory, with the reason of its early end, and with the name of its law if
+    /// it is not that of the scenario.
     #[must_use]
     pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>, reason: Option<String>) -> Self {
         let (at_s, duration_s) = (report.run.duration_s, scenario.time.duration_s);
@@ -148,8 +148,7 @@ impl OwnRecording {
             let why = why.lines().next().unwrap_or_default();
             let message =
                 format!("{} was flown by another tautline: its scenario cannot be read: {why}", path.display());
-            let help =
-                "audit it with the tautline that flew it, or export it as CSV and say how close vehicles may come";
+            let help = "audit it with the tautline that flew it, or export it as CSV and give --delta";
             Failure::input("recording/foreign-scenario", message, help)
         })?;
         let mut own = Self::of(&scenario, header.delta_m, options.metres());
@@ -214,11 +213,11 @@ impl OwnRecording {
         let audit = match &self.audit {
             _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
-                note("the recording holds no audit of its run; a run writes its audit at its end");
+                note("the recording holds no audit of its run, which a run writes at its end");
                 return self.of_samples(outcome, settings, &[&self.witnessed]);
             }
             StoredAudit::Altered => {
-                note("the recording is not as the run wrote it, so the run's audit may be of other samples");
+                note("the recording was changed after the run, so the run's audit may refer to other samples");
                 return self.of_samples(outcome, settings, &[&self.witnessed]);
             }
             StoredAudit::AsWritten(audit) => audit,
@@ -242,7 +241,7 @@ impl OwnRecording {
             return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.witnessed]);
         }
         if self.is_contradicted(outcome, audit, status) {
-            note("they show vehicles closer than the run's audit says");
+            note("they show vehicles closer than the run's audit");
             return RunAnswer::Samples;
         }
         match status {
@@ -273,9 +272,9 @@ impl OwnRecording {
         }
     }
 
-    /// Returns why a clear answer of the samples is not certain: the run found two closer, between samples, than the
-    /// question allows. Distances of another metric are compared by an upper bound. Motion that `--offset` shifts in time is
-    /// not that of the run.
+    /// Returns the reason why a clear answer of the samples is not certain: between samples the run found a pair closer
+    /// than the request allows. Distances of another metric are compared by an upper bound. Motion that `--offset`
+    /// shifts in time is not that of the run.
     fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<String> {
         if outcome.separation != Some(Status::Clear) {
             return None;
@@ -397,7 +396,7 @@ fn witnessed(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
     }
 }
 
-/// Leaves the answer of the samples undecided, for a reason that the run's audit gives.
+/// Leaves the answer of the samples undecided, for a reason of the run's audit.
 fn undecided(outcome: &mut Outcome, why: String) -> RunAnswer {
     outcome.status = outcome.status.and(Status::Undecided);
     outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));
