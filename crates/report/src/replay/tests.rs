@@ -74,7 +74,7 @@ fn a_short_flight_is_there_whole() {
     assert_eq!(doubles(&data["times_s"]), times);
     // The first slice is the first instant alone.
     assert_eq!(doubles(&data["near_s"]), [&[0.0, 0.0][..], &times[1..99]].concat());
-    assert_eq!(data["nearest"], serde_json::json!([[0.0, "nearest so far 2.000 m, 1 and 2"]]));
+    assert_eq!(data["nearest"], serde_json::json!([[0.0, "closest so far 2.000 m, 1 and 2"]]));
     let verdicts = data["verdicts"].as_array().expect("verdicts");
     let said: Vec<_> = verdicts.iter().map(|told| (&told[1], told[2].as_str().expect("words"))).collect();
     assert_eq!(
@@ -129,7 +129,7 @@ fn one_vehicle_one_sample_and_nobody() {
     assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
     let far = FlightLog::recorded(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
     let refused = Replay::new(&stage(1), &far, &[], JUDGED, PAGE_BYTES).expect_err("too far");
-    assert_eq!(refused.to_string(), "vehicle 1 is beyond 1e9 m at 0.5 s");
+    assert_eq!(refused.to_string(), "vehicle 1 is farther than 1e9 m from the origin at 0.5 s");
 }
 
 #[test]
