@@ -20,7 +20,8 @@ pub fn run(scenario: &Scenario, sink: &mut (impl Sink + Send)) -> Result<Report,
     run_while(scenario, &Preflight::of(scenario)?, sink, &mut |_| ControlFlow::Continue(()))
 }
 
-/// Smallest number of vehicles for which samples are recorded in a thread of their own. Below it, the handover costs more.
+/// Smallest number of vehicles for which samples are recorded in a thread of their own. Below it, the handover costs
+/// more.
 const BESIDE_FROM: usize = 512;
 
 /// Flies a scenario like [`run`], with the findings of its check. `carry_on` is called after each step with the number

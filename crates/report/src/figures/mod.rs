@@ -63,7 +63,7 @@ pub struct Figure {
     pub name: String,
     /// Title, also drawn above the chart.
     pub title: String,
-    /// Description in sentences, for readers who cannot see the chart.
+    /// Description in sentences, for screen readers.
     pub description: String,
     /// Chart as a complete SVG document, which can be embedded in an HTML page.
     pub svg: String,

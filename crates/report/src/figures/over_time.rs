@@ -16,8 +16,7 @@ const DISTANCES: usize = 16_000_000;
 /// Smallest number of instants on its curve.
 const FEWEST_INSTANTS: usize = 48;
 
-/// Draws the control effort |u| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; for more vehicles the
-/// largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the samples miss it.
+/// Draws the control effort |u| \[m/s^2\] over time \[s\]. Up to 12 vehicles have a line each. For more vehicles the figure shows the largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the samples miss it.
 #[must_use]
 pub fn control(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -35,8 +34,7 @@ pub fn control(log: &FlightLog, title: &str) -> Figure {
     chart.figure("control", title, &description)
 }
 
-/// Draws tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message \[s\] of
-/// each vehicle over time \[s\], a figure for each channel that the run has. Lines and bands are those of [`control`].
+/// Draws a figure for each channel of the run, over time \[s\]: tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message \[s\]. Lines and bands are those of [`control`].
 ///
 /// `most_thrust_n` is the largest thrust of a rotor.
 #[must_use]

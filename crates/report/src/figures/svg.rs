@@ -123,7 +123,9 @@ impl Canvas {
         let title = printable(title);
         let shapes = html! {
             rect width="100%" height="100%" fill=(PAPER.light) {}
-            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) { (title) }
+            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) {
+                (title)
+            }
         };
         Self { size, title, shapes: shapes.into_string() }
     }
@@ -157,7 +159,9 @@ impl Canvas {
             // Adjacent tiles overlap slightly, because the paper would show through between them otherwise.
             rect x=(px(x)) y=(px(y)) width=(px(width + 0.3)) height=(px(height + 0.3)) fill=(fill) {}
             @if let Some((words, ink)) = words {
-                text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) { (words) }
+                text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) {
+                    (words)
+                }
             }
         };
         self.shapes += &shape.into_string();
@@ -217,7 +221,7 @@ impl Canvas {
         self.shapes += &shape.into_string();
     }
 
-    /// Returns the figure, with a description for readers who cannot see it.
+    /// Returns the figure, with a description for screen readers.
     pub(super) fn figure(self, name: &str, description: &str) -> Figure {
         let Self { size: (width, height), title, shapes } = self;
         let description = printable(description);

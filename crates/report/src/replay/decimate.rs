@@ -29,9 +29,13 @@ pub struct Span {
 
 /// Returns the indices of at most `most` (at least 2) of the instants `times_s` in ascending order.
 ///
-/// Kept are, in this order: the first and the last instant; the worst instant of each span, or the two around it; two
-/// on either side of these; all instants in a span and two on either side, span by span, up to three quarters of
-/// `most`; and every k-th of all instants.
+/// Instants are kept in this order, with spans up to three quarters of `most`:
+///
+/// - the first and the last instant,
+/// - the worst instant of each span, or the two around it,
+/// - two on either side of these,
+/// - all instants in a span and two on either side, span by span,
+/// - every k-th of all instants.
 #[must_use]
 pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
     let (count, most) = (times_s.len(), most.max(2));

@@ -325,7 +325,7 @@ pub struct Run {
     /// Steps that were flown in parts, because the law was too fast for them or vehicles were too close.
     #[serde(default)]
     pub refined_steps: u64,
-    /// Steps of which even the shortest part was longer than the law allows. From there on the motion is not that of
+    /// Steps whose shortest part was still longer than the law allows. From there on the motion is not that of
     /// the law.
     #[serde(default)]
     pub overlong_steps: u64,

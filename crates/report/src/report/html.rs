@@ -96,8 +96,9 @@ impl Report {
         let lengths = self.separation.ellipsoid.as_ref().map(|ellipsoid| {
             let [_, _, half_height_m] = ellipsoid.half_axes_m;
             format!(
-                "An ellipsoid around each vehicle must stay empty; it reaches {half_height_m} m above and below the centre. Distances of \
-                 the audit, certificate and violations are scaled lengths: horizontal parts are in metres, vertical parts are divided by {}.",
+                "An ellipsoid around each vehicle must stay empty; it reaches {half_height_m} m above and below the \
+                 centre. Distances of the audit, certificate and violations are scaled lengths: horizontal parts are \
+                 in metres, vertical parts are divided by {}.",
                 short(half_height_m / ellipsoid.half_axes_m[0])
             )
         });
@@ -105,8 +106,8 @@ impl Report {
             certificate,
             plant,
             format!(
-                "Commands are computed {} and {command}. A step is halved, at most {} times, if it is longer than {} over the \
-                 law's fastest rate, or if it would use up more than half of a pair's clearance.",
+                "Commands are computed {} and {command}. A step is halved, at most {} times, if it is longer than {} \
+                 over the law's fastest rate, or if it would use up more than half of a pair's clearance.",
                 time.control_hz.map_or_else(
                     || format!("once per step of {} ms", short(time.dt_s * 1e3)),
                     |control_hz| format!("{control_hz} times per second"),
@@ -114,20 +115,20 @@ impl Report {
                 time.max_halvings,
                 short(time.max_rate_dt)
             ),
-            "The audit sweeps every pair over every whole step, along the straight line between its ends, so it covers the time \
-             between samples. The closed form of the \
-             smallest distance decides, in double precision and to 4 units of rounding of the pair's distance; a shape \
-             cast by parry must agree. The engine's own contacts are evidence only."
+            "The audit sweeps every pair over every whole step, along the straight line between its ends, so it \
+             covers the time between samples. The closed form of the smallest distance decides, in double precision \
+             and to 4 units of rounding of the pair's distance; a shape cast by parry must agree. The engine's own \
+             contacts are evidence only."
                 .to_owned(),
             format!(
-                "Reached means: every edge error is at most {0} m, every vehicle is within {0} m of its slot in the \
-                 formation, {3}, and every speed relative to the mean velocity is at most {1} m/s, from \
-                 then on to the end, for at least {2} s.",
+                "Reached means that for at least the last {2} s every edge error is at most {0} m, and every vehicle \
+                 is within {0} m of its slot in the formation, {3}. Every speed relative to the mean velocity is at \
+                 most {1} m/s in that time.",
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s, moved
             ),
             format!(
-                "Errors are taken at the recorded samples, at most {} per second. The smallest separation, the largest energy and \
-                 the peak command cover every step of the run.",
+                "Errors are taken at the recorded samples, at most {} per second. The smallest separation, the \
+                 largest energy and the peak command cover every step of the run.",
                 short(time.record_hz)
             ),
         ];
@@ -139,8 +140,8 @@ impl Report {
         html! {
             (page::command(page.command))
             p {
-                "The same program gives the same motion to the last bit, on any number of threads: the hash of all recorded \
-                 states is " (self.run.state_hash) "."
+                "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
+                 recorded states is " (self.run.state_hash) "."
             }
             (folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256))
         }
@@ -166,18 +167,18 @@ fn folded_scenario(toml: &str, sha256: &str) -> Markup {
 fn plant(scenario: &Scenario) -> (String, &'static str) {
     match (&scenario.airframe, scenario.plant) {
         (Airframe::Unicycle(_), _) => (
-            "The vehicles are unicycles: they move in the direction of their heading, turn at a limited rate, and never stop. Their path within a \
-             step is an arc in closed form. The audit takes its chord, which it leaves by less than 1e-5 m. Mass and hull \
-             have no effect."
+            "The vehicles are unicycles: they move in the direction of their heading, turn at a limited rate, and \
+             never stop. Their path within a step is an arc in closed form. The audit takes its chord, which it \
+             leaves by less than 1e-5 m. Mass and hull have no effect."
                 .to_owned(),
             "held over the step",
         ),
         (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier) => (
             format!(
-                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom and four rotors, under \
-                 gravity, with the lag of their motors, drag and an attitude loop at {} Hz. Within a step each moves on a straight \
-                 line at constant speed, and hulls that touch repel each other. Everything is computed \
-                 in double precision.",
+                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom and four \
+                 rotors. Gravity, drag, the lag of the motors and an attitude loop at {} Hz are simulated. Within a \
+                 step each moves on a straight line at constant speed, and hulls that touch repel each other. \
+                 Everything is computed in double precision.",
                 quadrotor.model.name,
                 quadrotor.attitude_hz
             ),
@@ -192,16 +193,16 @@ fn plant(scenario: &Scenario) -> (String, &'static str) {
         ),
         (Airframe::Quadrotor(quadrotor), PlantSpec::Ideal) => (
             format!(
-                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an integrator of 8th \
-                 order in double precision (64 bits); hulls have no effect, and no engine reports contacts. The audit assumes \
-                 straight lines within a step.",
+                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an \
+                 integrator of 8th order in double precision (64 bits). Hulls have no effect, and no engine reports \
+                 contacts. The audit assumes straight lines within a step.",
                 quadrotor.model.name
             ),
             "held until the next command",
         ),
         (Airframe::Point, PlantSpec::Ideal) => (
             "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
-             8th order in double precision (64 bits); mass and hull have no effect, and no engine reports \
+             8th order in double precision (64 bits). Mass and hull have no effect, and no engine reports \
              contacts. The audit assumes straight lines within a step."
                 .to_owned(),
             "recorded; the motion between follows the law in continuous time",

@@ -83,8 +83,8 @@ impl Hulls {
                 Some(_) => "A step skipped the collision: shorten time.dt_s",
             };
             format!(
-                "Vehicles {first} and {second} passed through each other: their hulls touch at {} m, and they came to {} m at {}. {why}. \
-                 Solid hulls would move otherwise from then on.",
+                "Vehicles {first} and {second} passed through each other: their hulls touch at {} m, and they came to \
+                 {} m at {}. {why}. Solid hulls would move otherwise from then on.",
                 metres(touching_m),
                 metres_below(min_m, touching_m),
                 seconds(min_at_s)
@@ -93,8 +93,8 @@ impl Hulls {
         let hits = self.hits().map(|hits| {
             let (first, rest) = hits.split_at(1);
             format!(
-                "{}{rest}. After the first collision the motion is not governed by the law; the point vehicles of the ideal \
-                 plant move otherwise.",
+                "{}{rest}. After the first collision the motion is not governed by the law; the point vehicles of the \
+                 ideal plant move otherwise.",
                 first.to_uppercase()
             )
         });

@@ -106,8 +106,8 @@ impl Obstacles {
         self.tightest().map(|(room_m, _)| format!("{} m beyond every obstacle's clearance", at_least(room_m, 3)))
     }
 
-    /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the error of
-    /// integration.
+    /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the
+    /// error of integration.
     fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
         let certified_m = self.certified_room_m?;
         let (room_m, tightest) = self.tightest()?;
@@ -144,8 +144,8 @@ impl Obstacles {
         });
         let open = (self.status == Status::Undecided && self.disagreements == 0).then(|| match self.deepest() {
             Some(deepest) => format!(
-                "The step cannot resolve whether the clearance of obstacles is kept: in the flown motion {}, and after steps that are too \
-                 long for the law the integration error may exceed the violation.",
+                "The step cannot resolve whether the clearance of obstacles is kept. In the flown motion {}, but the \
+                 integration error of steps that are too long for the law may be larger.",
                 deepest.brief()
             ),
             None => "The audit cannot decide whether every vehicle kept its clearance from the obstacles.".to_owned(),

@@ -33,7 +33,7 @@ impl Section {
         Self { heading, caption: caption.into(), columns: &[], all: rows.len(), rows }
     }
 
-    /// Returns the same section with `all` rows in total, of which only the first are listed.
+    /// Returns the same section with `all` rows in total; only the first are listed.
     pub(super) fn of_all(self, all: usize) -> Self {
         Self { all, ..self }
     }

@@ -1,4 +1,4 @@
-//! Keys, null for numbers that are not finite, reasons, headlines, certificates, early ends.
+//! Tests of keys, null values, reasons, verdict lines, certificates and early ends.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use tautline_sim::sim::{self, Ending, Flight};
 const DELTA_M: f64 = 2.0;
 const JUDGE: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.02, hold_s: 1.0 };
 
-/// Two vehicles that pass each other at `miss_m` between 0 and 1 s, as the judge sees it.
+/// Returns the audit of two vehicles that pass each other at `miss_m` between 0 and 1 s.
 fn passing(miss_m: f64) -> AuditOutcome {
     let mut auditor = Auditor::new(2, DELTA_M).expect("a judge");
     auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, miss_m, 0.0])).expect("judged");
@@ -49,10 +49,10 @@ const REACHED: Summary = Summary {
 
 const NOT_REACHED: Summary = Summary { reached_at_s: None, held_s: None, max_edge_error_m: 8.57, ..REACHED };
 
-/// What a test changes about an otherwise good run.
+/// Changes of a test to a run that passes.
 struct Case {
     audit: AuditOutcome,
-    /// What the judge saw in metres, where ellipsoids stay empty.
+    /// Audit in metres, for ellipsoids.
     in_metres: Option<AuditOutcome>,
     summary: Summary,
     trap_dimension: Option<usize>,
@@ -140,7 +140,7 @@ impl Case {
         })
     }
 
-    /// The only reason why this run does not pass.
+    /// Returns the only reason against a pass.
     fn reason(&self) -> String {
         let verdict = self.report().verdict;
         assert!(!verdict.pass);
@@ -149,7 +149,7 @@ impl Case {
     }
 }
 
-/// Every key of an indented JSON text in order, with its indentation less that of the outermost keys.
+/// Returns the keys of an indented JSON text in order, with their indentation relative to the outermost keys.
 fn keys(json: &str) -> Vec<String> {
     let key = |line: &str| {
         let name = line.trim_start().strip_prefix('"')?.split_once("\":")?.0;
@@ -159,7 +159,7 @@ fn keys(json: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_keys_of_the_json_are_these_in_this_order() {
+fn json_has_these_keys_in_this_order() {
     let mut case = Case::good();
     case.audit = passing(1.5);
     let expected = "schema_version
@@ -246,19 +246,19 @@ performance
 }
 
 #[test]
-fn a_report_read_back_from_its_json_is_the_same_to_the_last_bit() {
+fn json_round_trip_is_exact() {
     let mut case = Case::good();
     case.audit = passing(1.5);
     let report = case.report();
     let back: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("reads back");
     assert_eq!(back, report);
     let extended = report.to_json().expect("JSON").replacen("{\n", "{\n  \"extra\": 1,\n", 1);
-    let back: Report = serde_json::from_str(&extended).expect("keys of a later program of this version are no error");
+    let back: Report = serde_json::from_str(&extended).expect("unknown keys are ignored");
     assert_eq!(back, report);
 }
 
 #[test]
-fn what_is_no_finite_number_is_null_and_reads_back() {
+fn non_finite_numbers_are_null_and_read_back() {
     let mut case = Case::good();
     case.summary = Summary {
         max_edge_error_m: f64::NAN,
@@ -279,7 +279,7 @@ fn what_is_no_finite_number_is_null_and_reads_back() {
 }
 
 #[test]
-fn a_clear_run_that_reached_its_formation_passes_without_reasons() {
+fn clear_run_that_reached_its_formation_passes() {
     let report = Case::good().report();
     assert!(report.verdict.pass);
     assert_eq!(report.verdict.reasons, Vec::<String>::new());
@@ -288,7 +288,7 @@ fn a_clear_run_that_reached_its_formation_passes_without_reasons() {
 }
 
 #[test]
-fn a_violation_is_told_with_its_pair_distance_and_time() {
+fn violation_names_pair_distance_and_time() {
     let case = Case { audit: passing(1.5327), certificate: Certificate::void(Void::NoBarrier), ..Case::good() };
     assert_eq!(case.reason(), "Vehicles 1 and 2 came to 1.532 m at 0.50 s; the safety distance is 2.000 m.");
     assert_eq!(case.report().headline(), "VIOLATION: vehicles 1 and 2 came to 1.532 m (delta 2.000 m) at 0.50 s");
@@ -297,13 +297,13 @@ fn a_violation_is_told_with_its_pair_distance_and_time() {
 }
 
 #[test]
-fn a_violation_by_a_hair_does_not_look_like_the_safety_distance() {
+fn tiny_violation_differs_from_delta_as_printed() {
     let case = Case { audit: passing(DELTA_M - 1e-7), ..Case::good() };
     assert!(case.report().headline().contains("came to 1.9999999 m (delta 2.000 m)"));
 }
 
 #[test]
-fn rounding_breaks_no_certificate() {
+fn rounding_does_not_break_a_certificate() {
     // A swarm that starts in its own formation certifies its own distances.
     let void = Vec::new();
     let certificate = Certificate { certified_m: Some(3.0), void, ..Certificate::void(Void::NoBarrier) };
@@ -318,17 +318,18 @@ fn rounding_breaks_no_certificate() {
 }
 
 #[test]
-fn a_flight_below_its_certificate_does_not_pass_even_where_it_is_clear() {
+fn clear_flight_below_its_certificate_does_not_pass() {
     let case = Case { audit: passing(2.04), ..Case::good() };
     assert_eq!(
         case.reason(),
-        "The law certifies 2.055 m in continuous time, but vehicles 1 and 2 came to 2.040 m: the flown motion is not the one \
-         that the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose digits."
+        "The law certifies 2.055 m in continuous time, but vehicles 1 and 2 came to 2.040 m: the flown motion is not \
+         the one that the proof covers. Shorten time.dt_s, and look for positions so large that their differences \
+         lose digits."
     );
 }
 
 #[test]
-fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
+fn unreached_formation_is_reported_with_its_largest_error() {
     let case = Case { summary: NOT_REACHED, ..Case::good() };
     assert_eq!(
         case.reason(),
@@ -342,7 +343,7 @@ fn a_formation_that_is_not_reached_is_told_with_its_largest_error() {
 }
 
 #[test]
-fn the_headline_names_the_number_that_fails() {
+fn headline_names_the_unmet_criterion() {
     let said = |summary| {
         let report = Case { summary, ..Case::good() }.report();
         let headline = report.headline();
@@ -381,7 +382,7 @@ fn the_headline_names_the_number_that_fails() {
 }
 
 #[test]
-fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
+fn headline_of_a_refused_flight_begins_with_the_refusal() {
     let case = Case { refused: &[Code::StartOnLine, Code::DriftUnresolved], ..Case::good() };
     assert_eq!(case.reason(), "The check refuses the flight: start-on-line, drift-unresolved.");
     assert_eq!(
@@ -393,7 +394,7 @@ fn a_flight_that_was_refused_never_passes_and_says_so_in_its_headline() {
 }
 
 #[test]
-fn a_formation_kept_too_short_or_still_moving_says_so() {
+fn reason_names_a_short_hold_or_a_residual_speed() {
     let short = Summary { reached_at_s: None, held_s: Some(0.4), ..REACHED };
     assert!(
         Case { summary: short, ..Case::good() }.reason().contains("kept for the last 0.40 s only; 1.00 s is required")
@@ -403,7 +404,7 @@ fn a_formation_kept_too_short_or_still_moving_says_so() {
 }
 
 #[test]
-fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
+fn flat_start_is_a_reason_only_if_the_formation_is_not_reached() {
     let case = Case { summary: NOT_REACHED, trap_dimension: Some(1), ..Case::good() };
     let reasons = case.report().verdict.reasons;
     assert_eq!(reasons.len(), 2);
@@ -412,7 +413,7 @@ fn a_start_flatter_than_the_formation_is_named_only_where_it_was_not_left() {
 }
 
 #[test]
-fn detectors_that_disagree_never_pass() {
+fn disagreement_of_detectors_does_not_pass() {
     let mut case = Case::good();
     case.audit.parry.disagreements = 3;
     case.audit.status = Status::Undecided;
@@ -421,7 +422,7 @@ fn detectors_that_disagree_never_pass() {
 }
 
 #[test]
-fn what_was_not_judged_whole_never_passes() {
+fn incomplete_audit_does_not_pass() {
     let mut case = Case::good();
     case.audit.status = Status::Undecided;
     assert!(case.reason().starts_with("The audit could not judge every pair and step"));
@@ -429,7 +430,7 @@ fn what_was_not_judged_whole_never_passes() {
 }
 
 #[test]
-fn a_run_that_ended_early_never_passes_and_says_why() {
+fn early_end_is_a_reason() {
     assert_eq!(
         Case { ending: Ending::Interrupted, ..Case::good() }.reason(),
         "The run ended early, at 120.00 s: interrupted."
@@ -437,7 +438,7 @@ fn a_run_that_ended_early_never_passes_and_says_why() {
 }
 
 #[test]
-fn a_void_certificate_says_why_in_sentences() {
+fn void_certificate_gives_its_reasons() {
     let report = Case::good().report();
     assert_eq!((report.separation.certified_m, report.separation.certificate_void.len()), (Some(2.055_307), 0));
     assert!(report.text().contains("certified 2.055307 m"));
@@ -448,7 +449,7 @@ fn a_void_certificate_says_why_in_sentences() {
 }
 
 #[test]
-fn the_table_has_a_line_for_every_part() {
+fn table_has_a_line_for_every_part() {
     let text = Case::good().report().text();
     let names: Vec<_> = text.lines().map(|line| line.split(' ').next().unwrap_or_default()).collect();
     let parts = ["separation", "audit", "formation", "energy", "control", "velocity", "run", "performance"];
@@ -458,7 +459,7 @@ fn the_table_has_a_line_for_every_part() {
 }
 
 #[test]
-fn a_report_on_disk_is_the_report() {
+fn report_file_contains_the_json() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("report.json");
     let report = Case::good().report();
@@ -470,7 +471,7 @@ fn a_report_on_disk_is_the_report() {
 }
 
 #[test]
-fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
+fn every_leg_must_be_reached_and_the_first_miss_is_named() {
     let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
     let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
         let bound =
@@ -503,7 +504,7 @@ fn every_leg_is_to_be_reached_and_the_first_that_is_not_is_named() {
 }
 
 #[test]
-fn a_certificate_is_broken_by_a_share_of_its_clearance() {
+fn certificate_tolerance_is_relative_to_its_clearance() {
     let report = |certified_m: f64, closest_m: f64| {
         let certificate = Certificate {
             certified_m: Some(certified_m),
@@ -516,13 +517,13 @@ fn a_certificate_is_broken_by_a_share_of_its_clearance() {
         };
         Case { audit: passing(closest_m), certificate, ..Case::good() }.report().verdict
     };
-    // A clearance of 1.451 mm of which a tenth is missing, and one of which nothing is but rounding.
+    // The clearance is 1.451 mm: first a tenth of it is missing, then only rounding.
     assert!(!report(2.001_451, 2.001_314).pass);
     assert!(report(2.001_451, 2.001_450_5).pass);
 }
 
 #[test]
-fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows() {
+fn energy_rise_is_a_reason_if_the_energy_is_proved_never_to_grow() {
     let risen = |share: f64, energy_falls: bool| {
         let energy_rise = Some(EnergyRise { from: 3.656_742_96, to: 3.656_742_96 * (1.0 + share) });
         let case = Case { energy_falls, energy_rise, ..Case::good() };
@@ -533,10 +534,10 @@ fn energy_above_its_start_is_a_reason_where_the_proof_says_that_it_never_grows()
     let reasons = &report.verdict.reasons;
     assert!(!report.verdict.pass && reasons[0].contains("rose from 3.6567e0 to 6.4724e0"), "{reasons:?}");
     assert!(report.headline().starts_with("ENERGY ROSE: to 1.770 of its start (clear: "), "{}", report.headline());
-    assert!(risen(0.77, false).verdict.pass, "nothing is proved there");
+    assert!(risen(0.77, false).verdict.pass, "without a proof a rise is allowed");
 }
 
-/// A vehicle passes a ball of 1 m, whose clearance is 0.5 m, at this distance from its middle.
+/// Returns the audit of a vehicle that passes a ball of radius 1 m and clearance 0.5 m, at this distance from its centre.
 fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
     let ball = Obstacle {
         name: "tower".to_owned(),
@@ -552,7 +553,7 @@ fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
 }
 
 #[test]
-fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
+fn violated_clearance_or_certificate_of_an_obstacle_does_not_pass() {
     let report = |miss_m: f64, certified_room_m: Option<f64>| {
         let certificate = Certificate { certified_room_m, ..Case::good().certificate };
         Case { clearance: Some(passing_a_ball(miss_m)), certificate, ..Case::good() }.report()
@@ -562,7 +563,8 @@ fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
     assert!(clear.headline().contains("0.500 m beyond every obstacle's clearance"), "{}", clear.headline());
     let broken = report(2.0, Some(0.6));
     assert!(!broken.verdict.pass && broken.verdict.reasons[0].contains("certifies 0.600 m beyond every clearance"));
-    let said = "CERTIFICATE BROKEN: vehicle 1 came to 1.000 m from `tower` at 0.50 s (clearance 0.500 m), certified 0.600 m beyond";
+    let said = "CERTIFICATE BROKEN: vehicle 1 came to 1.000 m from `tower` at 0.50 s (clearance 0.500 m), certified \
+         0.600 m beyond";
     assert!(broken.headline().starts_with(said), "{}", broken.headline());
     let violated = report(1.25, None);
     assert_eq!((violated.audit.status, violated.audit.violations.len()), (Status::Violation, 0));
@@ -571,7 +573,7 @@ fn who_is_too_near_to_an_obstacle_or_nearer_than_certified_does_not_pass() {
 }
 
 #[test]
-fn beside_a_violation_it_counts_what_could_not_be_told() {
+fn undecided_times_count_beside_a_violation() {
     let is_all_known = |change: fn(&mut AuditOutcome, &mut ClearanceOutcome)| {
         let (mut audit, mut clearance) = (passing(1.5), passing_a_ball(1.25));
         change(&mut audit, &mut clearance);
@@ -587,14 +589,15 @@ fn beside_a_violation_it_counts_what_could_not_be_told() {
 }
 
 #[test]
-fn around_ellipsoids_both_lengths_are_told_and_the_scaled_one_is_judged() {
+fn ellipsoids_report_scaled_and_unscaled_distances() {
     let case = Case { in_metres: Some(passing(1.25)), ..Case::good() };
     let report = case.report();
     assert!(report.headline().starts_with("CLEAR: never closer than 2.460 m scaled to ellipsoids (delta 2.000 m)"));
     let ellipsoid = report.separation.ellipsoid.as_ref().expect("an ellipsoid");
     assert_eq!((report.separation.min_m, ellipsoid.min_distance_m), (Some(2.4607), Some(1.25)));
     assert!(report.text().contains(
-        "ellipsoids   half axes 1.000, 1.000, 3.000 m; unscaled, centres never closer than 1.250000 m at 0.50 s, vehicles 1 and 2\n"
+        "ellipsoids   half axes 1.000, 1.000, 3.000 m; unscaled, centres never closer than 1.250000 m at 0.50 s, \
+         vehicles 1 and 2\n"
     ));
     let read: Report = serde_json::from_str(&report.to_json().expect("JSON")).expect("a report");
     assert_eq!(read, report);
@@ -606,7 +609,7 @@ fn early() -> Case {
 }
 
 #[test]
-fn a_flight_that_ended_early_is_undecided_however_clear_it_was_up_to_there() {
+fn early_end_of_a_clear_flight_is_undecided() {
     let report = early().report();
     assert_eq!((report.audit.status, report.audit.undecided), (Status::Undecided, 0));
     assert!(!report.verdict.pass);
@@ -615,7 +618,7 @@ fn a_flight_that_ended_early_is_undecided_however_clear_it_was_up_to_there() {
         "UNDECIDED: the flight ended early at 120.00 s; until then never closer than 2.460 m (delta 2.000 m); not \
          reached: largest edge error 8.570 m"
     );
-    assert!(report.judgement().is_else_known, "what was flown was judged");
+    assert!(report.judgement().is_else_known, "everything flown was judged");
     assert_eq!(report.formation.at_rest, None, "more time may help");
     // The same flight, flown to its end.
     let whole = Case { ending: Ending::Completed, ..early() }.report();
@@ -625,7 +628,7 @@ fn a_flight_that_ended_early_is_undecided_however_clear_it_was_up_to_there() {
 }
 
 #[test]
-fn a_violation_stays_one_and_a_doubt_of_the_judge_is_not_laid_on_the_end() {
+fn early_end_keeps_violations_and_other_undecided_times() {
     let violated = Case { audit: passing(1.5), ..early() }.report();
     assert_eq!(violated.audit.status, Status::Violation);
     let headline = violated.headline();
@@ -639,7 +642,7 @@ fn a_violation_stays_one_and_a_doubt_of_the_judge_is_not_laid_on_the_end() {
 }
 
 #[test]
-fn a_formation_that_was_kept_up_to_an_early_end_is_not_reached() {
+fn formation_kept_up_to_an_early_end_is_not_reached() {
     let report = Case { summary: REACHED, ..early() }.report();
     let formation = &report.formation;
     assert_eq!((formation.reached, formation.reached_at_s), (false, None));
@@ -652,7 +655,7 @@ fn a_formation_that_was_kept_up_to_an_early_end_is_not_reached() {
 }
 
 #[test]
-fn a_report_without_wall_clock_times_reads_back_without() {
+fn report_without_wall_clock_times_reads_back() {
     let report = Report { performance: None, ..early().report() };
     let json = report.to_json().expect("JSON");
     assert!(!json.contains("performance") && !report.text().contains("wall"), "{json}");

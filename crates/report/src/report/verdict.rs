@@ -25,8 +25,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear, both detectors agree,
-    /// the certificate and the energy bound hold, every leg is reached and the run is flown to its end.
+    /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear and both detectors agree. The certificate and the energy bound must hold, every leg must be reached, and the run must be flown to its end.
     pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
         let reasons: Vec<_> = [
             refused(result),
@@ -163,8 +162,8 @@ fn unresolved_by_step(result: &FlightResult<'_>) -> Option<String> {
     let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
     let [first, second] = deepest.pair.numbers();
     Some(format!(
-        "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m in the \
-         flown motion at {}, and after steps that are too long for the law the integration error may exceed the violation.",
+        "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion vehicles {first} and \
+         {second} came to {} m at {}, but the integration error of steps that are too long for the law may be larger.",
         metres(result.scenario.delta_m),
         metres_below(deepest.min_m, result.scenario.delta_m),
         seconds(deepest.min_at_s),
@@ -185,8 +184,8 @@ fn undecided(result: &FlightResult<'_>) -> Option<String> {
     }
     if result.flight.audit.status == Status::Undecided && result.flight.audit.unresolved > 0 {
         return Some(
-            "Two vehicles came so close to delta that the audit cannot decide: the bound on the bend of their paths within a \
-             step exceeds their distance from delta."
+            "Two vehicles came so close to delta that the audit cannot decide: the bound on the bend of their paths \
+             within a step exceeds their distance from delta."
                 .to_owned(),
         );
     }
@@ -199,9 +198,7 @@ fn ended_early(report: &Report) -> Option<String> {
     Some(format!("The run ended early, at {}: {why}.", seconds(report.run.duration_s)))
 }
 
-/// Returns whether a separation is below the certified one by more than the integration error. The error is relative to
-/// the certified clearance above delta: near the barrier the energy of a pair is inversely proportional to its
-/// clearance, so both have the same relative error.
+/// Returns whether a separation is below the certified one by more than the integration error. The error is relative to the certified clearance above delta. Near the barrier the energy of a pair is inversely proportional to its clearance, so both have the same relative error.
 pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f64) -> bool {
     separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
 }
@@ -218,9 +215,9 @@ fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
     let allowed = highest_honest(initial, summary, vehicles);
     (result.energy_falls() && most > allowed).then(|| {
         format!(
-            "The law's energy never grows in continuous time, but rose from {initial:.4e} to {most:.4e} m^2/s^2, \
-             while integration and rounding explain {allowed:.4e}: the flown motion is not that of the law. Shorten \
-             time.dt_s, or raise time.max_halvings.",
+            "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow; integration \
+             and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten time.dt_s, or raise \
+             time.max_halvings.",
         )
     })
 }
@@ -246,8 +243,9 @@ fn steps_too_long(result: &FlightResult<'_>) -> Option<String> {
     let overlong = result.flight.overlong_steps;
     (overlong > 0).then(|| {
         format!(
-            "{} longer than the law allows, even after all halvings: the flown motion is not that of \
-             the law. Shorten time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law gentler.",
+            "{} longer than the law allows, even after all halvings: the flown motion is not that of the law. Shorten \
+             time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law \
+             gentler.",
             counted(overlong, "step was", "steps were"),
             TimeSpec::DEFAULT_MAX_RATE_DT
         )
@@ -271,8 +269,8 @@ fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
             judge.edge_error_m
         ),
         Fails::MaxPositionErrorM => format!(
-            "at the end every edge error is within its limit, but the shape, its attitude or its place is another one: the largest \
-             position error is {} m (limit {} m)",
+            "at the end every edge error is within its limit, but the shape, its attitude or its place is another \
+             one: the largest position error is {} m (limit {} m)",
             metres(summary.max_position_error_m),
             judge.edge_error_m
         ),

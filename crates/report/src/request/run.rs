@@ -43,7 +43,7 @@ pub struct RunRequest<'a> {
     pub figures: bool,
     /// Whether the scenario is flown again at half the step.
     pub verify: bool,
-    /// Number of threads, of which at most two are used; by default the number of cores. The recording has the same
+    /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
     /// bits for any number.
     pub threads: Option<usize>,
     /// Whether the report contains wall-clock times. Without them equal flights give equal bytes.

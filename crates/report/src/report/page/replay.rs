@@ -110,7 +110,8 @@ fn note(replay: &Replay) -> String {
     };
     let said = [
         format!(
-            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are those of the audit. ",
+            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are those of the \
+             audit. ",
             metres(replay.rounding_m)
         ),
         some(replay.vehicles, "vehicles"),

@@ -227,7 +227,10 @@ impl RecordedReport {
         shortened
             .map(|(what, tally)| {
                 let (count, listed) = (counted_in_words(tally), tally.listed);
-                format!("{count} {what} were found and {listed} are listed: the worst, and the first of each pair or vehicle, {LISTED} of either at most")
+                format!(
+                    "{count} {what} were found and {listed} are listed: the worst, and the first of each pair or \
+                     vehicle, {LISTED} of either at most"
+                )
             })
             .collect()
     }
@@ -246,8 +249,7 @@ impl RecordedReport {
         std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
     }
 
-    /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason why there is
-    /// none.
+    /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason for its absence.
     #[must_use]
     pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
         let tone = match self.status {
@@ -292,7 +294,7 @@ fn counted_in_words(tally: Tally) -> String {
 /// Returns the number of findings, and the number of the listed ones if the list is cut.
 fn shortened_in_words(tally: Tally) -> String {
     let count = counted_in_words(tally);
-    if tally.is_shortened() { format!("{count}, of which {} are listed", tally.listed) } else { count }
+    if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
 }
 
 impl EarlyEnd {

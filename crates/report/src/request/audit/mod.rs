@@ -361,7 +361,8 @@ impl<'a> AuditRequest<'a> {
         if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
-            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, --limit, --fence";
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
+                 --limit, --fence";
             return Err(Failure::input("audit/nothing-to-judge", message, help));
         }
         if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
@@ -393,7 +394,8 @@ impl<'a> AuditRequest<'a> {
         let path = self.subject.called();
         if unit != "s" {
             let message = format!(
-                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} depends on it"
+                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
+                 depends on it"
             );
             return Err(Failure::input(
                 "audit/guessed-time-unit",
@@ -579,7 +581,8 @@ impl<'a> Taken<'a> {
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
         settings.is_own_limit = is_silent && request.obstacles.is_none();
-        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
+        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two
+        // samples.
         settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));
         let is_asked = request.obstacles.is_none() && settings.ellipsoid_m.is_none();
         let obstacles = own.map(|own| &own.obstacles[..]).filter(|own| is_asked && !own.is_empty());
@@ -617,8 +620,8 @@ fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
         let Presence { from_s, to_s } = outcome.presence[vehicle]?;
         let name = outcome.name(vehicle);
         Some(format!(
-            "{name}, present from {from_s:?} s to {to_s:?} s, is never present with another and is not judged (--offset \
-             {name}=SECONDS corrects a clock)"
+            "{name}, present from {from_s:?} s to {to_s:?} s, is never present with another and is not judged \
+             (--offset {name}=SECONDS corrects a clock)"
         ))
     })
 }

@@ -121,8 +121,8 @@ impl Level<'_> {
             if drop_m > MOST_DROP_M && is_judged(name, sample.time_s) {
                 let (time_s, away_km) = (sample.time_s, away_m / 1000.0);
                 let message = format!(
-                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is {drop_m:.1} m \
-                     lower, and {asked} needs heights above the ground"
+                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is \
+                     {drop_m:.1} m lower, and {asked} needs heights above the ground"
                 );
                 let help = "give an --origin within 3 km of all vehicles, or judge a part with --ids, --from and --to";
                 return Err(Failure::input("audit/far-from-origin", message, help));

@@ -70,7 +70,7 @@ impl Instants {
     }
 }
 
-/// Reads a recording again and returns its replay, or the reason why there is none, and the figures of the closest
+/// Reads a recording again and returns its replay, or the reason for its absence, and the figures of the closest
 /// pairs.
 pub(super) fn of_recording(
     open: &Open<'_>,
