@@ -16,7 +16,9 @@ const DISTANCES: usize = 16_000_000;
 /// Smallest number of instants on its curve.
 const FEWEST_INSTANTS: usize = 48;
 
-/// Draws the control effort |u| \[m/s^2\] over time \[s\]. Up to 12 vehicles have a line each. For more vehicles the figure shows the largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the samples miss it.
+/// Draws the control effort |u| \[m/s^2\] over time \[s\]. Up to 12 vehicles have a line each. For more vehicles the
+/// figure shows the largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the
+/// samples miss it.
 #[must_use]
 pub fn control(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -34,7 +36,10 @@ pub fn control(log: &FlightLog, title: &str) -> Figure {
     chart.figure("control", title, &description)
 }
 
-/// Draws a figure for each channel of the run, over time \[s\]: tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message \[s\]. Lines and bands are those of [`control`].
+/// Draws a figure for each channel of the run over time \[s\], with lines and bands like those of [`control`].
+///
+/// Channels are tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message
+/// \[s\].
 ///
 /// `most_thrust_n` is the largest thrust of a rotor.
 #[must_use]

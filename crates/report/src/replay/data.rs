@@ -88,7 +88,8 @@ struct Data<'a> {
     steps: String,
     /// Instants and vehicles, as 16-bit indices: vehicles that were absent at some time since the previous instant.
     breaks: String,
-    /// Times \[s\], as doubles, from which a pair is the closest by the audit. The pairs are 16-bit indices in the list of vehicles, with 65535 for a vehicle that is not drawn.
+    /// Times \[s\], as doubles, from which a pair is the closest by the audit. The pairs are 16-bit indices in the list
+    /// of vehicles, with 65535 for a vehicle that is not drawn.
     near_s: String,
     near_who: String,
     /// Statements and the times \[s\] from which they hold: on the closest pair so far, and on the verdict.

@@ -164,7 +164,8 @@ impl Mesh {
     }
 }
 
-/// Returns the side and the lines of squares on the ground at a height \[m\], below everything between two corners \[m\]. The side is 1, 2 or 5 times a power of ten.
+/// Returns the side and the lines of squares on the ground at a height \[m\], below everything between two corners
+/// \[m\]. The side is 1, 2 or 5 times a power of ten.
 pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, Vec<Vector3<f64>>) {
     let rough = (0.5 * (high - low)).xy().amax() / SQUARES;
     let mut ten = 1e-9;

@@ -121,8 +121,8 @@ impl Report {
              contacts are evidence only."
                 .to_owned(),
             format!(
-                "Reached means that for at least the last {2} s every edge error is at most {0} m, and every vehicle \
-                 is within {0} m of its slot in the formation, {3}. Every speed relative to the mean velocity is at \
+                "Reached means that for at least the last {2} s every edge error is at most {0} m. Every vehicle is \
+                 within {0} m of its slot in the formation, {3}. Every speed relative to the mean velocity is at \
                  most {1} m/s in that time.",
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s, moved
             ),

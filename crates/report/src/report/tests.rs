@@ -537,7 +537,8 @@ fn energy_rise_is_a_reason_if_the_energy_is_proved_never_to_grow() {
     assert!(risen(0.77, false).verdict.pass, "without a proof a rise is allowed");
 }
 
-/// Returns the audit of a vehicle that passes a ball of radius 1 m and clearance 0.5 m, at this distance from its centre.
+/// Returns the audit of a vehicle that passes a ball of radius 1 m and clearance 0.5 m, at this distance from its
+/// centre.
 fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
     let ball = Obstacle {
         name: "tower".to_owned(),

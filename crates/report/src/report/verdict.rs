@@ -25,7 +25,9 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear and both detectors agree. The certificate and the energy bound must hold, every leg must be reached, and the run must be flown to its end.
+    /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear and both detectors
+    /// agree. The certificate and the energy bound must hold, every leg must be reached, and the run must be flown to
+    /// its end.
     pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
         let reasons: Vec<_> = [
             refused(result),
@@ -198,7 +200,9 @@ fn ended_early(report: &Report) -> Option<String> {
     Some(format!("The run ended early, at {}: {why}.", seconds(report.run.duration_s)))
 }
 
-/// Returns whether a separation is below the certified one by more than the integration error. The error is relative to the certified clearance above delta. Near the barrier the energy of a pair is inversely proportional to its clearance, so both have the same relative error.
+/// Returns whether a separation is below the certified one by more than the integration error. The error is relative to
+/// the certified clearance above delta. Near the barrier the energy of a pair is inversely proportional to its
+/// clearance, so both have the same relative error.
 pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f64) -> bool {
     separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
 }
@@ -215,8 +219,8 @@ fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
     let allowed = highest_honest(initial, summary, vehicles);
     (result.energy_falls() && most > allowed).then(|| {
         format!(
-            "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow; integration \
-             and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten time.dt_s, or raise \
+            "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow. \
+             Integration and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten time.dt_s, or raise \
              time.max_halvings.",
         )
     })

@@ -38,8 +38,8 @@ pub(crate) fn places(numbers: &mut Numbers, count: usize, axes: usize, extent_m:
     places_m
 }
 
-/// Returns a random scenario. 3 to 8 vehicles in the plane or in space start at random positions at least 1.1 delta
-/// apart, and form a circle or a sphere. Delta and alpha span three decades, a22 spans -2 to 0.1.
+/// Returns a random scenario. Between 3 and 8 vehicles in the plane or in space start at random positions at least 1.1
+/// delta apart, and form a circle or a sphere. Delta and alpha span three decades, a22 spans -2 to 0.1.
 fn scenario(seed: u64) -> Scenario {
     let mut numbers = Numbers(seed.wrapping_mul(0xd134_2543_de82_ef95));
     let sixth = 6.0 * numbers.unit();

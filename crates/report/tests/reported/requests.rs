@@ -74,7 +74,7 @@ fn file(folder: &Path) -> Subject<'static> {
     Subject::Files { paths: vec![path], options: Box::default() }
 }
 
-fn request(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
+fn audit_request(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
     AuditRequest { settings, ..AuditRequest::new(subject) }
 }
 
@@ -86,10 +86,11 @@ fn motion_in_memory_is_judged_like_its_recording() {
     let request = AuditRequest {
         command: "audit(...)".to_owned(),
         html: Some(page.clone()),
-        ..request(subject, Settings::delta(2.0))
+        ..audit_request(subject, Settings::delta(2.0))
     };
     let ours = audit_files(&request, &Silent::default()).expect("judged");
-    let theirs = audit_files(&request(file(folder.path()), Settings::delta(2.0)), &Silent::default()).expect("judged");
+    let theirs =
+        audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &Silent::default()).expect("judged");
     assert!(!ours.is_good());
     let (ours, theirs) = (ours.report, theirs.report);
     assert_eq!(ours.verdict(), "VIOLATION");
@@ -102,7 +103,7 @@ fn motion_in_memory_is_judged_like_its_recording() {
 fn wrong_requests_have_error_codes() {
     let folder = tempfile::tempdir().expect("a folder");
     let code = |settings: Settings, change: &dyn Fn(&mut AuditRequest<'static>)| {
-        let mut request = AuditRequest { config: ConfigFile::None, ..request(file(folder.path()), settings) };
+        let mut request = AuditRequest { config: ConfigFile::None, ..audit_request(file(folder.path()), settings) };
         change(&mut request);
         let failure = audit_files(&request, &Silent::default()).expect_err("refused");
         assert!(!failure.is_machine() && failure.help().is_some(), "{failure}");
@@ -138,7 +139,7 @@ fn wrong_requests_have_error_codes() {
 fn rejects_a_radius_beside_an_ellipsoid() {
     let folder = tempfile::tempdir().expect("a folder");
     let both = Settings { radius_m: Some(0.1), ellipsoid_m: Some(Vector3::new(1.0, 1.0, 2.0)), ..Settings::default() };
-    let failure = audit_files(&request(file(folder.path()), both), &Silent::default()).expect_err("refused");
+    let failure = audit_files(&audit_request(file(folder.path()), both), &Silent::default()).expect_err("refused");
     assert_eq!(failure.code(), "audit/radius-and-ellipsoid");
 }
 
@@ -147,7 +148,7 @@ fn monitor_ends_the_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let monitor = Silent::default();
     monitor.interruption.store(true, Ordering::Relaxed);
-    let failure = audit_files(&request(file(folder.path()), Settings::delta(2.0)), &monitor).expect_err("ended");
+    let failure = audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &monitor).expect_err("ended");
     assert_eq!((failure.code(), failure.is_machine()), ("interrupted", true));
     let request = ExportRequest {
         paths: vec![folder.path().join("passing.csv")],

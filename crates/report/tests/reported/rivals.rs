@@ -118,7 +118,8 @@ fn missing_m(scenario: &Scenario, flight: &Flight) -> f64 {
     (0..scenario.count()).map(|i| (row(&flight.last.positions_m, i) - row(slots_m, i)).norm()).fold(0.0, f64::max)
 }
 
-/// Returns a scenario of two vehicles, 10 m apart on the x axis, that swap positions. The first starts `aside_m` off the axis.
+/// Returns a scenario of two vehicles, 10 m apart on the x axis, that swap positions. The first starts `aside_m` off
+/// the axis.
 fn swap(law: LawSpec, aside_m: f64) -> Scenario {
     let places_m = Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
     let mut start = Swarm::at_rest(places_m.clone());

@@ -162,7 +162,8 @@ fn held_commands_need_no_refinement() {
 /// Returns a hub with links to two vehicles that have no link between them, all at their slots.
 fn star(half_m: f64, speed_m_s: f64, kind: &str, more: &str) -> Scenario {
     read(&format!(
-        "start = {{ positions_m = [[0, 0], [3, {half_m}], [3, -{half_m}]], velocities_m_s = [[0, 0], [0, -{speed_m_s}], [0, {speed_m_s}]] }}\n\
+        "start.positions_m = [[0, 0], [3, {half_m}], [3, -{half_m}]]\n\
+         start.velocities_m_s = [[0, 0], [0, -{speed_m_s}], [0, {speed_m_s}]]\n\
          formation = {{ shape = \"points\", points_m = [[0, 0], [3, 0.501], [3, -0.501]] }}\n\
          graph.kind = \"{kind}\"\nlaw.delta_m = 1.0\ntime.duration_s = 2.0\n{more}"
     ))

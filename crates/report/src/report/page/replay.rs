@@ -145,7 +145,8 @@ mod tests {
 
     #[test]
     fn removes_comments_and_indentation_only() {
-        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n/** two\n lines */ c();\n";
+        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n\
+                      /** two\n lines */ c();\n";
         assert_eq!(without_comments(source), "const a = ((b)) => \"a // b\";\nc();\n");
     }
 

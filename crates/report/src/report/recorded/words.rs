@@ -249,7 +249,8 @@ impl RecordedReport {
         std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
     }
 
-    /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason for its absence.
+    /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason for its
+    /// absence.
     #[must_use]
     pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
         let tone = match self.status {

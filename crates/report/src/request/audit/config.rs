@@ -196,7 +196,8 @@ mod tests {
 
     #[test]
     fn request_takes_precedence_over_the_file() {
-        let text = "[audit]\ndelta_m = 1.5\nabove_m = 0.5\nobstacles = \"venue.toml\"\n[audit.limits]\nspeed_m_s = 5.0\nclimb_m_s = 2";
+        let text = "[audit]\ndelta_m = 1.5\nabove_m = 0.5\nobstacles = \"venue.toml\"\n\
+                    [audit.limits]\nspeed_m_s = 5.0\nclimb_m_s = 2";
         let asked = filled(request(), text).expect("a question");
         assert!(asked.asked_by().is_some_and(|note| note.contains("show/tautline.toml")));
         let AuditRequest { settings, obstacles, .. } = asked.request;
