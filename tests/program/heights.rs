@@ -51,7 +51,7 @@ fn a_question_about_heights_needs_them() {
             let ran = audit(folder.path(), &[&[recording], question].concat());
             assert_eq!(ran.exit, Some(2), "{recording} {question:?}: {ran:?}");
             assert!(
-                ran.err.contains("heights of its vehicles are not") && ran.err.contains("--column z="),
+                ran.err.contains("heights of its vehicles are unknown") && ran.err.contains("--column z="),
                 "{}",
                 ran.err
             );

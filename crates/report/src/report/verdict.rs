@@ -220,8 +220,8 @@ fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
     (result.energy_falls() && most > allowed).then(|| {
         format!(
             "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow. \
-             Integration and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten time.dt_s, or raise \
-             time.max_halvings.",
+             Integration and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten \
+             time.dt_s, or raise time.max_halvings.",
         )
     })
 }
