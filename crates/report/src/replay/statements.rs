@@ -124,7 +124,7 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
     let mut groups: Vec<_> = events.chunk_by(|a, b| a.0 == b.0).collect();
     let mut statements = Vec::new();
     if groups.first().is_none_or(|first| first[0].0 > begin_s) {
-        statements.push((begin_s, false, state.said(), None));
+        statements.push((begin_s, false, state.statement(), None));
     }
     let together = groups.len().div_ceil(most.max(1)).max(1);
     while !groups.is_empty() {
@@ -136,9 +136,9 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
             state.take(group, &mut seen);
         }
         statements.push(match end_s.filter(|_| together > 1) {
-            Some(end_s) => state.said_of_several(&seen, from_s, end_s),
-            None if together > 1 => state.said_of_several(&seen, from_s, f64::INFINITY),
-            None => (from_s, !state.violations.is_empty(), state.said(), state.violations.first().copied()),
+            Some(end_s) => state.merged_statement(&seen, from_s, end_s),
+            None if together > 1 => state.merged_statement(&seen, from_s, f64::INFINITY),
+            None => (from_s, !state.violations.is_empty(), state.statement(), state.violations.first().copied()),
         });
         groups = rest;
     }
@@ -160,7 +160,7 @@ impl State<'_> {
         }
     }
 
-    fn said(&self) -> String {
+    fn statement(&self) -> String {
         let begun = match self.begun[0] {
             0 => String::new(),
             1 => "1 violation so far".to_owned(),
@@ -179,7 +179,7 @@ impl State<'_> {
     }
 
     /// Returns the statement on an interval with more changes than statements.
-    fn said_of_several(
+    fn merged_statement(
         &self,
         [violations, undecided]: &[BTreeSet<usize>; 2],
         from_s: f64,
@@ -190,7 +190,7 @@ impl State<'_> {
         match (self.first_of(violations), self.first_of(undecided)) {
             (Some(violation), _) => (from_s, true, format!("violation {around}: {violation}"), None),
             (None, Some(doubt)) => (from_s, false, format!("undecided {around}: {doubt}"), None),
-            (None, None) => (from_s, false, self.said(), None),
+            (None, None) => (from_s, false, self.statement(), None),
         }
     }
 

@@ -8,7 +8,7 @@ use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
-use super::verdict::{Fails, Verdict, at_rest, rises};
+use super::verdict::{Fails, Verdict, at_rest, energy_rises};
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{Breath, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
@@ -549,7 +549,7 @@ impl Report {
                 at_end: summary.energy_final.and_then(finite),
                 max_over_initial: summary.energy_max_over_initial.and_then(finite),
                 max_over_leg_start: flight.energy_rise.and_then(|rise| finite(rise.to / rise.from)),
-                rose: rises(result),
+                rose: energy_rises(result),
             },
             control: Control {
                 peak_m_s2: finite(summary.peak_control_m_s2),

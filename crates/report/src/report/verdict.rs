@@ -209,14 +209,14 @@ pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f
 
 /// Returns whether the energy rose although it is proved never to grow. A rise shows a step that is too long for the
 /// law, or loss of digits.
-pub(super) fn rises(result: &FlightResult<'_>) -> bool {
+pub(super) fn energy_rises(result: &FlightResult<'_>) -> bool {
     risen_energy(result).is_some()
 }
 
 fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
     let (summary, vehicles) = (result.summary, result.scenario.count());
     let EnergyRise { from: initial, to: most } = result.flight.energy_rise?;
-    let allowed = highest_honest(initial, summary, vehicles);
+    let allowed = largest_explained_energy(initial, summary, vehicles);
     (result.energy_falls() && most > allowed).then(|| {
         format!(
             "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow. \
@@ -333,7 +333,7 @@ pub(super) const INTEGRATION: f64 = EnergyRise::INTEGRATION;
 ///
 /// Here u is the largest command, v the speed of the fastest vehicle and x the largest distance from the start of the
 /// swarm. Rounding moves a vehicle by r against a force of u, and changes its velocity by epsilon v.
-pub(super) fn highest_honest(initial: f64, summary: &Summary, vehicles: usize) -> f64 {
+pub(super) fn largest_explained_energy(initial: f64, summary: &Summary, vehicles: usize) -> f64 {
     let resolution_m = f64::EPSILON * summary.extent_m;
     let rounding = summary.peak_control_m_s2 * resolution_m + (f64::EPSILON * summary.fastest_m_s).powi(2);
     (1.0 + INTEGRATION) * initial + vehicles as f64 * rounding

@@ -82,7 +82,7 @@ impl OfLimit {
     }
 
     /// Returns the limited quantity in words.
-    fn called(&self) -> &'static str {
+    fn quantity_name(&self) -> &'static str {
         use tautline_audit::envelope::Quantity;
         match self.limit.quantity {
             Quantity::Speed => "speed",
@@ -107,21 +107,21 @@ impl OfLimit {
             (false, false) => return "not known".to_owned(),
             (true, false) => format!("at least {}", at_least(lower, 3)),
             (false, true) => format!("at most {}", at_most(upper, 3)),
-            (true, true) if upper - lower <= 1e-6 * upper.abs().max(1.0) => self.told_apart(upper),
+            (true, true) if upper - lower <= 1e-6 * upper.abs().max(1.0) => self.distinct_from_limit(upper),
             (true, true) => format!("{} to {}", at_least(lower, 3), at_most(upper, 3)),
         };
         format!("{number} {}", self.unit())
     }
 
     /// Formats a value with at least three decimals, and with enough to differ from the limit.
-    fn told_apart(&self, value: f64) -> String {
+    fn distinct_from_limit(&self, value: f64) -> String {
         let size = |number: f64, decimals: usize| fixed(number, decimals).trim_start_matches('-').to_owned();
-        let is_told = |&decimals: &usize| size(value, decimals) != size(self.allowed, decimals);
-        let decimals = if value == self.allowed { 3 } else { (3..=17).find(is_told).unwrap_or(3) };
+        let is_distinct = |&decimals: &usize| size(value, decimals) != size(self.allowed, decimals);
+        let decimals = if value == self.allowed { 3 } else { (3..=17).find(is_distinct).unwrap_or(3) };
         fixed(value, decimals)
     }
 
-    fn asked(&self) -> String {
+    fn limit_in_words(&self) -> String {
         let least = if self.limit.quantity.is_least() { "at least " } else { "" };
         format!("{least}{} {}", exact(self.allowed), self.unit())
     }
@@ -129,7 +129,7 @@ impl OfLimit {
     /// Returns the finding in a few words, such as `speed at most 3.200 m/s (limit 5.000 m/s)`.
     #[must_use]
     pub fn brief(&self) -> String {
-        let called = self.called();
+        let quantity = self.quantity_name();
         match self.status {
             Status::Clear => {
                 let least = self.limit.quantity.is_least();
@@ -142,14 +142,14 @@ impl OfLimit {
                     let bound = if is_beyond { exact(self.allowed) } else { bound };
                     format!(" {} {bound} {}", if least { "at least" } else { "at most" }, self.unit())
                 });
-                format!("{called}{most} (limit {})", self.asked())
+                format!("{quantity}{most} (limit {})", self.limit_in_words())
             }
             Status::Violation => {
                 let worst = self.extreme.iter().map(|of| {
                     let at = seconds(of.finding.at_s);
                     format!(" of {} was {} at {at}", of.vehicle, self.value(&of.finding))
                 });
-                format!("{called}{} (limit {})", worst.collect::<String>(), self.asked())
+                format!("{quantity}{} (limit {})", worst.collect::<String>(), self.limit_in_words())
             }
             Status::Undecided => {
                 let why = match (&self.undecided[..], &self.unknown[..]) {
@@ -159,7 +159,7 @@ impl OfLimit {
                     ([], [vehicle, ..]) => format!("unknown for {vehicle}"),
                     ([], []) => "unknown at times".to_owned(),
                 };
-                format!("{called} {why} (limit {})", self.asked())
+                format!("{quantity} {why} (limit {})", self.limit_in_words())
             }
         }
     }
@@ -171,7 +171,8 @@ impl OfLimit {
 
     /// Returns the undecided times, a sentence each.
     pub(super) fn undecided_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        let unknown = self.unknown.iter().map(|vehicle| format!("{vehicle}: its {} is not known", self.called()));
+        let unknown =
+            self.unknown.iter().map(|vehicle| format!("{vehicle}: its {} is not known", self.quantity_name()));
         self.undecided.iter().map(|of| self.words(of, "against")).chain(unknown)
     }
 
@@ -182,16 +183,16 @@ impl OfLimit {
 
     /// Returns a violation or an undecided time in a few words.
     pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>) -> String {
-        format!("{vehicle}: {} {} (limit {})", self.called(), self.value(finding), self.asked())
+        format!("{vehicle}: {} {} (limit {})", self.quantity_name(), self.value(finding), self.limit_in_words())
     }
 
     fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>, how: &str) -> String {
         format!(
             "{vehicle}: {} {} by {} s, {how} the limit of {} from {} s to {} s",
-            self.called(),
+            self.quantity_name(),
             self.value(finding),
             fixed(finding.at_s, 3),
-            self.asked(),
+            self.limit_in_words(),
             fixed(finding.from_s, 3),
             fixed(finding.to_s, 3)
         )
@@ -201,11 +202,11 @@ impl OfLimit {
     pub(super) fn row(&self) -> [String; 6] {
         let of = self.extreme.as_ref();
         [
-            self.called().to_owned(),
+            self.quantity_name().to_owned(),
             of.map_or("not known".to_owned(), |of| self.value(&of.finding)),
             of.map_or(String::new(), |of| of.vehicle.clone()),
             of.map_or(String::new(), |of| fixed(of.finding.at_s, 3)),
-            self.asked(),
+            self.limit_in_words(),
             match self.status {
                 Status::Clear => "kept",
                 Status::Violation => "exceeded",

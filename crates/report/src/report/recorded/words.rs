@@ -95,7 +95,7 @@ impl RecordedReport {
                 });
                 let is_in_verdict = self.audit.judged_by_run || !self.audit.proved;
                 let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion) };
-                format!("{closest}({delta}{motion}){}", self.of_those_alone())
+                format!("{closest}({delta}{motion}){}", self.never_with_another())
             }
             Status::Violation => {
                 let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
@@ -119,7 +119,7 @@ impl RecordedReport {
     }
 
     /// Returns the vehicles that are never present together with another one, and are therefore not judged.
-    fn of_those_alone(&self) -> String {
+    fn never_with_another(&self) -> String {
         let others = |count: usize| if count > 0 { format!(" and {count} more") } else { String::new() };
         self.alone.split_first().map_or(String::new(), |(first, rest)| {
             let (is, others) = (if rest.is_empty() { "is" } else { "are" }, others(rest.len()));

@@ -35,7 +35,7 @@ pub struct OwnRecording {
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
     /// Violations and approaches of the events of the run.
-    witnessed: Vec<RunFinding>,
+    run_findings: Vec<RunFinding>,
     /// Whether the audit ignores the run's audit.
     is_independent: bool,
     /// Whether positions and times are read unchanged.
@@ -124,7 +124,7 @@ impl OwnRecording {
             obstacles: scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect(),
             early_end: None,
             audit: StoredAudit::None,
-            witnessed: Vec::new(),
+            run_findings: Vec::new(),
             is_independent: false,
             is_read_as_written: true,
             scale,
@@ -167,7 +167,7 @@ impl OwnRecording {
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(Event::EndedEarly { reason: why, .. }) => reason = Some(why),
-                Entry::Event(event) => own.witnessed.extend(witnessed(&event, &scenario)),
+                Entry::Event(event) => own.run_findings.extend(run_finding(&event, &scenario)),
             }
         }
         if reason.is_some() || last_step < scenario.time.steps() {
@@ -214,11 +214,11 @@ impl OwnRecording {
             _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
                 note("the recording holds no audit of its run, which a run writes at its end");
-                return self.of_samples(outcome, settings, &[&self.witnessed]);
+                return self.of_samples(outcome, settings, &[&self.run_findings]);
             }
             StoredAudit::Altered => {
                 note("the recording was changed after the run, so the run's audit may refer to other samples");
-                return self.of_samples(outcome, settings, &[&self.witnessed]);
+                return self.of_samples(outcome, settings, &[&self.run_findings]);
             }
             StoredAudit::AsWritten(audit) => audit,
         };
@@ -238,7 +238,7 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.witnessed]);
+            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.run_findings]);
         }
         if self.is_contradicted(outcome, audit, status) {
             note("they show vehicles closer than the run's audit");
@@ -365,7 +365,7 @@ impl OwnRecording {
 }
 
 /// Returns the violation or the approach of an event, in the lengths of [`run_audit`].
-fn witnessed(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
+fn run_finding(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
     let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
     let finding = |vehicle: usize, time_s: f64, limit_m: f64, min_m: f64| RunFinding {
         vehicle: vehicle as u64 + 1,
