@@ -39,18 +39,20 @@ impl Report {
     /// Returns the failures beside the status of the audit, as `label: detail`, in the order of the reasons of the
     /// verdict.
     fn failures(&self) -> Vec<String> {
-        let is_clear = self.audit.status != Status::Violation;
+        let has_no_violation = self.audit.status != Status::Violation;
         let codes = &self.verdict.refused;
         let refused = (!codes.is_empty()).then(|| format!("refused by check: {}", codes.join(", ")));
-        let broken = self.separation.certified_m.filter(|_| is_clear && self.breaks_certificate()).map(|certified_m| {
-            let closest = self.separation.closest().map(|closest| {
-                let [first, second] = closest.pair.numbers();
-                let min_m = metres_below(closest.separation_m, certified_m);
-                format!("vehicles {first} and {second} came to {min_m} m at {}, ", seconds(closest.time_s))
+        let broken =
+            self.separation.certified_m.filter(|_| has_no_violation && self.breaks_certificate()).map(|certified_m| {
+                let closest = self.separation.closest().map(|closest| {
+                    let [first, second] = closest.pair.numbers();
+                    let min_m = metres_below(closest.separation_m, certified_m);
+                    format!("vehicles {first} and {second} came to {min_m} m at {}, ", seconds(closest.time_s))
+                });
+                format!("certificate broken: {}certified {} m", closest.unwrap_or_default(), metres(certified_m))
             });
-            format!("certificate broken: {}certified {} m", closest.unwrap_or_default(), metres(certified_m))
-        });
-        let past_obstacles = self.obstacles.as_ref().filter(|_| is_clear).and_then(Obstacles::broken_certificate);
+        let past_obstacles =
+            self.obstacles.as_ref().filter(|_| has_no_violation).and_then(Obstacles::broken_certificate);
         let past_obstacles = past_obstacles.map(|broken| format!("certificate broken: {broken}"));
         let overlong = self.run.overlong_steps;
         let overlong = (overlong > 0)
@@ -59,8 +61,8 @@ impl Report {
             Some(ratio) => format!("energy rose: to {ratio:.3} of its start"),
             None => "energy rose: it is proved never to grow".to_owned(),
         });
-        let is_open = self.audit.status == Status::Undecided && self.is_clear_until_its_early_end();
-        let ended = (self.run.ended_early.is_some() && !is_open)
+        let is_in_lead = self.is_clear_until_its_early_end();
+        let ended = (self.run.ended_early.is_some() && !is_in_lead)
             .then(|| format!("ended early: at {}", seconds(self.run.duration_s)));
         [
             refused,
@@ -68,10 +70,10 @@ impl Report {
             self.hulls.brief(),
             broken,
             overlong,
-            rose.filter(|_| is_clear),
+            rose.filter(|_| has_no_violation),
             ended,
-            self.missing().filter(|_| is_clear),
-            super::legs::missed(&self.legs).filter(|_| is_clear && self.formation.reached),
+            self.missing().filter(|_| has_no_violation),
+            super::legs::missed(&self.legs).filter(|_| has_no_violation && self.formation.reached),
         ]
         .into_iter()
         .flatten()
