@@ -90,7 +90,7 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
     let least = format!("{:.6}", (min_m * 1e6).floor() / 1e6);
     let said = text(&found["closest"]["said"]);
     assert!(
-        said.contains(&least) && said.ends_with(&format!("4-5 at {:.3} s", at_s.unwrap_or_default())),
+        said.contains(&least) && said.ends_with(&format!("4 and 5 at {:.3} s", at_s.unwrap_or_default())),
         "{said}: {least}"
     );
     assert_eq!(found["closest"]["clock"], at.as_str());
