@@ -199,7 +199,7 @@ pub(super) struct AuditArguments {
     /// folder.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) config: Option<PathBuf>,
-    /// Ask what the command line says alone, and look for no tautline.toml.
+    /// Ignore tautline.toml: use the options of the command line alone.
     #[arg(long, conflicts_with = "config", help_heading = "Question")]
     pub(super) no_config: bool,
 
@@ -296,7 +296,7 @@ fn limit(text: &str) -> Result<Limit, String> {
     let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
     let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE, of {}", names()))?;
     let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.name() == name.trim());
-    let quantity = quantity.ok_or_else(|| format!("`{name}` is no limit: the limits are {}", names()))?;
+    let quantity = quantity.ok_or_else(|| format!("`{name}` is not a limit: the limits are {}", names()))?;
     match value.trim().parse::<f64>() {
         Ok(allowed) if allowed.is_finite() => Ok(Limit { quantity, allowed }),
         _ => Err(format!("`{value}` is not a number")),
@@ -402,7 +402,7 @@ mod tests {
             limit("speed").unwrap_err(),
             "write LIMIT=VALUE, of speed, horizontal, climb, descent, accel, height, floor"
         );
-        assert!(limit("spee=3").unwrap_err().starts_with("`spee` is no limit"));
+        assert!(limit("spee=3").unwrap_err().starts_with("`spee` is not a limit"));
         assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");
     }
 }

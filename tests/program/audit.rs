@@ -58,7 +58,7 @@ fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
     for asked in [&bounded[3..], &["--from", "0"], &["--to", "3"], &["--max-gap", "5"], &["--offset", "a=1"]] {
         let ran = audit(folder.path(), &[&bounded[..3], asked].concat());
         assert_eq!(ran.exit, Some(2), "{ran:?}");
-        assert!(ran.err.contains("log.csv") && ran.err.contains("say --time-unit ms, or --time-unit s"), "{ran:?}");
+        assert!(ran.err.contains("log.csv") && ran.err.contains("give --time-unit ms, or --time-unit s"), "{ran:?}");
     }
     assert_eq!(audit(folder.path(), &bounded[..3]).exit, Some(0), "a straight way is the same in any unit");
     for (unit, exit) in [("ms", 0), ("s", 1)] {
@@ -313,8 +313,8 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
     let junit = fs::read_to_string(folder.path().join("late.xml")).expect("JUnit");
     assert!(junit.contains("failures=\"0\"") && !late.out.contains("was not seen"), "{junit} {late:?}");
     // Nothing is said of charlie, and that is said.
-    assert!(late.out.contains("(delta 1.000 m); charlie is never there with another; from "), "{late:?}");
-    assert!(late.err.contains("charlie, there from 10.5 s to 19.5 s, is never there with another"), "{late:?}");
+    assert!(late.out.contains("(delta 1.000 m); charlie is never present with another; from "), "{late:?}");
+    assert!(late.err.contains("charlie, present from 10.5 s to 19.5 s, is never present with another"), "{late:?}");
     let gap = audit(folder.path(), &["gap.csv", "--delta", "1"]);
     assert_eq!(gap.exit, Some(1), "{gap:?}");
     let said = "UNDECIDED: bravo was not seen from 2.500 s to 4.500 s; --max-gap 2 would judge across (delta 1.000 m";

@@ -341,7 +341,7 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
         (&["nowhere"], "scenario/not-found", ""),
         (&["pair.toml", "--csv", "a.txt", "--json", "./a.txt"], "files/overwrites-input", "another file"),
         (&["pair.toml", "--csv", "pair.toml"], "files/overwrites-input", "another file"),
-        (&["pair.toml", "--json", "new.json", "--csv", "folder.csv"], "files/is-directory", "a file within it"),
+        (&["pair.toml", "--json", "new.json", "--csv", "folder.csv"], "files/is-directory", "a file in this directory"),
         (&["pair.toml", "--html", "earlier.html"], "files/exists", "--force"),
         (&["pair.toml", "--csv", "-", "--json", "-"], "files/one-standard-output", "into a file"),
     ];

@@ -51,7 +51,7 @@ fn a_question_about_heights_needs_them() {
             let ran = audit(folder.path(), &[&[recording], question].concat());
             assert_eq!(ran.exit, Some(2), "{recording} {question:?}: {ran:?}");
             assert!(
-                ran.err.contains("heights of its vehicles are not") && ran.err.contains("--column z="),
+                ran.err.contains("heights of its vehicles are unknown") && ran.err.contains("--column z="),
                 "{}",
                 ran.err
             );
@@ -106,7 +106,7 @@ fn heights_above_a_first_place_that_nobody_named_are_none() {
         &["--delta", "1", "--obstacles", "ball.toml"],
     ] {
         let ran = audit(folder.path(), &[&["adsb.csv"], question].concat());
-        let said = "measured from the first one, 47.0,8.0,11826.0";
+        let said = "relative to the first one, 47.0,8.0,11826.0";
         assert!(ran.exit == Some(2) && ran.err.contains(said) && ran.err.contains("--origin"), "{ran:?}");
         let asked = audit(folder.path(), &[&["adsb.csv", "--origin", "47,8,0"], question].concat());
         assert!(asked.exit.is_some_and(|exit| exit < 2), "{asked:?}");

@@ -100,7 +100,7 @@ fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
     assert!((least_m(&audit) - min_m).abs() < 1e-12, "the run's audit is repeated");
     fs::write(folder.path().join("none.toml"), "").expect("a file");
     let none = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "none.toml"]);
-    assert!(none.exit == Some(2) && none.err.contains("there is no [[obstacle]]"), "{}", none.err);
+    assert!(none.exit == Some(2) && none.err.contains("the file has no [[obstacle]]"), "{}", none.err);
 
     // What the recording holds is the scenario, obstacles to the last bit.
     let held = ran(&folder, &["list", "--show", "out/among/run.mcap"]).out;

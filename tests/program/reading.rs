@@ -112,7 +112,7 @@ fn one_vehicle_alone_is_judged_by_its_limits() {
         (&["--limit", "speed=2"][..], 2, "--one-vehicle"),
         (&["--one-vehicle", "--limit", "speed=2"], 0, "speed at most 1.415 m/s"),
         (&["--one-vehicle", "--limit", "speed=1"], 1, "VIOLATION"),
-        (&["--one-vehicle", "--delta", "1"], 2, "1 vehicle to judge, and nothing to keep apart"),
+        (&["--one-vehicle", "--delta", "1"], 2, "1 vehicle to judge, but no second object"),
     ] {
         let (code, text) = said(&audit(&[("cf1.csv", text)], &[&["cf1.csv"], words].concat()));
         assert!(code == Some(exit) && text.contains(expected), "{words:?}: {text}");

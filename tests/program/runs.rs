@@ -138,7 +138,7 @@ fn the_readme_shows_what_the_program_prints() {
 fn with_json_talk_goes_to_standard_error_and_with_quiet_nowhere() {
     let folder = folder();
     let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());
-    assert!(talking.err.lines().any(|line| line.starts_with("CLEAR: ")), "{}", talking.err);
+    assert!(talking.err.lines().any(|line| line.starts_with("NOT REACHED: ")), "{}", talking.err);
     assert!(json(&talking.out).is_object());
     let quiet = run(folder.path(), &[&SHORT[..], &["--json", "--quiet", "--force"]].concat());
     assert_eq!((quiet.exit, quiet.err.as_str()), (talking.exit, ""));
@@ -157,7 +157,7 @@ fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
 
     let collinear = run(folder.path(), &["pentagon-collinear", "--force"]);
     assert_eq!(collinear.exit, BAD);
-    assert!(collinear.out.starts_with("CLEAR: ") && collinear.out.contains("NOT reached"), "{}", collinear.out);
+    assert!(collinear.out.starts_with("REFUSED BY CHECK: start-on-line; not reached: largest edge error "), "{}", collinear.out);
     assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
     let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
     assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
@@ -179,7 +179,7 @@ fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
         "{}",
         solid.err
     );
-    assert!(report["verdict"]["reasons"].to_string().contains("a bounce of the engine's, and not the law's motion"));
+    assert!(report["verdict"]["reasons"].to_string().contains("After the first collision the motion is not governed by the law"));
     let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
     assert!(page.contains("Hulls that hit") && page.contains("hulls hit, "), "a table, and marks in the figure");
     let (_, events) = McapRecording::open(&folder.path().join("out/run.mcap"))
@@ -200,8 +200,8 @@ fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
     assert_eq!(report["hulls"]["bounces"], Value::Null);
     let through = &report["hulls"]["passed_through"];
     assert!(through["min_m"].as_f64() < through["touching_m"].as_f64(), "{through}");
-    assert!(points.err.contains("passed through each other as points"), "{}", points.err);
-    assert!(report["verdict"]["reasons"].to_string().contains("solid ones fly otherwise"));
+    assert!(points.err.contains("passed through each other: vehicles "), "{}", points.err);
+    assert!(report["verdict"]["reasons"].to_string().contains("Solid hulls would move otherwise"));
 
     // Nothing of the kind is said of a flight without.
     let clear = run(folder.path(), &["--json", "--force", "--no-snapshots"]);

@@ -38,7 +38,7 @@ class Arrays(Case):
             ("(T,) is needed, not of shape (100, 1)", t[:, None], p),
             ("holds nothing to judge", t[:0], p[:0]),
             ("holds nothing to judge", t, p[:, :0]),
-            ("1 vehicle to judge, and nothing to keep apart", t, p[:, :1]),
+            ("1 vehicle to judge, but no second object", t, p[:, :1]),
         ):
             self.refuses(tl.Error, message, lambda t=times, p=positions: tl.audit(t, p, delta=1.0))
         self.refuses(tl.Error, "velocities: they are of shape", lambda: tl.audit(t, p, delta=1.0, velocities=p[1:]))

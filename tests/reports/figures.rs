@@ -184,7 +184,7 @@ fn every_pair_of_a_small_swarm_has_a_line_and_the_closest_approach_is_marked() {
     let rings = drawing.rings();
     let &[(x, y)] = &rings[..] else { panic!("{rings:?}") };
     assert!((x - expected.0).abs() <= PLACE && (y - expected.1).abs() <= PLACE, "({x}, {y}), not {expected:?}");
-    assert!(figure.description.contains("2.750 m, vehicles 1-2 at 4.00 s"), "{}", figure.description);
+    assert!(figure.description.contains("2.750 m, vehicles 1 and 2 at 4.00 s"), "{}", figure.description);
     // The visit lasted one sample of two hundred; the line of the pair reaches down to it.
     let lowest = drawing.polylines((colors[0], "1.5"))[0].iter().map(|&(_, y)| y).fold(0.0, f64::max);
     assert!((lowest - expected.1).abs() <= PLACE, "{lowest}, not {}", expected.1);

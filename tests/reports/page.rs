@@ -106,7 +106,7 @@ fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_n
     let folder = tempfile::tempdir().expect("a folder");
     let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2"]);
     for part in [
-        "CLEAR: never closer than",
+        "(clear: never closer than",
         "certified 2.055307 m",
         "The certified separation holds for the complete graph",
         "Everything is computed in double precision",
@@ -157,7 +157,7 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
         fs::read_to_string(folder.path().join("a.html")).expect("a page")
     };
     let near = page(1.5);
-    let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest distance of all")).expect("a figure");
+    let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest separation of all pairs")).expect("a figure");
     assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
     // It is that of all, and not of one pair: 8 m but around the pass.
     let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());

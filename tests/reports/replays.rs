@@ -90,18 +90,18 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
     let least = format!("{:.6}", (min_m * 1e6).floor() / 1e6);
     let said = text(&found["closest"]["said"]);
     assert!(
-        said.contains(&least) && said.ends_with(&format!("4-5 at {:.3} s", at_s.unwrap_or_default())),
+        said.contains(&least) && said.ends_with(&format!("4 and 5 at {:.3} s", at_s.unwrap_or_default())),
         "{said}: {least}"
     );
     assert_eq!(found["closest"]["clock"], at.as_str());
     assert!(
-        text(&found["closest"]["state"]).starts_with("violation: 4-5 come to 1.532 m (limit 2.000) · nearest so far"),
+        text(&found["closest"]["state"]).starts_with("violation: 4 and 5 come to 1.532 m (limit 2.000) · closest so far"),
         "{found}"
     );
     assert!(found["reds"].as_u64() > Some(20), "who is too near is red: {found}");
-    assert!(text(&found["violation"]["said"]).starts_with("Violation: 4-5 came to 1.532 m (limit 2.000) at"));
+    assert!(text(&found["violation"]["said"]).starts_with("Violation: 4 and 5 came to 1.532 m (limit 2.000) at"));
     assert!(
-        text(&found["end"]["state"]).starts_with("1 violation so far · nearest so far 1.532 m, 4 and 5 · "),
+        text(&found["end"]["state"]).starts_with("1 violation so far · closest so far 1.532 m, 4 and 5 · "),
         "{found}"
     );
     assert_eq!((text(&found["end"]["clock"]), text(&found["end"]["said"])), ("10.00 s", ""));
@@ -246,7 +246,7 @@ fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
     assert_eq!(found["there"], serde_json::json!([[1, 1], [1, 0], [1, 0], [1, 1]]), "{found}");
     assert_eq!((&found["images"], &found["ran"]), (&Value::from(0), &Value::from(0)));
     assert!(
-        text(&found["state"]).starts_with("undecided so far · nearest known so far 5.000 m, <img src=x"),
+        text(&found["state"]).starts_with("undecided so far · closest known so far 5.000 m, <img src=x"),
         "{found}"
     );
 }
@@ -280,27 +280,27 @@ fn at_no_time_is_more_said_than_the_judge_knows_by_then() {
     let page = audited(folder.path(), &gap, &["--delta", "1"]);
     let found = states(folder.path(), &page, &[2.0, 5.0, 10.0, 14.0, 20.0]);
     let expected = [
-        "no violation so far · nearest known so far at most 12.250 m",
-        "undecided: b is not seen · nearest known so far at most 9.250 m",
-        "undecided so far · nearest known so far at most 4.250 m",
-        "violation: a and c come to 0.250 m (limit 1.000) · nearest known so far 0.250 m, a and c",
-        "1 violation so far, not all is known · nearest known so far 0.250 m, a and c",
+        "no violation so far · closest known so far at most 12.250 m",
+        "undecided: b is not seen · closest known so far at most 9.250 m",
+        "undecided so far · closest known so far at most 4.250 m",
+        "violation: a and c come to 0.250 m (limit 1.000) · closest known so far 0.250 m, a and c",
+        "1 violation so far, some times undecided · closest known so far 0.250 m, a and c",
     ];
     assert_eq!(found, expected);
     let page = audited(folder.path(), &leap, &["--delta", "1"]);
     let found = states(folder.path(), &page, &[19.0, 19.5, 19.98, 20.0]);
     let expected = [
-        "no violation so far · nearest so far at most 20.000 m",
-        "no violation so far · nearest so far at most 20.000 m",
-        "violation: a and b come to 0.250 m (limit 1.000) · nearest so far at most 20.000 m",
-        "violation: a and b come to 0.250 m (limit 1.000) · nearest so far 0.250 m, a and b",
+        "no violation so far · closest so far at most 20.000 m",
+        "no violation so far · closest so far at most 20.000 m",
+        "violation: a and b come to 0.250 m (limit 1.000) · closest so far at most 20.000 m",
+        "violation: a and b come to 0.250 m (limit 1.000) · closest so far 0.250 m, a and b",
     ];
     assert_eq!(found, expected);
     // Between two samples of a bounded acceleration a distance is at least something.
     let bounds = ["--delta", "1", "--motion", "bounded", "--max-accel", "300"];
     let found = states(folder.path(), &audited(folder.path(), &leap, &bounds), &[10.5]);
     assert!(
-        found[0].starts_with("undecided: a and b may come too near · nearest known so far at least 0.000 m"),
+        found[0].starts_with("undecided: a and b may come too close · closest known so far at least 0.000 m"),
         "{found:?}"
     );
     // Of single vehicles alone nothing is said of distances.

@@ -1,7 +1,7 @@
-//! A scenario, flown to its report.
+//! Flight of a scenario and its report.
 //!
-//! [`run`] is a function of its scenario: many of them run side by side, and memory does not grow with the length of a
-//! flight. Whatever else is wanted of a flight (a recording, figures, pictures) is the business of the sink.
+//! [`run`] depends on its scenario only, so flights can run in parallel. Memory does not grow with the length of a
+//! flight. Recordings, figures and pictures are made by sinks.
 
 use std::ops::ControlFlow;
 
@@ -12,20 +12,21 @@ use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Ending, Parts, SimError};
 
-/// Flies a scenario to its end, hands what is recorded to `sink`, and reports.
+/// Flies a scenario to its end, passes its samples and events to `sink`, and returns the report.
 ///
 /// # Errors
-/// [`SimError`]; what was recorded up to then stays recorded.
+/// [`SimError`]. Everything recorded up to then stays recorded.
 pub fn run(scenario: &Scenario, sink: &mut (impl Sink + Send)) -> Result<Report, SimError> {
     run_while(scenario, &Preflight::of(scenario)?, sink, &mut |_| ControlFlow::Continue(()))
 }
 
-/// From this many vehicles on samples are recorded in a thread of their own; below, handing them over costs more.
+/// Smallest number of vehicles for which samples are recorded in a thread of their own. Below it, the handover costs
+/// more.
 const BESIDE_FROM: usize = 512;
 
-/// As [`run`], with what is known before the first step; `carry_on` is asked after each step with the number of steps
-/// flown and ends the flight with [`ControlFlow::Break`]. A large swarm's samples are recorded in a thread of their own where
-/// there are threads at hand, unless the sink [looks at steps](Sink::looks_at_steps).
+/// Flies a scenario like [`run`], with the findings of its check. `carry_on` is called after each step with the number
+/// of flown steps, and [`ControlFlow::Break`] ends the flight. Samples of a large swarm are recorded in a thread of
+/// their own if threads are available and the sink does not [look at steps](Sink::looks_at_steps).
 ///
 /// # Errors
 /// As [`run`].
@@ -38,8 +39,8 @@ pub fn run_while(
     Ok(run_with(scenario, preflight, Parts::of(scenario)?, sink, carry_on)?.0)
 }
 
-/// As [`run_while`], with parts that need not be the scenario's, such as another law; `preflight` is of that law
-/// ([`Preflight::under`]). Says how the flight ended too.
+/// Flies a scenario like [`run_while`], with parts that may differ from those of the scenario, such as another law.
+/// `preflight` is the check of that law ([`Preflight::under`]). Also returns how the flight ended.
 ///
 /// # Errors
 /// As [`run`].
@@ -74,10 +75,10 @@ pub fn run_with(
     Ok((report, flight.ending))
 }
 
-/// Smallest separations that differ by this part of delta or less are the same.
+/// Largest difference of two smallest separations that count as equal, relative to delta.
 const SAME: f64 = 0.01;
 
-/// Flies the scenario of `report` again with every step half as long.
+/// Flies the scenario of `report` again with every step half as long, and compares the results.
 ///
 /// # Errors
 /// As [`run`].

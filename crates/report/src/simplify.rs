@@ -1,11 +1,11 @@
 //! Simplification of a line by its farthest points (Ramer 1972, Douglas and Peucker 1973).
 
-/// Returns every point that the line needs besides the `kept` points, which are in ascending order, each with the largest
-/// tolerance that needs it.
+/// Returns the points of a line that a simplification needs besides the `kept` points, each with the largest tolerance
+/// that needs it. `kept` is in ascending order.
 ///
-/// `off(k, from, to)` is the distance of point `k` from the line between two other points; a distance of at most `least`
-/// needs no point. A point comes after the ends of its part, whose tolerance is at least as large: the line through all
-/// points with a tolerance above some bound is at most that bound off.
+/// `off(k, from, to)` is the distance of point `k` from the line between two other points. Distances of at most `least`
+/// need no point. A point follows the ends of its part in the result, and their tolerance is at least as large. The
+/// line through all points with a tolerance above a bound therefore deviates by at most that bound.
 pub(crate) fn needed(kept: &[usize], least: f64, off: impl Fn(usize, usize, usize) -> f64) -> Vec<(usize, f64)> {
     let mut parts: Vec<_> = kept.windows(2).map(|ends| (ends[0], ends[1], f64::INFINITY)).collect();
     let mut needed = Vec::new();

@@ -350,7 +350,8 @@ impl Study for Comparison {
             1 => format!("the same start (start.seed {})", self.seed),
             runs => format!("the same {runs} starts (start.seed {} to {})", self.seed, self.seed + (runs - 1)),
         };
-        format!("{}: {laws} from {starts}, delta {} m", self.about.scenario.name, self.about.delta_m)
+        let interrupted = if self.is_good() { "" } else { "INTERRUPTED: " };
+        format!("{interrupted}{}: {laws} from {starts}, delta {} m", self.about.scenario.name, self.about.delta_m)
     }
 
     fn notes(&self) -> Vec<String> {

@@ -298,7 +298,8 @@ impl Study for Margin {
     }
 
     fn headline(&self) -> String {
-        let (key, name) = (&self.key, &self.about.scenario.name);
+        let interrupted = if self.interrupted { "INTERRUPTED: " } else { "" };
+        let (key, name) = (&self.key, format!("{interrupted}{}", self.about.scenario.name));
         let [does, does_not] = self.question.words();
         let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
         match (self.turn, self.sides()) {

@@ -365,6 +365,7 @@ impl Study for Sweep {
 
     fn headline(&self) -> String {
         let holds = |point: &&Point| point.held.of == self.runs && point.held.count == self.runs;
+        let interrupted = if self.interrupted { "INTERRUPTED: " } else { "" };
         let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
             let shown =
@@ -372,7 +373,7 @@ impl Study for Sweep {
             format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
         });
         format!(
-            "{} {}{every} at {} of {}{}",
+            "{interrupted}{} {}{every} at {} of {}{}",
             self.about.scenario.name,
             self.question.words()[0],
             self.points.iter().filter(holds).count(),

@@ -411,7 +411,7 @@ fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_captio
     let metres = format!("{} m", tautline_core::text::at_least(min_m, 3));
     let figure = figures::distances(&log, scenario.delta_m, None, "Distances");
     assert!(
-        figure.description.contains(&format!("Closest: {metres}, vehicles {first}-{second}")),
+        figure.description.contains(&format!("Closest: {metres}, vehicles {first} and {second}")),
         "{}",
         figure.description
     );
@@ -419,7 +419,7 @@ fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_captio
     let peak = report.control.peak_m_s2.expect("a peak");
     assert!(control.contains(&format!("at most {peak:.3} m/s")), "{control}");
     let replay = replay_of_run(&scenario, &log, &report, PAGE_BYTES).expect("a replay");
-    let in_replay = format!("nearest so far {metres}, {first} and {second}");
+    let in_replay = format!("closest so far {metres}, {first} and {second}");
     assert!(replay.json.contains(&in_replay), "{in_replay}");
 
     let timeline = Timeline::flown(&scenario, Arc::new(log));

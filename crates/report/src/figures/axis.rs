@@ -1,20 +1,20 @@
-//! Axes: what range they show, and where their ticks are.
+//! Axes: range, ticks and labels.
 
 use super::svg::text_px;
 use tautline_core::text::{at_least, decimals_of};
 
-/// Numbers beyond this have no place on an axis: differences of larger ones might overflow.
+/// Largest number on an axis. Differences of larger numbers may overflow.
 const LARGEST: f64 = 1e150;
-/// Smallest share of its magnitude that a range may span: below, ticks would differ by rounding alone.
+/// Smallest span of a range relative to its magnitude. Below it, ticks would differ by rounding alone.
 const NARROWEST: f64 = 1e-9;
-/// Most decades of a logarithmic axis: 1e-12 beside 1e6 can still be told apart in a figure.
+/// Largest number of decades of a logarithmic axis. With 18 decades, 1e-12 and 1e6 are still distinct in a figure.
 const MOST_DECADES: i32 = 18;
 
-/// How an axis maps numbers to places.
+/// Mapping of numbers to positions on an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scale {
     Linear,
-    /// By the decimal logarithm.
+    /// Decimal logarithm.
     Log,
 }
 
@@ -23,17 +23,16 @@ pub(super) enum Scale {
 pub(super) struct Axis {
     pub(super) label: String,
     pub(super) scale: Scale,
-    /// Ends of the axis as places: numbers, or their logarithms.
+    /// Ends of the axis as positions: numbers, or their logarithms.
     pub(super) from: f64,
     pub(super) to: f64,
-    /// Places of the ticks.
+    /// Positions of the ticks.
     pub(super) ticks: Vec<f64>,
     step: f64,
 }
 
 impl Axis {
-    /// A linear axis that shows all of the finite `numbers` and ends at ticks where `whole`; from 0 to 1 if there are
-    /// none.
+    /// Returns a linear axis over the finite `numbers`. It ends at ticks if `whole`. Without numbers it spans 0 to 1.
     pub(super) fn linear(label: &str, numbers: impl IntoIterator<Item = f64>, whole: bool) -> Self {
         let (low, high) = extent(numbers).unwrap_or((0.0, 1.0));
         let (low, high) = widened(low, high);
@@ -42,14 +41,14 @@ impl Axis {
         Self::between(label, from, to, step)
     }
 
-    /// A linear axis between two numbers, `from` < `to`.
+    /// Returns a linear axis from `from` to `to`, which is larger.
     pub(super) fn spanning(label: &str, from: f64, to: f64, most_ticks: f64) -> Self {
         let (from, to) = widened(from, to);
         Self::between(label, from, to, nice_step(to - from, most_ticks))
     }
 
     fn between(label: &str, from: f64, to: f64, step: f64) -> Self {
-        /// A tick that rounding puts beside the end of its axis is still on it.
+        /// A tick that rounding puts beyond the end of its axis by this share of a step is still on it.
         const ROUNDING: f64 = 1e-9;
         let first = (from / step - ROUNDING).ceil();
         let ticks = (0..100).map(|k| (first + f64::from(k)) * step).take_while(|&tick| tick <= to + ROUNDING * step);
@@ -58,8 +57,8 @@ impl Axis {
         Self { label: label.to_owned(), scale: Scale::Linear, from, to, ticks, step }
     }
 
-    /// A logarithmic axis over whole decades that shows all of the finite positive `numbers`, or the upper
-    /// [`MOST_DECADES`] of theirs; from 0.1 to 1 if there are none.
+    /// Returns a logarithmic axis of whole decades over the finite positive `numbers`, or over the upper
+    /// [`MOST_DECADES`] of their decades. Without numbers it spans 0.1 to 1.
     pub(super) fn log(label: &str, numbers: impl IntoIterator<Item = f64>) -> Self {
         let positive = numbers.into_iter().filter(|&x| x > 0.0).map(f64::log10);
         let (low, high) = extent(positive).unwrap_or((-1.0, 0.0));
@@ -68,34 +67,34 @@ impl Axis {
         #[expect(clippy::cast_possible_truncation, reason = "between 1 and MOST_DECADES")]
         let decades = (to - from) as i32;
         let step = f64::from((decades + 6) / 7);
-        // Ticks are decades divisible by the step, so that 1 is one of them wherever it is on the axis.
+        // Ticks are decades divisible by the step, so that 1 is a tick if it is on the axis.
         let ticks = (0..=decades).map(|k| from + f64::from(k)).filter(|place| place.rem_euclid(step) == 0.0).collect();
         Self { label: label.to_owned(), scale: Scale::Log, from, to, ticks, step }
     }
 
-    /// The place of a number on the axis; none where it has none.
+    /// Returns the position of a number on the axis, if it has one.
     pub(super) fn place(&self, number: f64) -> Option<f64> {
         let place = match self.scale {
             Scale::Linear => number,
             Scale::Log if number > 0.0 => number.log10(),
             Scale::Log => return None,
         };
-        // Rounding, and the last digits of a logarithm, must not break a line at the edge.
+        // Tolerance for rounding, so that a line at the edge does not break.
         let slack = 1e-9 * (self.to - self.from);
         (place >= self.from - slack && place <= self.to + slack).then(|| place.clamp(self.from, self.to))
     }
 
-    /// How far along the axis a place is, from 0 to 1.
+    /// Returns the share of the axis up to a position, from 0 to 1.
     pub(super) fn share(&self, place: f64) -> f64 {
         (place - self.from) / (self.to - self.from)
     }
 
-    /// The place halfway between its ends.
+    /// Returns the position in the middle of the axis.
     pub(super) fn middle(&self) -> f64 {
         f64::midpoint(self.from, self.to)
     }
 
-    /// An axis of time \[s\] between two instants, or of a second from the first where they are no two.
+    /// Returns an axis of time \[s\] between two instants, or of one second from the first if they are equal.
     pub(super) fn time(from_s: f64, to_s: f64) -> Self {
         let label = "time [s]";
         if to_s > from_s {
@@ -105,15 +104,15 @@ impl Axis {
         Self::spanning(label, from_s, from_s + 1.0, 5.0)
     }
 
-    /// An axis of distances that shows 0, or a logarithmic one where the largest number is so far beyond a limit that the
-    /// limit could not be seen.
+    /// Returns an axis of distances that contains 0, or a logarithmic axis if the limit would be invisible beside the
+    /// largest number.
     pub(super) fn distances(unit: &str, numbers: &[f64], limit: f64) -> Self {
-        /// The largest number that a linear axis shows, over the limit.
+        /// Largest number on a linear axis relative to the limit.
         const LOG_FROM: f64 = 40.0;
         let label = format!("distance [{unit}]");
         let largest = numbers.iter().copied().filter(|x| x.is_finite()).fold(limit, f64::max);
         let numbers = numbers.iter().copied();
-        // Within an obstacle distances are below zero.
+        // Distances inside an obstacle are negative.
         if limit > 0.0 && largest > LOG_FROM * limit && !numbers.clone().any(|x| x < 0.0) {
             Self::log(&label, numbers)
         } else {
@@ -121,17 +120,17 @@ impl Axis {
         }
     }
 
-    /// Width of what is written at the ticks, that of the widest \[px\].
+    /// Returns the width of the widest tick label \[px\].
     pub(super) fn labels_px(&self) -> f64 {
         self.ticks.iter().map(|&tick| text_px(&self.tick_label(tick))).fold(0.0, f64::max)
     }
 
-    /// A number of a linear axis, rounded down, with a digit more than its ticks.
+    /// Formats a number of a linear axis, rounded down, with one digit more than the ticks.
     pub(super) fn rounded_down(&self, number: f64) -> String {
         at_least(number, u8::try_from(decimals_of(0.1 * self.step, 6)).unwrap_or(6))
     }
 
-    /// What is written at the tick at `place`.
+    /// Returns the label of the tick at `place`.
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
             Scale::Linear => number_label(place, self.step),
@@ -140,7 +139,7 @@ impl Axis {
     }
 }
 
-/// The smallest and the largest of the numbers that have a place on an axis.
+/// Returns the smallest and the largest number that can be on an axis.
 pub(super) fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     numbers.into_iter().filter(|x| x.abs() <= LARGEST).fold(None, |extent, x| {
         let (low, high) = extent.unwrap_or((x, x));
@@ -148,7 +147,7 @@ pub(super) fn extent(numbers: impl IntoIterator<Item = f64>) -> Option<(f64, f64
     })
 }
 
-/// The same range, or a wider one about it where it is too narrow to be shown.
+/// Widens a range that is too narrow to be shown.
 fn widened(low: f64, high: f64) -> (f64, f64) {
     let magnitude = low.abs().max(high.abs());
     if high - low > NARROWEST * magnitude {
@@ -158,7 +157,7 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
     (low - margin, high + margin)
 }
 
-/// The step 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts.
+/// Returns the step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts.
 fn nice_step(span: f64, most: f64) -> f64 {
     let least = span / most;
     let power = 10.0_f64.powf(least.log10().floor());
@@ -166,9 +165,9 @@ fn nice_step(span: f64, most: f64) -> f64 {
     steps.into_iter().find(|step| *step >= least * (1.0 - 1e-9)).unwrap_or(10.0 * power)
 }
 
-/// A number with as many decimals as the step between ticks needs, and a true minus sign.
+/// Formats a number with the decimals that the tick step needs, and with a typographic minus sign.
 fn number_label(number: f64, step: f64) -> String {
-    /// Most digits behind the point that powers of ten are written with: with more, the number itself is shorter.
+    /// Largest number of decimals in a power of ten. Beyond it, the plain number is shorter.
     const MOST_DIGITS: usize = 3;
     let digits = decimals_of(step / 10.0_f64.powf(number.abs().log10().floor()), 17);
     let text = if number != 0.0 && (number.abs() >= 1e5 && digits <= MOST_DIGITS || step < 1e-4) {
@@ -180,7 +179,7 @@ fn number_label(number: f64, step: f64) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// A power of ten by its exponent.
+/// Formats a power of ten by its exponent.
 fn power_label(exponent: f64) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     if exponent.abs() <= 2.0 {
@@ -199,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_round_numbers_within_the_axis() {
+    fn ticks_are_round_numbers_on_the_axis() {
         let axis = Axis::linear("time [s]", [0.0, 120.0], false);
         assert_eq!(labels(&axis), ["0", "20", "40", "60", "80", "100", "120"]);
         let axis = Axis::linear("x [m]", [-0.31, 0.27], true);
@@ -221,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn no_numbers_and_impossible_numbers_make_an_axis_all_the_same() {
+    fn empty_and_non_finite_input_gives_an_axis() {
         let hostile: [&[f64]; 9] = [
             &[],
             &[f64::NAN],

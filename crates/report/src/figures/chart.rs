@@ -1,4 +1,4 @@
-//! A chart as plain data, and its drawing.
+//! Charts as plain data, and their drawing.
 
 use super::Figure;
 use super::axis::Axis;
@@ -8,29 +8,29 @@ use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, T
 pub(super) const WIDTH: f64 = 460.0;
 /// Space for the title \[px\].
 pub(super) const TITLE: f64 = 32.0;
-/// Left end of the plotting area, or more where its numbers are wide, and right end \[px\]; left of it are the numbers and
-/// the label of the vertical axis.
+/// Left and right end of the plotting area \[px\]. Numbers and label of the vertical axis are to the left; wide numbers
+/// move the left end to the right.
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = WIDTH - 16.0;
-/// Middle of the label of the vertical axis \[px\].
+/// Baseline of the label of the vertical axis \[px\].
 const LABEL: f64 = 17.0;
 /// Space for the numbers and the label of the horizontal axis \[px\].
 const BELOW: f64 = 44.0;
-/// Height of the plotting area \[px\]; with equal axes it follows the data between the two others.
+/// Height of the plotting area \[px\]. With equal axes it follows the data, between `LEAST_HEIGHT` and `MOST_HEIGHT`.
 const HEIGHT: f64 = 240.0;
 const LEAST_HEIGHT: f64 = 130.0;
 const MOST_HEIGHT: f64 = 380.0;
 const HAIRLINE: f64 = 0.8;
-/// Side of an inset, and how far it is from the edges of the plotting area \[px\].
+/// Side of an inset, and its distance from the edges of the plotting area \[px\].
 const INSET: f64 = 130.0;
 const INSET_GAP: f64 = 6.0;
-/// Largest part of the chart's width that half of an inset may show: beyond, it would show nothing from nearer.
+/// Largest share of the chart's width that half of an inset may show. A larger inset would not enlarge anything.
 const INSET_FROM: f64 = 0.1;
 const TICK: f64 = 4.0;
 /// Space between a tick and its number \[px\].
 const BESIDE_TICK: f64 = 3.0;
 
-/// A line through points in the units of the axes; it breaks where a point has no place on them.
+/// A line through points in the units of the axes. It breaks at points that cannot be on them.
 #[derive(Clone, Debug)]
 pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
@@ -47,7 +47,7 @@ pub(super) struct Band {
     pub(super) label: Option<String>,
 }
 
-/// A mark at a point, perhaps with a text beside it.
+/// A mark at a point, with an optional text beside it.
 #[derive(Clone, Debug)]
 pub(super) struct Mark {
     pub(super) at: (f64, f64),
@@ -59,12 +59,12 @@ pub(super) struct Mark {
 }
 
 impl Mark {
-    /// A ring that the legend explains.
+    /// Returns a ring with an optional entry in the legend.
     pub(super) fn ring(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
         Self { at, marker: Marker::Ring, colour, radius: 4.5, text: None, label }
     }
 
-    /// A cross, which the legend may explain.
+    /// Returns a cross with an optional entry in the legend.
     pub(super) fn cross(at: (f64, f64), colour: Colour, label: Option<String>) -> Self {
         Self { at, marker: Marker::Cross, colour, radius: 4.0, text: None, label }
     }
@@ -75,7 +75,7 @@ impl Mark {
 pub(super) struct Chart {
     pub(super) x: Axis,
     pub(super) y: Axis,
-    /// A unit is as long on both axes.
+    /// Whether units have the same length on both axes.
     pub(super) equal: bool,
     pub(super) bands: Vec<Band>,
     pub(super) lines: Vec<Line>,
@@ -85,7 +85,7 @@ pub(super) struct Chart {
     left: f64,
 }
 
-/// A square part of a chart with equal axes, drawn a second time from near in a corner.
+/// A square part of a chart with equal axes, drawn enlarged in a corner.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inset {
     pub(super) middle: (f64, f64),
@@ -93,7 +93,7 @@ pub(super) struct Inset {
     pub(super) half: f64,
 }
 
-/// How a line or an area is painted.
+/// Paint of a line or an area.
 #[derive(Clone, Copy)]
 enum Paint {
     Line(Stroke),
@@ -105,7 +105,7 @@ impl Chart {
         Self { x, y, equal: false, bands: Vec::new(), lines: Vec::new(), marks: Vec::new(), inset: None, left: LEFT }
     }
 
-    /// Adds a line that the legend explains.
+    /// Adds a line with an entry in the legend.
     pub(super) fn line(&mut self, points: Vec<(f64, f64)>, stroke: Stroke, label: impl Into<String>) {
         self.lines.push(Line { points, stroke, label: Some(label.into()) });
     }
@@ -115,12 +115,12 @@ impl Chart {
         self.line([self.x.from, self.x.to].map(|x| (x, y)).to_vec(), stroke, label);
     }
 
-    /// Adds a vertical line across the chart, which the legend may explain.
+    /// Adds a vertical line across the chart, with an optional entry in the legend.
     pub(super) fn upright(&mut self, x: f64, stroke: Stroke, label: Option<String>) {
         self.lines.push(Line { points: [self.y.from, self.y.to].map(|y| (x, y)).to_vec(), stroke, label });
     }
 
-    /// Adds the vertical line between the ends of an interval, if there is one.
+    /// Adds a vertical line between the ends of an interval, if there is one.
     pub(super) fn interval(&mut self, x: f64, ends: Option<[f64; 2]>, stroke: Stroke) {
         let points = ends.into_iter().flatten().map(|y| (x, y)).collect();
         self.lines.push(Line { points, stroke, label: None });
@@ -129,7 +129,7 @@ impl Chart {
     /// Draws the chart under a title.
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };
-        // Wide numbers have their room, so that they do not run into the label of their axis.
+        // Wide numbers move the plotting area to the right, away from the label of their axis.
         self.left = LEFT.max(LABEL + TEXT / 2.0 + 2.0 * BESIDE_TICK + TICK + self.y.labels_px());
         if self.equal && self.left > LEFT {
             height = self.make_axes_equal();
@@ -168,7 +168,8 @@ impl Chart {
         canvas.figure(name, description)
     }
 
-    /// Draws lines and marks around the middle of an inset from near, in the upper corner that is farther from it.
+    /// Draws lines and marks around the middle of an inset, enlarged, in the upper corner that is farther from the
+    /// middle.
     fn draw_inset(&self, canvas: &mut Canvas, inset: Inset, middle: Point, bottom: f64) {
         let side = INSET.min(0.5 * (bottom - TITLE));
         let is_right = middle.0 > f64::midpoint(self.left, RIGHT);
@@ -178,7 +179,7 @@ impl Chart {
         let on_inset = |(x, y): (f64, f64)| {
             (corner.0 + side / 2.0 + unit * (x - inset.middle.0), corner.1 + side / 2.0 - unit * (y - inset.middle.1))
         };
-        // The corners within, and one more on each side: the rest is outside.
+        // Corners inside the inset, and one more on each side.
         let near = |&(x, y): &(f64, f64)| (x - inset.middle.0).abs().max((y - inset.middle.1).abs()) <= inset.half;
         let stretches = self.lines.iter().flat_map(|line| {
             let is_near: Vec<bool> = line.points.iter().map(near).collect();
@@ -204,7 +205,7 @@ impl Chart {
         canvas.line(&here, Stroke::solid(SOFT_INK, HAIRLINE));
     }
 
-    /// Widens one range until a unit is as long on both axes; returns the height of the plotting area \[px\].
+    /// Widens one range until units have the same length on both axes. Returns the height of the plotting area \[px\].
     fn make_axes_equal(&mut self) -> f64 {
         let width = RIGHT - self.left;
         let (across, up) = (self.x.to - self.x.from, self.y.to - self.y.from);
@@ -219,7 +220,7 @@ impl Chart {
         height
     }
 
-    /// The grid, the axes, their ticks and labels.
+    /// Draws grid, axes, ticks and labels.
     fn draw_axes(&self, canvas: &mut Canvas, on_paper: impl Fn(Point) -> Point) {
         let [Axis { from: left, to: right, .. }, Axis { from: low, to: high, .. }] = [&self.x, &self.y];
         let (grid, frame) = (Stroke::solid(GRID, HAIRLINE), Stroke::solid(SOFT_INK, HAIRLINE));
@@ -257,21 +258,21 @@ impl Chart {
         Some((self.x.place(x)?, self.y.place(y)?))
     }
 
-    /// Points as places, in unbroken stretches.
+    /// Returns points as positions on the axes, split where a point cannot be on them.
     fn stretches(&self, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
         let places: Vec<_> = points.iter().map(|&point| self.place(point)).collect();
         let stretches = places.split(Option::is_none).filter(|stretch| !stretch.is_empty());
         stretches.map(|stretch| stretch.iter().copied().flatten().collect()).collect()
     }
 
-    /// The places around a band: along its lower curve and back along the upper one.
+    /// Returns the outline of a band: along its lower curve, then back along the upper one.
     fn outline(&self, band: &Band) -> Vec<(f64, f64)> {
         let low = band.points.iter().map(|&(x, low, _)| (x, low));
         let high = band.points.iter().rev().map(|&(x, _, high)| (x, high));
         low.chain(high).filter_map(|point| self.place(point)).collect()
     }
 
-    /// What the legend explains, in rows as wide as a figure.
+    /// Returns the entries of the legend, in rows of the width of a figure.
     fn legend(&self) -> Vec<Vec<Entry<'_>>> {
         let bands = self.bands.iter().map(|band| (&band.label, Sample::Band(band)));
         let lines = self.lines.iter().map(|line| (&line.label, Sample::Line(line.stroke)));
@@ -295,7 +296,7 @@ impl Chart {
     }
 }
 
-/// An entry of the legend.
+/// Entry of the legend.
 struct Entry<'a> {
     words: &'a str,
     sample: Sample<'a>,
@@ -310,20 +311,20 @@ enum Sample<'a> {
 const LEGEND_LEFT: f64 = 28.0;
 const LEGEND_ROW: f64 = 18.0;
 const LEGEND_MARGIN: f64 = 12.0;
-/// Length of a legend's sample \[px\].
+/// Length of a line sample in the legend \[px\].
 const SAMPLE: f64 = 18.0;
 /// Space between a sample and its words, and between entries \[px\].
 const SPACE: f64 = 5.0;
 const BETWEEN: f64 = 12.0;
 
 impl Entry<'_> {
-    /// Width by a crude estimate of the font \[px\], rather that of a wide one.
+    /// Returns an upper estimate of the width by the font size \[px\].
     fn width(&self) -> f64 {
         SAMPLE + SPACE + 0.6 * TEXT * self.words.chars().count() as f64
     }
 }
 
-/// Height of a legend with its margins \[px\].
+/// Returns the height of a legend with its margins \[px\].
 fn legend_height(rows: &[Vec<Entry<'_>>]) -> f64 {
     if rows.is_empty() { 0.0 } else { LEGEND_MARGIN + LEGEND_ROW * rows.len() as f64 }
 }

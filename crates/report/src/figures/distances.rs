@@ -9,22 +9,22 @@ use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
 use tautline_core::text::{at_least, counted};
 
-/// Pairs whose distances are ranked at one instant: of more pairs, so many of them are.
+/// Largest number of pairs whose distances are ranked at an instant.
 const RANKED_PAIRS: usize = 20_000;
-/// Instants at which they are: one for each pixel.
+/// Largest number of instants with ranked distances: one for each pixel.
 const RANKED_INSTANTS: usize = 400;
-/// Pairs of a large swarm that are drawn one by one: those that come closest.
+/// Number of pairs of a large swarm that are drawn one by one, the closest.
 const CLOSEST_PAIRS: usize = 5;
-/// Colour of what marks a hit.
+/// Palette index of the colour of collisions.
 const HIT: usize = 1;
-/// More pairs than this are not told apart by colour.
+/// Largest number of pairs with distinct colours.
 const TOLD_APART: usize = 15;
 
-/// Distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one: every pair of up to
-/// 12 vehicles; of more vehicles the smallest distance, bands of quantiles, and the five pairs that come closest. The
-/// quantiles are those of 20 000 pairs, spread evenly over all, where there are more.
+/// Draws distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one. Up to 12
+/// vehicles, every pair has a line. For more vehicles the figure shows the smallest distance, bands of quantiles, and
+/// the five closest pairs. Quantiles are those of at most 20 000 pairs, spread evenly over all.
 ///
-/// The closest approach is marked with what the recording says of the time between samples too.
+/// The closest approach includes the time between samples.
 #[must_use]
 pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title: &str) -> Figure {
     let (spans, closest) = (Spans::of(log), log.closest());
@@ -52,7 +52,8 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     );
     if let Some(closest) = closest {
         let metres = at_least(closest.separation_m, 3);
-        let words = format!("{metres} m, vehicles {} at {:.2} s", closest.pair, closest.time_s);
+        let [first, second] = closest.pair.numbers();
+        let words = format!("{metres} m, vehicles {first} and {second} at {:.2} s", closest.time_s);
         description.extend([" Closest: ", &words, "."]);
         let at = (closest.time_s, closest.separation_m);
         chart.marks.push(Mark::ring(at, INK, Some(format!("closest {words}"))));
@@ -84,7 +85,7 @@ fn of_all_pairs(spans: &Spans<'_>) -> Vec<Line> {
     lines.collect()
 }
 
-/// Draws the pairs of a large swarm; says what is drawn of all that could be, as a sentence behind a space.
+/// Draws the pairs of a large swarm. Returns a sentence, after a blank, on the pairs that are drawn.
 fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     let (ranked_pairs, all) = ranked_pairs(spans.vehicles());
     let instants = spans.spread(RANKED_INSTANTS);
@@ -102,7 +103,7 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     let median = times_s().zip(&ranks).map(|(time_s, ranks)| (time_s, ranks[2])).collect();
     chart.line(median, Stroke::solid(PALETTE[0], 1.6), "median");
 
-    // Between samples too, where the recording knows.
+    // Includes the time between samples, if the recording covers it.
     let swept: Vec<_> = spans.iter().filter_map(|span| Some((span.time_s, span.closest?))).collect();
     let nearest = |span: &Span<'_>| {
         let (pair, separation_m) = nearest_present(span.positions_m, spans.log.metric())?;
@@ -128,19 +129,19 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     }
 }
 
-/// The pairs whose distances are ranked, and how many there are in all.
+/// Returns the pairs whose distances are ranked, and the number of all pairs.
 fn ranked_pairs(count: usize) -> (Vec<(usize, usize)>, usize) {
     let all = count * count.saturating_sub(1) / 2;
     if all <= RANKED_PAIRS {
         return (pairs(count).collect(), all);
     }
-    // Every vehicle about as often as every other, with partners spread over all others.
+    // Each vehicle has about the same number of pairs, with partners spread over all others.
     let pair = |k: usize| (k % count, (k % count + 1 + evenly(k, count - 1)) % count);
     ((0..RANKED_PAIRS).map(pair).collect(), all)
 }
 
-/// The `k`-th of numbers below `count` that fill them evenly and follow no order of theirs: multiples of the golden ratio
-/// spread over the unit interval.
+/// Returns the `k`-th term of a sequence that fills the numbers below `count` evenly in a scattered order: multiples of
+/// the golden ratio, modulo 1, scaled.
 pub(super) fn evenly(k: usize, count: usize) -> usize {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
@@ -148,14 +149,14 @@ pub(super) fn evenly(k: usize, count: usize) -> usize {
     number.min(count - 1)
 }
 
-/// Quantiles of 5, 25, 50, 75 and 95 % of the distances of pairs \[m\]; NaN where no distance is finite.
+/// Returns the quantiles of 5, 25, 50, 75 and 95 % of the distances of pairs \[m\]; NaN without a finite distance.
 fn quantiles_m(positions_m: &Rows, pairs: &[(usize, usize)], scratch: &mut Vec<f64>) -> [f64; 5] {
     scratch.clear();
     scratch.extend(pairs.iter().map(|&(i, j)| separation(positions_m, i, j)).filter(|distance| distance.is_finite()));
     [0.05, 0.25, 0.5, 0.75, 0.95].map(|share| quantile(scratch, share))
 }
 
-/// The number below which a share of the others lies; NaN for none. Reorders the numbers.
+/// Returns the number below which a share of the numbers lies; NaN without numbers. Reorders the numbers.
 pub(super) fn quantile(numbers: &mut [f64], share: f64) -> f64 {
     let Some(last) = numbers.len().checked_sub(1) else { return f64::NAN };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
@@ -163,7 +164,7 @@ pub(super) fn quantile(numbers: &mut [f64], share: f64) -> f64 {
     *numbers.select_nth_unstable_by(place.min(last), f64::total_cmp).1
 }
 
-/// The pairs that come closest, the closest first.
+/// Returns the closest pairs, the closest first.
 fn closest_pairs(closest: &[(f64, ClosestApproach)], vehicles: usize) -> Vec<Pair> {
     let known = closest.iter().map(|(_, closest)| (closest.pair, closest.separation_m));
     let mut known: Vec<_> = known.filter(|(pair, apart_m)| apart_m.is_finite() && pair.second() < vehicles).collect();

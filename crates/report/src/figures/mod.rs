@@ -1,33 +1,34 @@
-//! A run as charts in SVG.
+//! Charts of runs, recordings and studies in SVG.
 //!
 //! | function | shows |
 //! | --- | --- |
-//! | [`paths`] | where the vehicles went, from above: start x, end o, a unit as long on both axes |
-//! | [`paths_in_space`] | the same in space, where the run is not level |
+//! | [`paths`] | paths from above: start x, end o, equal units on both axes |
+//! | [`paths_in_space`] | paths in space, if the run is not level |
 //! | [`distances`] | distances of pairs, with the safety distance and the certified one |
 //! | [`control`] | control effort of each vehicle |
 //! | [`channels`] | tilt, rotor thrust, wind and age of messages of each vehicle |
 //! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
 //! | [`shape_error`] | largest error of a desired distance |
-//! | [`disagreement`] | largest speed relative to the swarm's mean |
-//! | [`encounters`] | distances of pairs of a recording, with bands where they are not known exactly |
-//! | [`closest_approach`] | two paths of a recording from above, and from near where they are closest |
-//! | [`smallest`] | the smallest distance of all of a recording |
+//! | [`disagreement`] | largest speed relative to the mean velocity of the swarm |
+//! | [`encounters`] | distances of pairs of a recording, with bands where they are uncertain |
+//! | [`closest_approach`] | two paths of a recording from above, with their closest approach enlarged |
+//! | [`smallest`] | the smallest separation of all pairs of a recording |
 //! | [`tension_curve`] | an edge tension with its barrier and its minimum |
 //! | [`convergence`] | an integrator's error over its step |
-//! | [`attack`] | the smallest separation that a search had found over its flights |
-//! | [`margin`] | the share of flights that show something over the values of a key |
-//! | [`shares`] | the same of several laws |
+//! | [`attack`] | the smallest separation found so far over the flights of a search |
+//! | [`margin`] | the share of flights with a property over the values of a key |
+//! | [`shares`] | such shares of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
 //! | [`heat_map`](heat_map()) | a number over a grid of two keys |
-//! | [`histograms`] | how often a number of many flights falls where |
+//! | [`histograms`] | distributions of a number over many flights |
 //!
-//! [`of_run`] draws every one that a run has data for. All of them draw a [`FlightLog`] and never fail for
-//! what is in it: what is not a finite number breaks a line, and a log without samples gives empty axes. The same log
-//! gives the same bytes, and their number is bounded for any swarm and any time: of many vehicles, quantiles and the extremes are drawn, and a figure says what.
+//! [`of_run`] draws all figures that a run has data for, from a [`FlightLog`]. Drawing never fails: numbers that are
+//! not finite break a line, and a log without samples gives empty axes. Equal logs give equal bytes. The size of a
+//! figure is bounded for any swarm and duration: for many vehicles it shows quantiles and extremes, and its description
+//! states that.
 //!
-//! Charts use no fonts and no style but their own. They are drawn on a panel that is white, and dark where the reader
-//! prefers dark pages, in colours that colour-blind people tell apart.
+//! Charts use their own fonts and styles only. The panel is white, or dark if the reader prefers dark pages.
+//! Colour-blind readers can distinguish the colours.
 
 mod axis;
 mod chart;
@@ -58,34 +59,34 @@ use crate::flight_log::FlightLog;
 /// A finished chart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Figure {
-    /// Short name, such as `paths`: the name of its file without `.svg`.
+    /// Short name, such as `paths`, which is the name of its file without `.svg`.
     pub name: String,
     /// Title, also drawn above the chart.
     pub title: String,
-    /// What the chart shows, in sentences, for people who cannot see it.
+    /// Description in sentences, for screen readers.
     pub description: String,
-    /// The chart as a complete SVG document, which may also be put into an HTML page as it is.
+    /// Chart as a complete SVG document, which can be embedded in an HTML page.
     pub svg: String,
 }
 
-/// What the figures of a run are measured by.
+/// Limits and references that the figures of a run show.
 #[derive(Clone, Copy, Debug)]
 pub struct Criteria<'a> {
     /// Safety distance delta \[m\].
     pub delta_m: f64,
-    /// Distance that the law's certificate promised \[m\].
+    /// Certified separation \[m\].
     pub certified_m: Option<f64>,
-    /// The formations, one after the other, and the graph whose edges they are judged by.
+    /// Formations in their order, and the graph of the desired distances.
     pub shape: Option<(&'a [Leg], &'a Graph)>,
     /// Largest edge error that counts as reached \[m\].
     pub edge_error_m: Option<f64>,
     /// Largest velocity disagreement that counts as reached \[m/s\].
     pub disagreement_m_s: Option<f64>,
-    /// Most thrust of a rotor \[N\].
+    /// Largest thrust of a rotor \[N\].
     pub most_thrust_n: Option<f64>,
 }
 
-/// Every figure that a run has data for, in the order in which they are best read.
+/// Draws all figures that a run has data for, in reading order.
 #[must_use]
 pub fn of_run(log: &FlightLog, criteria: &Criteria<'_>) -> Vec<Figure> {
     let spans = Spans::of(log);

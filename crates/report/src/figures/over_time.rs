@@ -1,4 +1,4 @@
-//! Numbers of a run over time.
+//! Quantities of a run over time.
 
 use super::Figure;
 use super::axis::Axis;
@@ -11,14 +11,14 @@ use tautline_laws::formation::{edges_looked_at, largest_edge_error_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::target::{Course, Leg};
 
-/// Distances that are computed for the shape error, at most.
+/// Largest number of distances that are computed for the shape error.
 const DISTANCES: usize = 16_000_000;
-/// Fewest instants that its curve is drawn through.
+/// Smallest number of instants on its curve.
 const FEWEST_INSTANTS: usize = 48;
 
-/// Control effort |u| \[m/s^2\] over time \[s\]: a line for each of up to 12 vehicles; of more vehicles the largest
-/// effort, the median and the band that holds nine tenths of them. The peak over all steps is marked where a sample does not
-/// show it.
+/// Draws the control effort |u| \[m/s^2\] over time \[s\]. Up to 12 vehicles have a line each. For more vehicles the
+/// figure shows the largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the
+/// samples miss it.
 #[must_use]
 pub fn control(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -36,10 +36,12 @@ pub fn control(log: &FlightLog, title: &str) -> Figure {
     chart.figure("control", title, &description)
 }
 
-/// Tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message \[s\] of each vehicle
-/// over time \[s\], as control effort is drawn: a figure for each channel that the run has.
+/// Draws a figure for each channel of the run over time \[s\], with lines and bands like those of [`control`].
 ///
-/// `most_thrust_n` is the most that a rotor gives.
+/// Channels are tilt \[degrees\], largest thrust of a rotor \[N\], wind speed \[m/s\] and age of the oldest message
+/// \[s\].
+///
+/// `most_thrust_n` is the largest thrust of a rotor.
 #[must_use]
 pub fn channels(log: &FlightLog, most_thrust_n: Option<f64>) -> Vec<Figure> {
     let spans = Spans::of(log);
@@ -60,14 +62,14 @@ fn channel(spans: &Spans<'_>, k: usize, most_thrust_n: Option<f64>) -> Figure {
     let gap = if unit == "°" { "" } else { " " };
     let mut description = format!("The {what} of {count} vehicles over time; at most {peak:.3}{gap}{unit}.");
     if let Some(most) = most {
-        chart.level(most, Stroke::dashed(INK, 1.3), format!("most of a rotor {most} N"));
+        chart.level(most, Stroke::dashed(INK, 1.3), format!("maximum of a rotor {most} N"));
         description = format!("{description} A rotor gives at most {most} N.");
     }
     chart.figure(series.name, series.title, &description)
 }
 
-/// Draws a line for each of up to 12 vehicles; of more vehicles the largest number, the median and the band that holds nine
-/// tenths of them. A span without numbers breaks the lines.
+/// Draws a line for each of up to 12 vehicles; for more vehicles the largest number, the median, and the band from 5 to
+/// 95 %. A span without numbers breaks the lines.
 fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Span<'_>) -> &'b [f64]) {
     let count = spans.vehicles();
     if count <= FEW_VEHICLES {
@@ -90,7 +92,7 @@ fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Sp
     }
 }
 
-/// The law's energy \[m^2/s^2\] over time \[s\] with E(0), which on a complete graph it never exceeds.
+/// Draws the law's energy \[m^2/s^2\] over time \[s\] with E(0), which bounds it on a complete graph.
 #[must_use]
 pub fn energy(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -105,7 +107,7 @@ pub fn energy(log: &FlightLog, title: &str) -> Figure {
         chart.level(initial, Stroke::dashed(INK, 1.3), format!("E(0) = {initial:.4} m²/s²"));
         let excess = largest / initial - 1.0;
         comparison = if initial == 0.0 && largest > 0.0 {
-            format!(" It begins at nothing and rises to {largest:.4} m²/s².")
+            format!(" It starts at zero and rises to {largest:.4} m²/s².")
         } else if excess > 0.0 {
             format!(" It exceeds E(0), {initial:.4} m²/s², by a share of {excess:.1e}.")
         } else {
@@ -115,10 +117,10 @@ pub fn energy(log: &FlightLog, title: &str) -> Figure {
     chart.figure("energy", title, &format!("The law's energy over time.{comparison}"))
 }
 
-/// Largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\]: of the formation
-/// of the leg that was under way.
+/// Draws the largest error of a desired distance over the graph's edges \[m\], on a logarithmic axis, over time \[s\].
+/// The formation is that of the current leg.
 ///
-/// `allowed_m` is what counts as reached.
+/// `allowed_m` is the largest error that counts as reached.
 #[must_use]
 pub fn shape_error(log: &FlightLog, legs: &[Leg], graph: &Graph, allowed_m: Option<f64>, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -135,9 +137,9 @@ pub fn shape_error(log: &FlightLog, legs: &[Leg], graph: &Graph, allowed_m: Opti
     decay(&spans, "shape-error", title, "largest edge error", "m", points, allowed_m)
 }
 
-/// Largest speed relative to the swarm's mean velocity \[m/s\], on a logarithmic axis, over time \[s\].
+/// Draws the largest speed relative to the mean velocity of the swarm \[m/s\], on a logarithmic axis, over time \[s\].
 ///
-/// `allowed_m_s` is what counts as reached.
+/// `allowed_m_s` is the largest disagreement that counts as reached.
 #[must_use]
 pub fn disagreement(log: &FlightLog, allowed_m_s: Option<f64>, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -145,7 +147,7 @@ pub fn disagreement(log: &FlightLog, allowed_m_s: Option<f64>, title: &str) -> F
     decay(&spans, "disagreement", title, "velocity disagreement", "m/s", points, allowed_m_s)
 }
 
-/// A number that should vanish, on a logarithmic axis, with the largest value that counts as vanished.
+/// Draws a quantity that should vanish on a logarithmic axis, with its tolerance.
 fn decay(
     spans: &Spans<'_>,
     name: &str,

@@ -1,4 +1,4 @@
-//! Where the vehicles went.
+//! Paths of the vehicles.
 
 use nalgebra::Vector3;
 
@@ -11,14 +11,14 @@ use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, 
 use crate::flight_log::{FEW_VEHICLES, FlightLog};
 use tautline_core::swarm::row;
 
-/// Share of the extent left free on each side.
+/// Free share of the extent on each side.
 const MARGIN: f64 = 0.06;
-/// Most vehicles whose paths are drawn.
+/// Largest number of drawn paths.
 const MOST_PATHS: usize = 300;
 
-/// Where the vehicles went, seen from above: x and y \[m\], a unit as long on both axes, a cross at each start and a
-/// ring at each end. Up to 12 vehicles have their own colour and are numbered; of more than 300, as many are drawn, chosen
-/// evenly, and the two that come closest.
+/// Draws the paths from above: x and y \[m\] in equal units, a cross at each start and a ring at each end. Up to 12
+/// vehicles have colours and numbers. Of more than 300 vehicles, 300 are drawn: the two of the closest approach, and
+/// others chosen evenly.
 #[must_use]
 pub fn paths(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -43,7 +43,7 @@ pub fn paths(log: &FlightLog, title: &str) -> Figure {
     chart.figure("paths", title, &description(log, "from above"))
 }
 
-/// The vehicles whose paths are drawn.
+/// Returns the vehicles whose paths are drawn.
 fn drawn(log: &FlightLog) -> Vec<usize> {
     let count = log.count();
     if count <= MOST_PATHS {
@@ -57,7 +57,7 @@ fn drawn(log: &FlightLog) -> Vec<usize> {
     drawn
 }
 
-/// How a vehicle is drawn.
+/// Look of the path of a vehicle.
 struct Look {
     path: Stroke,
     start: Colour,
@@ -92,14 +92,14 @@ fn description(log: &FlightLog, from: &str) -> String {
 const YAW: f64 = 0.6;
 const PITCH: f64 = 0.42;
 const HEIGHT: f64 = 330.0;
-/// Most that the box of the axes may take, across and up \[px\]; the rest is for the numbers.
+/// Largest width and height of the box of axes \[px\]; the rest is for the numbers.
 const BOX: Point = (340.0, 270.0);
-/// Least space between the ticks of an axis, and across between their numbers \[px\].
+/// Smallest distance between the ticks of an axis, and horizontally between their numbers \[px\].
 const TICK_PX: f64 = 32.0;
 const BESIDE_PX: f64 = 4.0;
 
-/// Where the vehicles went in space: x, y and z \[m\] in a parallel projection, a unit as long on all axes. Which
-/// vehicles, marks and colours as in [`paths`].
+/// Draws the paths in space: x, y and z \[m\] in a parallel projection with equal units. Selection, marks and colours
+/// are those of [`paths`].
 #[must_use]
 pub fn paths_in_space(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
@@ -124,10 +124,10 @@ pub fn paths_in_space(log: &FlightLog, title: &str) -> Figure {
     canvas.figure("paths-3d", &description(log, "in space"))
 }
 
-/// A box of axes, seen from above its edge where x is largest and y smallest.
+/// A box of axes, seen from above its edge of the largest x and smallest y.
 struct View {
     axes: [Axis; 3],
-    /// Pixels of a metre.
+    /// Pixels per metre.
     unit: f64,
 }
 
@@ -141,7 +141,7 @@ impl View {
         let seen_across = across * YAW.cos() + deep * YAW.sin();
         let seen_up = (across * YAW.sin() + deep * YAW.cos()) * PITCH.sin() + up * PITCH.cos();
         let unit = (BOX.0 / seen_across).min(BOX.1 / seen_up);
-        // How much of a length along each axis is seen across: numbers beside each other must not meet.
+        // Horizontal share of a length along each axis, because adjacent numbers must not overlap.
         let axes = [(0, YAW.cos()), (1, YAW.sin()), (2, 0.0)].map(|(k, across)| {
             let Axis { label, from, to, .. } = &axes[k];
             let spanning = |tick_px: f64| Axis::spanning(label, *from, *to, (unit * (to - from) / tick_px).max(1.0));
@@ -156,7 +156,7 @@ impl View {
         self.axes.iter().zip(place.iter()).all(|(axis, &p)| axis.place(p).is_some())
     }
 
-    /// Seen from afar: x to the right and nearer, y to the right and away, z up.
+    /// Projects a position: x to the right and nearer, y to the right and farther, z up.
     fn on_paper(&self, place: Vector3<f64>) -> Point {
         let middle = Vector3::from(self.axes.each_ref().map(Axis::middle));
         let [x, y, z] = (self.unit * (place - middle)).into();
@@ -165,7 +165,7 @@ impl View {
         (WIDTH / 2.0 + right, TITLE + HEIGHT / 2.0 - up)
     }
 
-    /// The floor and the two walls behind, with a grid, and the numbers along three edges.
+    /// Draws the floor and the two rear walls with a grid, and the numbers along three edges.
     fn draw_axes(&self, canvas: &mut Canvas) {
         let [x, y, z] = &self.axes;
         let at = |x, y, z| self.on_paper(Vector3::new(x, y, z));

@@ -1,35 +1,34 @@
-//! Two of a recording: their distance over time, and their closest approach from above.
+//! Figures of a pair of a recording: distance over time, and closest approach from above.
 
 use super::Figure;
 use super::axis::{Axis, Scale, extent};
 use super::chart::{Band, Chart, Inset, Mark};
 use super::svg::{INK, PALETTE, Stroke};
 
-/// Width of the inset of a closest approach, over the distance as it is seen from above.
+/// Width of the inset of a closest approach, relative to the distance in the plane.
 const NEAR: f64 = 4.0;
 
-/// Two over time.
+/// Distance of a pair, or of a vehicle and an obstacle, over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Encounter {
-    /// Their names.
+    /// Both names.
     pub names: [String; 2],
-    /// What distances are counted in: `m`, or `ellipsoids`.
+    /// Unit of distances: `m` or `ellipsoids`.
     pub unit: &'static str,
-    /// Time \[s\], distance as drawn, and how much smaller or larger it can be. Nothing is drawn across a distance that is
-    /// no number.
+    /// Time \[s\], distance as drawn, and its uncertainty. A distance that is NaN breaks the line.
     pub distances: Vec<(f64, f64, f64)>,
-    /// Where each is over the same times, x and y \[m\].
+    /// Positions of both over the same times, x and y \[m\].
     pub paths_m: [Vec<(f64, f64)>; 2],
-    /// What the distance must not fall below.
+    /// Limit of the distance.
     pub limit_m: f64,
-    /// When the motion as drawn is closest \[s\].
+    /// Time of the closest approach of the drawn motion \[s\].
     pub closest_s: f64,
-    /// How close in words, with the unit.
+    /// Smallest distance in words, with the unit.
     pub closest: String,
 }
 
 impl Encounter {
-    /// The moment that is drawn closest.
+    /// Returns the index of the closest drawn instant.
     fn nearest(&self) -> Option<usize> {
         let off =
             |point: &(f64, f64, f64)| if point.1.is_nan() { f64::INFINITY } else { (point.0 - self.closest_s).abs() };
@@ -42,18 +41,18 @@ impl Encounter {
     }
 }
 
-/// Distances over time \[s\] with the limit of the first, and bands where a distance is known to lie within an interval
-/// alone.
+/// Draws distances over time \[s\] with the limit of the first pair, and bands where a distance is known to an interval
+/// only.
 #[must_use]
 pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     let all = || encounters.iter().flat_map(|encounter| &encounter.distances);
     let (limit, unit) = encounters.first().map_or((0.0, "m"), |first| (first.limit_m, first.unit));
-    // Only within an obstacle are distances below zero.
+    // Distances are negative only inside an obstacle.
     let least = if all().any(|point| point.1 < 0.0) { f64::NEG_INFINITY } else { 0.0 };
     let numbers = all().flat_map(|&(_, distance, slack)| [(distance - slack).max(least), distance + slack]);
     let y = Axis::distances(unit, &numbers.chain([limit]).collect::<Vec<_>>(), limit);
     let (from_s, to_s) = extent(all().map(|point| point.0)).unwrap_or((0.0, 0.0));
-    // A logarithmic axis has no place for what may be zero.
+    // A logarithmic axis cannot show a lower bound of zero.
     let least = if y.scale == Scale::Log { 10_f64.powf(y.from) } else { least };
     let mut chart = Chart::new(Axis::time(from_s, to_s), y);
     for (k, encounter) in encounters.iter().enumerate() {
@@ -80,8 +79,8 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     chart.figure(name, title, &description)
 }
 
-/// The smallest distance of all over time \[s\], and the limit and the closest approach of those who came closest. The
-/// line breaks where no distance is known.
+/// Draws the smallest separation of all pairs over time \[s\], with the limit and the closest approach of the closest
+/// pair. The line breaks where no distance is known.
 #[must_use]
 pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &str) -> Figure {
     let Encounter { limit_m: limit, unit, .. } = *closest;
@@ -91,16 +90,16 @@ pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &s
     let numbers: Vec<_> = points.iter().map(|point| point.1).chain([limit]).collect();
     let mut chart = Chart::new(Axis::time(from_s, to_s), Axis::distances(unit, &numbers, limit));
     let least = points.iter().copied().filter(|point| point.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
-    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest distance of any two");
+    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest separation of all pairs");
     chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
     let words = closest.closest();
     chart.marks.extend(least.map(|at| Mark::ring(at, INK, Some(format!("closest {words}")))));
-    let description = format!("The smallest distance of any two over time; closest {words}, limit {limit:?} {unit}.");
+    let description = format!("Smallest separation of all pairs over time; closest {words}, limit {limit:?} {unit}.");
     chart.figure("smallest", title, &description)
 }
 
-/// The paths of two vehicles from above \[m\], and where both are when they are closest; an inset shows that from near, four
-/// times their distance wide.
+/// Draws the paths of two vehicles from above \[m\] and their positions at the closest approach. An inset enlarges that
+/// approach; it is four times the distance wide.
 #[must_use]
 pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let points = || encounter.paths_m.iter().flatten();
@@ -144,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_names_both_and_their_closest_and_shows_a_band_where_there_is_doubt() {
+    fn figure_names_both_and_shows_uncertainty_as_a_band() {
         let sure = encounters(&[encounter(0.0)], "encounters", "Distance");
         let doubtful = encounters(&[encounter(0.5)], "encounters", "Distance");
         assert!(sure.svg.contains("alpha and bravo") && sure.svg.contains("closest 1.000000 m"));
@@ -154,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_drawn_across_a_gap_and_scaled_distances_are_no_metres() {
+    fn gaps_break_the_line_and_scaled_distances_have_their_unit() {
         let closest = "1.000000 ellipsoids".to_owned();
         let whole = Encounter { unit: "ellipsoids", closest, ..encounter(0.5) };
         let mut broken = whole.clone();
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_draw_and_impossible_numbers_make_a_figure_all_the_same() {
+    fn empty_and_non_finite_input_gives_a_figure() {
         assert!(encounters(&[], "encounters", "Distance").svg.contains("distance [m]"));
         let mut odd = encounter(f64::NAN);
         odd.distances.push((f64::INFINITY, -1.0, 0.0));

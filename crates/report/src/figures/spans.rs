@@ -6,23 +6,23 @@ use super::axis::{Axis, extent};
 use crate::flight_log::{Extremes, FlightLog, Keyframe, closer};
 use tautline_core::swarm::{ClosestApproach, Rows};
 
-/// Most spans of time of a figure: some four for each pixel of its width.
+/// Largest number of spans of a figure: about four for each pixel of its width.
 const MOST_SPANS: usize = 2048;
 
-/// A flight in at most [`MOST_SPANS`] spans of time. Neighbouring keyframes are merged where there are more; a span keeps
+/// A flight in at most [`MOST_SPANS`] spans of time. If there are more keyframes, adjacent ones are merged and keep
 /// their extremes.
 pub(super) struct Spans<'a> {
     pub(super) log: &'a FlightLog,
     all: Vec<Span<'a>>,
 }
 
-/// A span of time: the state at its end, and the extremes within.
+/// A span of time: the state at its end, and the extremes in it.
 pub(super) struct Span<'a> {
-    /// Its end \[s\].
+    /// End \[s\].
     pub(super) time_s: f64,
-    /// Positions at its end \[m\].
+    /// Positions at the end \[m\].
     pub(super) positions_m: &'a Rows,
-    /// Closest approach within.
+    /// Closest approach in the span.
     pub(super) closest: Option<ClosestApproach>,
     pub(super) extremes: Cow<'a, Extremes>,
 }
@@ -35,23 +35,23 @@ impl<'a> Spans<'a> {
         Self { log, all: Span::of(std::slice::from_ref(first)).into_iter().chain(spans).collect() }
     }
 
-    /// All spans in order of time; the first is the first instant alone.
+    /// Returns all spans in order of time. The first span is the first instant.
     pub(super) fn iter(&self) -> std::slice::Iter<'_, Span<'a>> {
         self.all.iter()
     }
 
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     pub(super) fn vehicles(&self) -> usize {
         self.log.count()
     }
 
-    /// Axis of time \[s\].
+    /// Returns the axis of time \[s\].
     pub(super) fn time_axis(&self) -> Axis {
         let [from_s, to_s] = self.log.range_s();
         Axis::time(from_s, to_s)
     }
 
-    /// At most `most` of the spans (at least two), evenly spread, the first and the last among them.
+    /// Returns at most `most` spans (at least two), evenly spread, with the first and the last.
     pub(super) fn spread(&self, most: usize) -> Vec<&Span<'a>> {
         let most = most.max(2);
         if self.all.len() <= most {
@@ -60,14 +60,14 @@ impl<'a> Spans<'a> {
         (0..most).map(|k| &self.all[k * (self.all.len() - 1) / (most - 1)]).collect()
     }
 
-    /// Whether every vehicle stays in one plane of constant z, up to rounding.
+    /// Returns whether every vehicle stays at a constant z, up to rounding.
     pub(super) fn is_level(&self) -> bool {
         const FLATNESS: f64 = 1e-6;
         let [x, y, z] = [0, 1, 2].map(|axis| self.extent(axis).map_or(0.0, |(low, high)| high - low));
         z <= FLATNESS * x.max(y)
     }
 
-    /// Smallest and largest coordinate along an axis \[m\]; none without a finite one.
+    /// Returns the smallest and the largest coordinate along an axis \[m\], if one is finite.
     pub(super) fn extent(&self, axis: usize) -> Option<(f64, f64)> {
         extent(self.iter().flat_map(|span| span.positions_m.column(axis).iter().copied().collect::<Vec<_>>()))
     }

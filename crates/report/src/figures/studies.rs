@@ -1,4 +1,4 @@
-//! Figures of studies: the worst of a search, shares and separations over the values of a key, histograms.
+//! Figures of studies: progress of a search, shares and separations over the values of a key, histograms.
 
 use super::Figure;
 use super::axis::Axis;
@@ -6,8 +6,8 @@ use super::chart::{Chart, Mark};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use tautline_core::text::metres;
 
-/// The smallest separation \[m\] that a search had found after so many of `flights`, with delta and the separation of the flight
-/// that it began from. `found` has each flight, numbered from 1, that was worse than all before it.
+/// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
+/// the flight of the unchanged scenario. `found` holds each flight, numbered from 1, that was worse than all before.
 #[must_use]
 pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f64>) -> Figure {
     let last = flights.max(1) as f64;
@@ -20,32 +20,32 @@ pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f6
         points.push((flight as f64, min_m));
     }
     points.extend(points.last().map(|&(_, worst_m)| (last, worst_m)));
-    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "the worst found");
+    chart.line(points, Stroke::solid(PALETTE[0], 1.8), "worst so far");
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
     if let Some(own_m) = own_m {
-        chart.level(own_m, Stroke::dashed(SOFT_INK, 1.0), "the scenario as it is".to_owned());
+        chart.level(own_m, Stroke::dashed(SOFT_INK, 1.0), "unchanged scenario".to_owned());
     }
     let worst = found.last();
     chart.marks.extend(worst.map(|&(flight, min_m)| Mark::ring((flight as f64, min_m), PALETTE[0], None)));
     let found = worst.map(|(flight, min_m)| format!("{} m in flight {flight}", metres(*min_m)));
-    let found = found.unwrap_or_else(|| "nothing could be flown".to_owned());
+    let found = found.unwrap_or_else(|| "no flight".to_owned());
     let description = format!("The smallest separation found over the flights of the search: {found}.");
-    chart.figure("attack", "The worst found", &description)
+    chart.figure("attack", "Smallest separation found", &description)
 }
 
-/// The flights of one value.
+/// Share of the flights at one value of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// The value.
+    /// Value of the key.
     pub value: f64,
-    /// The share that showed what was asked, from 0 to 1.
+    /// Share of the flights with the property, from 0 to 1.
     pub share: f64,
-    /// Its 95 % interval, where there is one.
+    /// 95 % interval of the share, if known.
     pub interval: Option<[f64; 2]>,
 }
 
-/// Shares of flights that show something (`does`) over the values of a key, with their 95 % intervals and the bracket in which
-/// the verdict turns, and values that are `predicted`, each with what it is. The axis is logarithmic where asked.
+/// Draws shares of flights with a property (`does`) over the values of a key, with 95 % intervals, the bracket in which
+/// the verdict changes, and `predicted` values with their labels. The axis is logarithmic on request.
 #[must_use]
 pub fn margin(
     shares: &[Share],
@@ -83,7 +83,7 @@ fn chart_of_shares<'a>(key: &str, does: &str, shares: impl Iterator<Item = &'a S
     Chart::new(x, Axis::spanning(&format!("share that {does}"), 0.0, 1.0, 5.0))
 }
 
-/// Shares of flights of several laws that show something over the values of a key, with their 95 % intervals.
+/// Draws shares of flights of several laws with a property over the values of a key, with 95 % intervals.
 #[must_use]
 pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)], logarithmic: bool) -> Figure {
     let mut chart = chart_of_shares(key, does, series.iter().flat_map(|(_, shares)| shares), logarithmic);
@@ -97,20 +97,20 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
     chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
 }
 
-/// The smallest separations of the flights of one value.
+/// Smallest separations of the flights at one value of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Separation {
-    /// The value.
+    /// Value of the key.
     pub value: f64,
-    /// Smallest of all flights \[m\].
+    /// Smallest over all flights \[m\].
     pub smallest_m: f64,
     /// Median of the flights \[m\].
     pub median_m: f64,
-    /// Its 95 % interval \[m\], where there is one.
+    /// 95 % interval of the median \[m\], if known.
     pub interval_m: Option<[f64; 2]>,
 }
 
-/// Smallest separations of flights over the values of a key, with the safety distance delta \[m\].
+/// Draws smallest separations of flights over the values of a key, with the safety distance delta \[m\].
 #[must_use]
 pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) -> Figure {
     let lengths = flights
@@ -133,19 +133,20 @@ pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) 
     )
 }
 
-/// Numbers of one kind counted in intervals of one width.
+/// Counts of values in intervals of equal width.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Histogram {
     /// Lower end of the first interval.
     pub from: f64,
-    /// Upper end of the last.
+    /// Upper end of the last interval.
     pub to: f64,
-    /// How many fell into each.
+    /// Count of each interval.
     pub counts: Vec<u64>,
 }
 
 impl Histogram {
-    /// Counts the finite ones of `values` in so many intervals between the smallest and the largest; none of none.
+    /// Counts the finite `values` in `intervals` between the smallest and the largest value. Returns `None` without a
+    /// finite value.
     #[must_use]
     pub fn of(values: &[f64], intervals: usize) -> Option<Self> {
         let finite = || values.iter().copied().filter(|value| value.is_finite());
@@ -161,7 +162,7 @@ impl Histogram {
         Some(Self { from, to, counts })
     }
 
-    /// The outline of its bars as shares of `of`.
+    /// Returns the outline of the bars as shares of `of`.
     fn outline(&self, of: u64) -> Vec<(f64, f64)> {
         let width = (self.to - self.from) / self.counts.len() as f64;
         let at = |number: usize| self.from + width * number as f64;
@@ -173,7 +174,7 @@ impl Histogram {
     }
 }
 
-/// Histograms of several laws over one axis, as shares of each law's numbers, with a limit where there is one.
+/// Draws histograms of several laws on one axis, as shares of each law's values, with an optional limit.
 #[must_use]
 pub fn histograms(
     name: &str,
@@ -203,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_finite_number_is_counted_once_the_largest_in_the_last_interval() {
+    fn counts_each_finite_value_once() {
         let counted = Histogram::of(&[0.0, 0.9, 1.0, 3.9, 4.0, f64::NAN], 4).expect("numbers");
         assert_eq!((counted.from, counted.to, counted.counts.clone()), (0.0, 4.0, vec![2, 1, 0, 2]));
         assert_eq!(Histogram::of(&[2.0, 2.0], 3).expect("numbers").counts, [2, 0, 0]);

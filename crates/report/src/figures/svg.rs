@@ -1,4 +1,4 @@
-//! A drawing in SVG: its colours, strokes, shapes and words.
+//! SVG drawings: colours, strokes, shapes and texts.
 
 use std::fmt::Write as _;
 
@@ -7,17 +7,17 @@ use maud::{PreEscaped, html};
 use super::Figure;
 use crate::simplify::needed;
 
-/// A place on the drawing, to the right and down \[px\].
+/// A position on the drawing, to the right and down \[px\].
 pub(super) type Point = (f64, f64);
 
 /// Font sizes \[px\].
 pub(super) const TEXT: f64 = 13.0;
 const HEADING: f64 = 14.0;
-/// Where the title stands \[px\].
+/// Baseline of the title \[px\].
 const TITLE_BASELINE: f64 = 19.0;
 const MARK_WIDTH: f64 = 1.6;
 
-/// A colour on light paper and on dark.
+/// A colour on light paper and on dark paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Colour {
     light: &'static str,
@@ -33,7 +33,8 @@ pub(super) const INK: Colour = colour("#1B1F24", "#E6EAEF");
 pub(super) const SOFT_INK: Colour = colour("#57606A", "#9AA4AF");
 pub(super) const GRID: Colour = colour("#E1E4E8", "#2A323B");
 
-/// Colours that colour-blind people tell apart (after Okabe and Ito), each with a contrast of at least 3 on both papers.
+/// Colours that colour-blind readers can distinguish (after Okabe and Ito), each with a contrast of at least 3 on both
+/// papers.
 pub(super) const PALETTE: [Colour; 6] = [
     colour("#0072B2", "#56A8E0"),
     colour("#D55E00", "#F07F2E"),
@@ -43,7 +44,7 @@ pub(super) const PALETTE: [Colour; 6] = [
     colour("#7D858E", "#A5ADB6"),
 ];
 
-/// The style sheet that exchanges the colours on dark pages.
+/// Returns the style sheet that switches the colours on dark pages.
 fn style() -> String {
     let exchange = [PAPER, INK, SOFT_INK, GRID].into_iter().chain(PALETTE).flat_map(|Colour { light, dark }| {
         ["fill", "stroke"].map(|paint| format!(".tautline-figure [{paint}=\"{light}\"]{{{paint}:{dark}}}"))
@@ -51,13 +52,13 @@ fn style() -> String {
     format!("@media (prefers-color-scheme:dark){{{}}}", exchange.collect::<String>())
 }
 
-/// How a line is stroked.
+/// Stroke of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stroke {
     pub(super) colour: Colour,
     width: f64,
     opacity: f64,
-    /// Lengths of dashes and of gaps; none for a solid line.
+    /// Lengths of dashes and gaps; `None` for a solid line.
     dashes: Option<&'static str>,
 }
 
@@ -73,13 +74,13 @@ impl Stroke {
         Self { dashes: DASHED, ..Self::solid(colour, width) }
     }
 
-    /// The stroke of the `k`-th of several lines: colours first, then dashes.
+    /// Returns the stroke of the `k`-th of several lines: colours change first, then dashes.
     pub(super) fn of_line(k: usize) -> Self {
         let dashes = [None, DASHED, DOTTED][(k / PALETTE.len()) % 3];
         Self { dashes, ..Self::solid(PALETTE[k % PALETTE.len()], 1.5) }
     }
 
-    /// The same, seen through.
+    /// Returns the same stroke with this opacity.
     pub(super) fn faint(self, opacity: f64) -> Self {
         Self { opacity, ..self }
     }
@@ -95,7 +96,7 @@ pub(super) enum Marker {
     Ring,
 }
 
-/// Which point of a text is put in its place: left, centre or right, and below (first letter), middle or above.
+/// Anchor of a text: left, centre or right, and below (first letter), middle or above.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Align(&'static str, &'static str);
 
@@ -108,7 +109,7 @@ impl Align {
     pub(super) const RIGHT_ABOVE: Self = Self("end", "0.76em");
 }
 
-/// A drawing on its way.
+/// An unfinished drawing.
 #[derive(Clone, Debug)]
 pub(super) struct Canvas {
     size: (f64, f64),
@@ -117,17 +118,19 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Paper of a size \[px\] under a title, centred about `middle`.
+    /// Returns an empty drawing of a size \[px\] under a title, which is centred at `middle`.
     pub(super) fn new(size: (f64, f64), title: &str, middle: f64) -> Self {
         let title = printable(title);
         let shapes = html! {
             rect width="100%" height="100%" fill=(PAPER.light) {}
-            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) { (title) }
+            text x=(px(middle)) y=(px(TITLE_BASELINE)) text-anchor="middle" font-size=(HEADING) fill=(INK.light) {
+                (title)
+            }
         };
         Self { size, title, shapes: shapes.into_string() }
     }
 
-    /// A line through points; a dot where it is only one.
+    /// Draws a line through points, or a dot for a single point.
     pub(super) fn line(&mut self, points: &[Point], stroke: Stroke) {
         let Stroke { colour, width, dashes, .. } = stroke;
         let shape = match *points {
@@ -143,26 +146,28 @@ impl Canvas {
         self.shapes += &shape.into_string();
     }
 
-    /// A filled area within corners.
+    /// Fills a polygon.
     pub(super) fn area(&mut self, points: &[Point], colour: Colour, opacity: f64) {
         let shape = html! { polygon points=(corners(points)) fill=(colour.light) opacity=(opacity) {} };
         self.shapes += &shape.into_string();
     }
 
-    /// A filled tile from its upper left corner, with words of a colour in its middle. Both colours are the same on light and dark
-    /// paper.
+    /// Fills a rectangle from its upper left corner, with words of a given colour in its middle. Both colours are the
+    /// same on light and dark paper.
     pub(super) fn tile(&mut self, (x, y): Point, (width, height): Point, fill: &str, words: Option<(String, &str)>) {
         let shape = html! {
-            // Neighbours overlap a little, or the paper shines through between them.
+            // Adjacent tiles overlap slightly, because the paper would show through between them otherwise.
             rect x=(px(x)) y=(px(y)) width=(px(width + 0.3)) height=(px(height + 0.3)) fill=(fill) {}
             @if let Some((words, ink)) = words {
-                text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) { (words) }
+                text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) {
+                    (words)
+                }
             }
         };
         self.shapes += &shape.into_string();
     }
 
-    /// A marker of a radius \[px\].
+    /// Draws a marker of a radius \[px\].
     pub(super) fn marker(&mut self, marker: Marker, (x, y): Point, radius: f64, colour: Colour) {
         match marker {
             Marker::Ring => {
@@ -179,7 +184,7 @@ impl Canvas {
         }
     }
 
-    /// A square with its upper left corner here, beyond which nothing that is drawn in it shows.
+    /// Draws into a square with this upper left corner, which clips the content.
     pub(super) fn window(&mut self, (x, y): Point, side: f64, draw: impl FnOnce(&mut Self)) {
         let around = std::mem::take(&mut self.shapes);
         draw(self);
@@ -194,8 +199,8 @@ impl Canvas {
         self.shapes += &window.into_string();
     }
 
-    /// A text beside a marker: to the lower left of a cross and to the upper right of a ring, so that the numbers of one
-    /// that ends where it started stay apart.
+    /// Draws a text beside a marker: to the lower left of a cross, and to the upper right of a ring. The texts of a
+    /// vehicle that ends at its start do not overlap.
     pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
         match marker {
             Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
@@ -209,14 +214,14 @@ impl Canvas {
         self.shapes += &shape.into_string();
     }
 
-    /// A text that is read upwards.
+    /// Draws a text that reads upwards.
     pub(super) fn text_upwards(&mut self, (x, y): Point, words: &str) {
         let turned = format!("translate({} {}) rotate(-90)", px(x), px(y));
         let shape = html! { text transform=(turned) text-anchor="middle" fill=(INK.light) { (words) } };
         self.shapes += &shape.into_string();
     }
 
-    /// The figure, with a description for people who cannot see it.
+    /// Returns the figure, with a description for screen readers.
     pub(super) fn figure(self, name: &str, description: &str) -> Figure {
         let Self { size: (width, height), title, shapes } = self;
         let description = printable(description);
@@ -235,18 +240,18 @@ impl Canvas {
     }
 }
 
-/// The same text without control characters, which XML does not allow.
+/// Returns the text without control characters, which XML forbids.
 fn printable(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
 }
 
-/// Width of words by an estimate of the font, rather that of a wide one \[px\].
+/// Returns an upper estimate of the width of words by the font size \[px\].
 pub(super) fn text_px(words: &str) -> f64 {
     let narrow = words.chars().filter(|c| matches!(c, '.' | ' ' | '[' | ']')).count();
     TEXT * (0.6 * words.chars().count() as f64 - 0.3 * narrow as f64)
 }
 
-/// A length to a tenth of a pixel.
+/// Rounds a length to a tenth of a pixel.
 fn px(length: f64) -> f64 {
     // Adding 0 turns -0 into 0.
     (length * 10.0).round() / 10.0 + 0.0
@@ -262,13 +267,13 @@ fn corners(points: &[Point]) -> String {
     text
 }
 
-/// Farthest that a corner left out may lie from the line that is drawn \[px\], unless there would be too many.
+/// Largest distance of an omitted corner from the drawn line \[px\], unless there would be more than [`MOST_CORNERS`].
 const TOLERANCE: f64 = 0.1;
-/// Most corners of a drawing, the ends of its lines not counted: some 120 kB.
+/// Largest number of corners of a drawing besides the ends of its lines: about 120 kB.
 const MOST_CORNERS: usize = 12_000;
 
-/// The corners of lines that show: every corner left out lies within a tolerance of the line through the others. The tolerance is a tenth of a pixel, and as much larger as it takes to keep at
-/// most [`MOST_CORNERS`]. The ends are kept, so are extremes.
+/// Simplifies lines. Every omitted corner is within a tolerance of the line through the others. The tolerance is a
+/// tenth of a pixel, or larger if more than [`MOST_CORNERS`] corners would stay. Ends and extremes stay.
 pub(super) fn thinned<T>(mut lines: Vec<(T, Vec<Point>)>) -> Vec<(T, Vec<Point>)> {
     let weights: Vec<_> = lines.iter().map(|(_, points)| weights(points)).collect();
     let mut corners: Vec<f64> = weights.iter().flatten().copied().filter(|weight| weight.is_finite()).collect();
@@ -284,7 +289,7 @@ pub(super) fn thinned<T>(mut lines: Vec<(T, Vec<Point>)>) -> Vec<(T, Vec<Point>)
     lines
 }
 
-/// The largest tolerance \[px\] that keeps each point of a line; 0 where it is below [`TOLERANCE`].
+/// Returns the largest tolerance \[px\] that keeps each point of a line; 0 below [`TOLERANCE`].
 fn weights(points: &[Point]) -> Vec<f64> {
     let mut weights = vec![0.0; points.len()];
     let Some(end) = points.len().checked_sub(1) else { return weights };
@@ -295,7 +300,7 @@ fn weights(points: &[Point]) -> Vec<f64> {
     weights
 }
 
-/// Distance of a point from the segment between two others.
+/// Returns the distance of a point from the segment between two others.
 fn distance(point: Point, from: Point, to: Point) -> f64 {
     let (along_x, along_y) = (to.0 - from.0, to.1 - from.1);
     let (x, y) = (point.0 - from.0, point.1 - from.1);
@@ -313,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_line_is_its_ends_and_a_spike_stays() {
+    fn keeps_ends_and_spikes() {
         let line: Vec<_> = (0..1000).map(|k| (f64::from(k), 0.5 * f64::from(k))).collect();
         assert_eq!(thinned_line(&line), [line[0], line[999]]);
         let mut spiked = line.clone();
@@ -324,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn no_point_left_out_is_farther_from_the_line_than_the_tolerance() {
+    fn omitted_points_are_within_the_tolerance() {
         let curve: Vec<_> = (0..2000).map(|k| f64::from(k) * 0.05).map(|x| (x, 30.0 * (x / 8.0).sin())).collect();
         let kept = thinned_line(&curve);
         assert!(kept.len() < curve.len() / 4, "{} of {}", kept.len(), curve.len());
@@ -335,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn of_too_many_corners_the_farthest_stay() {
+    fn keeps_the_farthest_of_too_many_corners() {
         let noise = |k: u32, height: f64| (f64::from(k), if k.is_multiple_of(2) { 0.0 } else { height });
         let lines = vec![
             ("high", (0..9001).map(|k| noise(k, 50.0)).collect()),
@@ -348,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_one_point_and_points_in_one_place_are_lines_too() {
+    fn handles_empty_and_degenerate_lines() {
         assert!(thinned_line(&[]).is_empty());
         assert_eq!(thinned_line(&[(1.0, 2.0)]), [(1.0, 2.0)]);
         assert_eq!(thinned_line(&[(1.0, 2.0); 9]).len(), 2);

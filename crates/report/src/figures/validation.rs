@@ -1,4 +1,4 @@
-//! Curves that are held against formulas: the edge tension, and an integrator's error.
+//! Curves for the comparison with formulas: edge tension, and error of an integrator.
 
 use super::Figure;
 use super::axis::Axis;
@@ -6,15 +6,15 @@ use super::chart::{Chart, Mark};
 use super::svg::{INK, PALETTE, Stroke};
 use tautline_laws::law::EdgeTension;
 
-/// Highest tension shown, over alpha.
+/// Largest tension in the chart, over alpha.
 const TOP: f64 = 4.0;
-/// Farthest distance shown, in units of K beyond delta.
+/// Largest distance in the chart, in units of K beyond delta.
 const FAR: f64 = 5.0;
-/// Points of the curve.
+/// Number of points of the curve.
 const POINTS: u32 = 400;
 
-/// The tension V(l) \[m^2/s^2\] of equation (5) over the distance l \[m\], with the barrier at delta and the minimum at d
-/// marked.
+/// Draws the tension V(l) \[m^2/s^2\] of equation (5) over the distance l \[m\], with the barrier at delta and the
+/// minimum at d.
 #[must_use]
 pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
     let (delta_m, rest_m) = (tension.delta_m(), tension.rest_m());
@@ -30,25 +30,24 @@ pub fn tension_curve(tension: &EdgeTension, title: &str) -> Figure {
     chart.line(points, Stroke::solid(PALETTE[0], 1.8), "V(l)");
     chart.upright(delta_m, Stroke::solid(INK, 1.6), Some(format!("barrier δ = {delta_m} m")));
     let minimum = format!("minimum at d = {rest_m:.4} m, Vmin = {:.4} m²/s²", tension.minimum());
-    let description = format!("Edge tension over distance: it grows without bound towards {delta_m} m; {minimum}.");
+    let description = format!("Edge tension over distance: unbounded towards {delta_m} m; {minimum}.");
     chart.marks.push(Mark::ring((rest_m, 0.0), PALETTE[1], Some(minimum)));
     chart.figure("tension", title, &description)
 }
 
-/// The line of order 1 over the first error: below it, so that neither hides the other.
+/// Offset factor of the line of order 1 from the first error, so that the lines do not overlap.
 const ASIDE: f64 = 0.5;
 
-/// One step length.
+/// Error of an integrator at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Its length \[s\].
+    /// Length of the step \[s\].
     pub dt_s: f64,
     /// Largest position error \[m\].
     pub error_m: f64,
 }
 
-/// Largest position error \[m\] over the step \[s\], both on logarithmic axes, with a line
-/// of order 1 beside it.
+/// Draws the largest position error \[m\] over the step \[s\] on logarithmic axes, with a line of order 1 beside it.
 #[must_use]
 pub fn convergence(steps: &[Step], title: &str) -> Figure {
     let x = Axis::log("step dt [s]", steps.iter().map(|step| step.dt_s));

@@ -66,8 +66,8 @@ impl Frame {
 }
 
 impl FlightLog {
-    /// Returns the flight at a time \[s\], which is clamped to [`FlightLog::range_s`]; between two keyframes every vehicle
-    /// moves on a straight line. None without keyframes.
+    /// Returns the flight at a time \[s\], which is clamped to [`FlightLog::range_s`]; between two keyframes every
+    /// vehicle moves on a straight line. None without keyframes.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<Frame> {
         let [first_s, last_s] = self.range_s();

@@ -1,4 +1,4 @@
-//! Bounds of memory, exact extremes, interpolation.
+//! Tests of bounded memory, exact extremes and interpolation.
 
 use super::*;
 use tautline_core::record::{Channel, Peaks};
@@ -15,7 +15,8 @@ fn sample(log: &mut FlightLog, time_s: f64, x: f64, separation_m: f64) {
     log.take(&Sample { separation, ..Sample::new(time_s, 0, &swarm, &Rows::zeros(2)) });
 }
 
-/// Two vehicles on the x axis, sampled every 0.01 s in little memory; sample `k` has distance, energy and effort of `f(k)`.
+/// Two vehicles on the x axis, sampled every 0.01 s in little memory; sample `k` has distance, energy and effort of
+/// `f(k)`.
 fn log(samples: u64, f: impl Fn(u64) -> f64) -> FlightLog {
     let mut log = FlightLog::default().within(100_000);
     for k in 0..samples {
@@ -29,7 +30,7 @@ fn log(samples: u64, f: impl Fn(u64) -> f64) -> FlightLog {
 }
 
 #[test]
-fn a_long_flight_keeps_a_bounded_number_of_keyframes_and_both_of_its_ends() {
+fn long_flights_keep_bounded_keyframes_and_both_ends() {
     for samples in [1, 2, 200, 2049, 100_000] {
         let log = log(samples, |_| 3.0);
         let keyframes = log.keyframes();
@@ -40,7 +41,7 @@ fn a_long_flight_keeps_a_bounded_number_of_keyframes_and_both_of_its_ends() {
 }
 
 #[test]
-fn an_extreme_of_one_sample_survives_every_thinning() {
+fn extremes_survive_thinning() {
     let samples = 20_000;
     for at in [1, 777, 12_345, samples - 1] {
         let low = log(samples, |k| if k == at { 0.5 } else { 3.0 });
@@ -68,14 +69,14 @@ fn peaks_between_samples_count() {
 }
 
 #[test]
-fn a_log_without_samples_has_nothing() {
+fn empty_log_has_no_findings() {
     let log = FlightLog::default();
     assert_eq!((log.count(), log.samples(), log.range_s()), (0, 0, [0.0; 2]));
     assert!(log.keyframes().is_empty() && log.at(0.0).is_none() && log.closest().is_none());
 }
 
 #[test]
-fn samples_of_another_swarm_and_distances_that_are_not_finite_are_passed_over() {
+fn ignores_samples_of_another_swarm_and_non_finite_distances() {
     let mut log = log(3, |k| if k == 1 { f64::NAN } else { 3.0 });
     log.take(&Sample::new(9.0, 9, &Swarm::at_rest(Rows::zeros(5)), &Rows::zeros(0)));
     assert_eq!((log.samples(), log.range_s()), (3, [0.0, 0.02]));
@@ -83,7 +84,7 @@ fn samples_of_another_swarm_and_distances_that_are_not_finite_are_passed_over() 
 }
 
 #[test]
-fn between_two_keyframes_vehicles_are_on_a_straight_line() {
+fn interpolates_positions_linearly() {
     let mut log = FlightLog::default();
     sample(&mut log, 0.0, 4.0, 4.0);
     sample(&mut log, 1.0, 2.0, 2.0);
@@ -109,7 +110,7 @@ fn heading_deg(log: &FlightLog, time_s: f64) -> f64 {
 }
 
 #[test]
-fn between_two_keyframes_vehicles_turn_evenly_and_the_shorter_way() {
+fn interpolates_attitudes_evenly_on_the_shorter_rotation() {
     let quarter = [std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, std::f64::consts::FRAC_1_SQRT_2];
     for sign in [1.0, -1.0] {
         let log = turning(&[[1.0, 0.0, 0.0, 0.0], quarter.map(|x| sign * x)]);
@@ -121,7 +122,7 @@ fn between_two_keyframes_vehicles_turn_evenly_and_the_shorter_way() {
 }
 
 #[test]
-fn an_attitude_that_is_none_is_not_known_and_the_one_before_stays() {
+fn invalid_attitudes_are_unknown_and_keep_the_previous_one() {
     let level = [1.0, 0.0, 0.0, 0.0];
     for none in [[0.0; 4], [f64::NAN; 4]] {
         let log = turning(&[level, none, level]);
@@ -132,11 +133,11 @@ fn an_attitude_that_is_none_is_not_known_and_the_one_before_stays() {
     let (swarm, control) = (Swarm::at_rest(Rows::zeros(1)), Rows::zeros(1));
     let channels = [Channel { values: level.to_vec(), ..Channel::new("attitude", &["qx", "qy", "qz", "qw"]) }];
     other.take(&Sample { channels: &channels, ..Sample::new(1.0, 1, &swarm, &control) });
-    assert!(other.at(1.0).expect("a frame").attitude(0).is_none(), "columns in another order are something else");
+    assert!(other.at(1.0).expect("a frame").attitude(0).is_none(), "columns in another order are ignored");
 }
 
 #[test]
-fn an_approach_counts_from_its_own_time_and_not_from_its_sample() {
+fn approaches_count_from_their_own_time() {
     let mut log = FlightLog::default();
     sample(&mut log, 0.0, 4.0, 4.0);
     sample(&mut log, 1.0, 4.0, 1.0);
@@ -145,10 +146,10 @@ fn an_approach_counts_from_its_own_time_and_not_from_its_sample() {
 }
 
 #[test]
-fn the_distance_at_the_closest_approach_is_the_judges_and_not_that_of_straight_lines() {
+fn distance_at_the_closest_approach_is_that_of_the_audit() {
     let mut log = FlightLog::default();
     sample(&mut log, 0.0, 4.0, 4.0);
-    // Halfway between two samples that are 4 m apart the judge measured 0.5 m.
+    // The audit measured 0.5 m halfway between two samples with a distance of 4 m.
     sample(&mut log, 1.0, 4.0, 0.5);
     let frame = log.at(0.5).expect("a frame");
     assert_eq!((frame.nearest, frame.so_far), (Some((Pair::new(0, 1), 0.5)), Some(approach(0.5, 0.5))));
@@ -169,12 +170,12 @@ fn no_distance_is_below_the_closest_so_far() {
 }
 
 #[test]
-fn the_worst_moment_of_a_violation_stays_with_its_distance() {
+fn keeps_the_worst_moment_of_a_violation() {
     let mut log = FlightLog::new(Metric::default(), 1.0).within(40_000);
     let others = Pair::new(1, 2);
     for k in 0..10_000_u32 {
         let time_s = f64::from(k);
-        // For a sample, 0 and 1 are nearly at one place; some time later 1 and 2 are near each other.
+        // Vehicles 0 and 1 nearly coincide for one sample; later vehicles 1 and 2 come close.
         let (first, third) = (if k == 7777 { 9.9 } else { 0.0 }, if (8100..8103).contains(&k) { 10.5 } else { 30.0 });
         let swarm = Swarm::at_rest(Rows::from_row_slice(&[first, 0.0, 0.0, 10.0, 0.0, 0.0, third, 0.0, 0.0]));
         if k == 8100 {
@@ -193,13 +194,13 @@ fn the_worst_moment_of_a_violation_stays_with_its_distance() {
     let violation = log.violations().of_vehicles().next().expect("a violation");
     assert_eq!((violation.min_m, violation.min_at_s), (0.5, 8100.0));
     assert_eq!(log.at(violation.min_at_s).expect("a frame").distance_m(others), 0.5);
-    // Where nothing is looked at, samples are gone.
+    // Samples without a finding are dropped.
     assert!(log.keyframes().iter().all(|keyframe| keyframe.time_s != 7779.0));
     assert_eq!(log.at(4321.0).map(|frame| frame.positions_m[(1, 0)]), Some(10.0));
 }
 
 #[test]
-fn every_sample_within_a_violation_stays_and_the_rest_is_as_dense_everywhere() {
+fn keeps_samples_of_violations_and_thins_the_rest_evenly() {
     let mut log = FlightLog::default().within(200_000);
     let pair = Pair::new(0, 1);
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]));
@@ -220,7 +221,7 @@ fn every_sample_within_a_violation_stays_and_the_rest_is_as_dense_everywhere() {
 }
 
 #[test]
-fn violations_of_vehicles_that_the_flight_does_not_have_are_passed_over() {
+fn ignores_violations_of_unknown_vehicles() {
     let mut log = FlightLog::default();
     let (pair, time_s) = (Pair::new(3, 9), 0.0);
     log.note(&Event::ViolationBegan { pair, time_s });
@@ -233,7 +234,7 @@ fn violations_of_vehicles_that_the_flight_does_not_have_are_passed_over() {
 }
 
 #[test]
-fn a_violation_that_never_ends_leaves_memory_bounded() {
+fn endless_violation_keeps_memory_bounded() {
     let mut log = FlightLog::new(Metric::default(), 1.0).within(100_000);
     log.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: 0.0 });
     (0..10_000_u32).for_each(|k| sample(&mut log, f64::from(k), 0.5, 0.5));
@@ -242,7 +243,7 @@ fn a_violation_that_never_ends_leaves_memory_bounded() {
 }
 
 #[test]
-fn the_conclusion_of_the_judge_replaces_the_closest_approach_within_rounding() {
+fn conclusion_replaces_the_closest_approach_within_rounding() {
     let mut log = log(100, |k| if k == 50 { 1.5 } else { 3.0 });
     let less_m = 1.5_f64.next_down();
     log.conclude(less_m, 0.25);

@@ -1,4 +1,4 @@
-//! The smallest distance over time as a chart, in a thousand parts of its width and a hundred of its height.
+//! Smallest separation over time as a chart, in coordinates of 1000 by 100.
 
 use std::fmt::Write as _;
 
@@ -7,19 +7,20 @@ use tautline_audit::Slice;
 
 /// Width and height.
 const SIZE: [f64; 2] = [1000.0, 100.0];
-/// What a band is wider on either side, so that it is seen.
+/// Amount by which a band is widened on either side, so that it stays visible.
 const MARGIN: f64 = 1.5;
 
 /// Lines and bands of the chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
-    /// The smallest distance of each slice of time, as a path; nothing is drawn across a gap, and of a slice that is not whole a dot.
+    /// Smallest distance of each slice of time, as an SVG path. The path breaks at gaps, and a partial slice is a dot.
     pub distance: String,
     /// Height of the limit, from above.
     pub limit: Option<f64>,
-    /// Bands of findings: from where to where, and whether it is a violation (or undecided). Those of a kind do not overlap.
+    /// Bands of findings: start, end, and whether the finding is a violation (otherwise undecided). Bands of one kind
+    /// do not overlap.
     pub bands: Vec<(f64, f64, bool)>,
-    /// Where the closest approach is.
+    /// Position of the closest approach.
     pub closest: Option<[f64; 2]>,
 }
 
@@ -28,7 +29,7 @@ impl Chart {
         let x = |time_s: f64| ((time_s - first_s) / (last_s - first_s).max(1e-300)).clamp(0.0, 1.0) * SIZE[0];
         let mut sorted: Vec<f64> = near.iter().map(|slice| slice.closest.certain_m()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        // Nine tenths are seen, and the limit always.
+        // Nine tenths of the slices are inside the chart, and the limit always is.
         let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(1.0);
         let most = limit.map_or(usual, |limit| usual.clamp(2.0 * limit, 5.0 * limit)).max(1e-300);
         let y = |distance: f64| SIZE[1] * (1.0 - 0.96 * (distance / most).clamp(0.0, 1.0));
@@ -62,7 +63,7 @@ impl Chart {
     }
 }
 
-/// Stretches of which none touches another.
+/// Merges stretches that touch each other.
 fn joined(mut all: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut joined: Vec<(f64, f64)> = Vec::new();
@@ -83,7 +84,7 @@ mod tests {
     use tautline_core::swarm::Pair;
 
     #[test]
-    fn bands_of_a_kind_do_not_overlap_and_the_line_stops_at_a_gap() {
+    fn bands_do_not_overlap_and_gaps_break_the_line() {
         let slice = |from_s: f64| {
             let pair = ObjectPair::Vehicles(Pair::new(0, 1));
             let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };

@@ -1,4 +1,4 @@
-//! A replay as a page holds it.
+//! Data of a replay in a page.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -16,16 +16,16 @@ use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
 use tautline_core::swarm::{Rows, row};
 
-/// Most findings.
+/// Largest number of findings.
 const MOST_MOMENTS: usize = 200;
-/// Most slices of time of the chart.
+/// Largest number of time slices of the chart.
 const MOST_SLICES: usize = 1000;
-/// Most sentences on the nearest so far, and on the verdict, and what one takes \[bytes\].
+/// Largest number of statements on the closest pair so far, and on the verdict, and the size of one \[bytes\].
 const MOST_SAID: [usize; 2] = [1000, 1000];
 const SAID_BYTES: usize = 100;
-/// Most points of the way of an obstacle.
+/// Largest number of points on the path of an obstacle.
 const MOST_POINTS: usize = 5000;
-/// Rounding of a number in single precision, relative to it.
+/// Relative rounding error of a number in single precision.
 const SINGLE: f64 = 0.5 * f32::EPSILON as f64;
 /// Version of the data.
 const VERSION: u32 = 2;
@@ -34,82 +34,82 @@ const VERSION: u32 = 2;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Replay {
-    /// The data as JSON without any `<`, so that it may stand in a page's script element.
+    /// Data as JSON without any `<`, so that a script element of the page can hold it.
     pub json: String,
-    /// Smallest distance of any two over time.
+    /// Smallest separation of all pairs over time.
     pub chart: Chart,
     /// Largest error of a drawn coordinate \[m\].
     pub rounding_m: f64,
-    /// Number of instants that are kept, and number of samples.
+    /// Number of kept instants, and number of samples.
     pub instants: [usize; 2],
-    /// Number of vehicles that are drawn, and number of all that are ever there.
+    /// Number of drawn vehicles, and number of vehicles that are ever present.
     pub vehicles: [usize; 2],
-    /// Number of findings that can be jumped to, and number of all.
+    /// Number of findings to jump to, and number of all findings.
     pub moments: [usize; 2],
-    /// Whether vehicles are drawn at rest between two instants.
+    /// Whether vehicles rest between two instants.
     pub holds: bool,
-    /// Number of findings whose very instant, or one of whose vehicles, is not drawn.
+    /// Number of findings whose instant, or one of whose vehicles, is not drawn.
     pub inexact: usize,
-    /// Number of vehicles without a known radius, where there are any, and the radius that they are drawn with \[m\].
+    /// Number of vehicles without a known radius, if there are any, and the radius that they are drawn with \[m\].
     pub unknown_radius: Option<(usize, f64)>,
-    /// Largest distance of a drawn moving obstacle from its way \[m\].
+    /// Largest distance of a drawn moving obstacle from its path \[m\].
     pub obstacles_off_m: f64,
 }
 
-/// What the script reads. Lists of numbers are base64 of their bytes, the least first.
+/// Input of the script. Lists of numbers are base64 of their little-endian bytes.
 #[derive(Serialize)]
 struct Data<'a> {
     version: u32,
-    /// Names of the vehicles that are drawn.
+    /// Names of the drawn vehicles.
     vehicles: Vec<String>,
-    /// Radius that each is drawn with \[m\].
+    /// Drawn radius of each vehicle \[m\].
     radius_m: Vec<f64>,
     shell_m: Option<[f64; 3]>,
-    /// First instant \[s\], which the others are counted from, and the others as doubles.
+    /// First instant \[s\], and the other instants relative to it, as doubles.
     times_s: String,
-    /// Decimals of a time.
+    /// Number of decimals of a time.
     decimals: usize,
     /// Whether vehicles rest between two instants.
     holds: bool,
-    /// What places are drawn from, and from there the middle and half of the box around everything \[m\].
+    /// Origin of all drawn positions, and relative to it the middle and half of the box around everything \[m\].
     origin_m: [f64; 3],
     look_m: [f64; 3],
     half_m: [f64; 3],
-    /// Squares on the ground: their side \[m\], and lines from the origin in single precision.
+    /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
     ground: String,
-    /// Corner stones of the grid, and the most that it rounds a coordinate by \[m\].
+    /// Origin of the grid of positions, and its largest rounding error \[m\].
     middle_m: [f64; 3],
     cell_m: f64,
     rounding_m: f64,
-    /// Vehicles first, then the points that carry slots and reference.
+    /// Number of points: the vehicles, then the points that carry slots and reference.
     points: usize,
     starts: String,
     steps: String,
-    /// Instants and vehicles, as 16-bit places: who was not there all the time since the instant before.
+    /// Instants and vehicles, as 16-bit indices: vehicles that were absent at some time since the previous instant.
     breaks: String,
-    /// From when \[s\] on, as doubles, which two are the nearest by the judge, as 16-bit places in the list of vehicles; 65535
-    /// for one that is not drawn.
+    /// Times \[s\], as doubles, from which a pair is the closest by the audit. The pairs are 16-bit indices in the list
+    /// of vehicles, with 65535 for a vehicle that is not drawn.
     near_s: String,
     near_who: String,
-    /// What is said from when on \[s\]: of the nearest so far, and of the verdict.
+    /// Statements and the times \[s\] from which they hold: on the closest pair so far, and on the verdict.
     nearest: Vec<Statement>,
     verdicts: Vec<Verdict>,
-    /// In order of time.
+    /// Findings in order of time.
     moments: Vec<MomentData<'a>>,
     things: Vec<Thing>,
     #[serde(flatten)]
     targets: Targets,
 }
 
-/// From when on \[s\], whether there is a violation, what is said, and who and which obstacle are too near in a violation that cannot
-/// be jumped to.
+/// Start \[s\], whether a violation is present, the statement, and the vehicles and the obstacle of a violation that
+/// has no entry to jump to.
 type Verdict = (f64, bool, String, Vec<usize>, Option<usize>);
 
 #[derive(Serialize)]
 struct MomentData<'a> {
     kind: &'a str,
-    /// Places in the list of vehicles; those that are not drawn are left out.
+    /// Indices in the list of vehicles, without vehicles that are not drawn.
     who: Vec<usize>,
     thing: Option<usize>,
     from_s: f64,
@@ -118,27 +118,27 @@ struct MomentData<'a> {
     said: String,
 }
 
-/// How it was judged.
+/// Properties of the judgement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// Whether everything is known but for what the moments say.
+    /// Whether the audit decided everything besides the findings.
     pub is_else_known: bool,
-    /// What any two must keep, where it is one number for all.
+    /// Limit of separations, if it is the same for all pairs.
     pub limit: Option<f64>,
-    /// What distances are counted in: `m`, or `ellipsoids` for lengths over their axes.
+    /// Unit of distances: `m`, or `ellipsoids` for lengths over their axes.
     pub unit: &'static str,
 }
 
 impl Replay {
     /// Packs a flight into at most `room_bytes` of JSON.
     ///
-    /// Of more than [`MOST_VEHICLES`](super::MOST_VEHICLES), or of more than there is room for fifty instants and those of the
-    /// moments of, those of the moments and evenly chosen others are drawn. At most two thousand instants are kept, as [`chosen`]
-    /// says. Moments come in the order of their weight: all count for what is said over time, and the first two hundred can be
-    /// jumped to. Names and sentences are cut.
+    /// If there are more than [`MOST_VEHICLES`](super::MOST_VEHICLES), or too many for the room, the vehicles of the
+    /// findings and evenly chosen others are drawn. The room must suffice for fifty instants and those of the findings.
+    /// At most two thousand instants are kept, see [`chosen`]. `moments` are in order of gravity. All of them count for
+    /// the statements over time, and the first two hundred can be jumped to. Names and sentences are cut.
     ///
     /// # Errors
-    /// [`NoReplay`] where nobody is ever there, somebody is beyond 1e9 m, or there is no room for two instants.
+    /// [`NoReplay`] if no vehicle is ever present, a vehicle is beyond 1e9 m, or two instants do not fit.
     pub fn new(
         stage: &Stage,
         log: &FlightLog,
@@ -198,7 +198,8 @@ impl Replay {
             targets,
         };
         let no_room = NoReplay::NoRoom { room_bytes };
-        // Beyond a share of the room who was away in between is drawn at neither end.
+        // Breaks take a bounded share of the room. Beyond it, a vehicle that was absent in between is drawn at neither
+        // end.
         let most_breaks = log.gaps.len().min(room_bytes / 10 / BREAK_BYTES);
         let fixed = written(&data).len() + base64_bytes(12 * data.points) + BREAK_BYTES * most_breaks + NUMBERS;
         let of_an_instant = base64_bytes(8 + 6 * data.points);
@@ -245,15 +246,15 @@ impl Replay {
     }
 }
 
-/// What the numbers of the grid take, which are not known before it is chosen \[bytes\].
+/// Size of the numbers of the grid, which is chosen later \[bytes\].
 const NUMBERS: usize = 200;
-/// What a closest approach takes \[bytes\].
+/// Size of a closest approach \[bytes\].
 const SLICE_BYTES: usize = 24;
-/// What a break takes \[bytes\].
+/// Size of a break \[bytes\].
 const BREAK_BYTES: usize = 8;
 
 impl Moment {
-    /// The part of it that is shown.
+    /// Returns the finding, cut to the shown time.
     fn within(&self, begin_s: f64, end_s: f64) -> Self {
         let [from_s, to_s, at_s] =
             [self.span.from_s, self.span.to_s, self.span.at_s].map(|time_s| time_s.max(begin_s).min(end_s));
@@ -273,7 +274,7 @@ impl Moment {
     }
 }
 
-/// What is said of the verdict, no more than so often.
+/// Returns the statements on the verdict, at most [`MOST_SAID`].
 fn verdicts(
     moments: &[Moment],
     is_else_known: bool,
@@ -296,7 +297,7 @@ fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
     moments.into_iter()
 }
 
-/// Obstacles, with where they were at the moments that they have a part in.
+/// Returns the obstacles, with their positions at the findings that involve them.
 fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
     let most = (room_bytes / 4 / POINT_BYTES / stage.obstacles.len().max(1)).clamp(4, MOST_POINTS);
     let thing = |(k, obstacle): (usize, &Obstacle)| {
@@ -307,7 +308,7 @@ fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_byte
     stage.obstacles.iter().enumerate().map(thing).collect()
 }
 
-/// Places of the vehicles that are drawn, and of guides, at the instants that are kept \[m\]; none where one is not there.
+/// Returns the positions of the drawn vehicles and of the guides at the kept instants \[m\]; `None` for an absent one.
 fn instants<G: IntoIterator<Item = Option<Vector3<f64>>>>(
     log: &FlightLog,
     kept: &[usize],
@@ -323,24 +324,24 @@ fn instants<G: IntoIterator<Item = Option<Vector3<f64>>>>(
     kept.iter().map(instant).collect()
 }
 
-/// Whether the instant at which a span is at its worst is kept, or the two samples on either side.
+/// Returns whether the worst instant of a span is kept, or else the two samples around it.
 fn is_kept(log: &FlightLog, times_s: &[f64], kept: &[usize], span: &Span) -> bool {
     let (around, number) = (around_worst(times_s, span), |k: usize| log.keyframes()[k].number);
     let follow = around.clone().zip(around.clone().skip(1)).all(|(a, b)| number(b) - number(a) == 1);
     follow && around.into_iter().all(|k| kept.binary_search(&k).is_ok())
 }
 
-/// Decimals of times that tell a hundredth of a flight from the next, at least two.
+/// Returns the decimals of times that distinguish hundredths of a flight, at least two.
 fn decimals(span_s: f64) -> usize {
     (2..9_u8).find(|&decimals| span_s * 10_f64.powi(i32::from(decimals)) >= 100.0).map_or(9, usize::from)
 }
 
-/// As JSON that may stand within a page: `<` is written by its number.
+/// Returns JSON that a page can hold: `<` is escaped.
 fn written(data: &Data<'_>) -> String {
     serde_json::to_string(data).expect("every value has a JSON form").replace('<', "\\u003c")
 }
 
-/// The height of an obstacle that is level ground \[m\].
+/// Returns the height of an obstacle that is level ground \[m\].
 fn ground_m(obstacle: &Obstacle) -> Option<f64> {
     let Shape::HalfSpace { normal } = obstacle.shape else { return None };
     (normal.xy().norm() <= 1e-3 * normal.z).then(|| obstacle.path.first().map(|point| point.1.z)).flatten()

@@ -9,29 +9,33 @@ use super::{LONGEST_NAME, Moment, NoReplay, Stage, base64_bytes, cut};
 use crate::flight_log::FlightLog;
 use tautline_core::swarm::row;
 
-/// Most instants of a replay: a texture of every graphics card has so many rows.
+/// Largest number of instants of a replay, because every graphics card supports a texture of that many rows.
 pub const MOST_INSTANTS: usize = 2000;
-/// Instants that are kept on either side of what happened.
+/// Number of kept instants on either side of a finding.
 const BESIDE: usize = 2;
-/// Part of all instants that spans may take.
+/// Share of all instants for spans.
 const SHARE: f64 = 0.75;
 
-/// A time in which something happened.
+/// Time of a finding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// From \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// To \[s\].
+    /// End \[s\].
     pub to_s: f64,
-    /// When it was at its worst \[s\].
+    /// Worst instant \[s\].
     pub at_s: f64,
 }
 
-/// Indices of at most `most` (at least 2) instants, given in order of time \[s\], in ascending order.
+/// Returns the indices of at most `most` (at least 2) of the instants `times_s` in ascending order.
 ///
-/// Kept are the first and the last; those at or on either side of the worst time of each span; two on either side of it; all
-/// within spans and two on either side, one span after the other as long as they take no more than three quarters; and every
-/// k-th of all.
+/// Instants are kept in this order, with spans up to three quarters of `most`:
+///
+/// - the first and the last instant,
+/// - the worst instant of each span, or the two around it,
+/// - two on either side of these,
+/// - all instants in a span and two on either side, span by span,
+/// - every k-th of all instants.
 #[must_use]
 pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
     let (count, most) = (times_s.len(), most.max(2));
@@ -40,14 +44,14 @@ pub fn chosen(times_s: &[f64], spans: &[Span], most: usize) -> Vec<usize> {
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
     let mut kept = around(times_s, spans, (SHARE * most as f64) as usize);
-    // The smallest stride that leaves no more than there is room for.
+    // Smallest stride whose instants fit.
     let free = most - kept.len();
     let stride = count.div_ceil(free.max(1)).max(1);
     kept.extend((0..count).step_by(stride));
     kept.into_iter().collect()
 }
 
-/// Indices of the first and the last instant and of those in which something happened, as long as they are no more than `room`.
+/// Returns the indices of the first and the last instant and of those in spans, at most `room`.
 pub(super) fn around(times_s: &[f64], spans: &[Span], room: usize) -> BTreeSet<usize> {
     let count = times_s.len();
     let mut kept: BTreeSet<_> = count.checked_sub(1).into_iter().flat_map(|last| [0, last]).collect();
@@ -68,21 +72,22 @@ pub(super) fn around(times_s: &[f64], spans: &[Span], room: usize) -> BTreeSet<u
     kept
 }
 
-/// The instant at which a span is at its worst, or those on either side of it.
+/// Returns the worst instant of a span, or the two around it.
 pub(super) fn around_worst(times_s: &[f64], span: &Span) -> Range<usize> {
     let first = times_s.partition_point(|&time_s| time_s < span.at_s);
     let end = times_s.partition_point(|&time_s| time_s <= span.at_s);
     if first < end { first..end } else { first.saturating_sub(1)..(end + 1).min(times_s.len()) }
 }
 
-/// Most vehicles of a replay: a texture of every graphics card has so many columns, and some for slots.
+/// Largest number of vehicles of a replay, because every graphics card supports a texture of that many columns, and
+/// some for slots.
 pub const MOST_VEHICLES: usize = 2000;
-/// Fewest instants that vehicles are left out for.
+/// Number of instants below which vehicles are omitted.
 const FEWEST_INSTANTS: usize = 50;
-/// Farthest coordinate: beyond, single precision draws nothing well \[m\].
+/// Largest coordinate \[m\]. Single precision is too coarse beyond it.
 const FARTHEST_M: f64 = 1e9;
 
-/// Which vehicles are ever there.
+/// Returns the vehicles that are ever present.
 pub(super) fn present(stage: &Stage, log: &FlightLog) -> Result<Vec<usize>, NoReplay> {
     let mut seen = BTreeSet::new();
     for keyframe in log.keyframes() {
@@ -100,10 +105,10 @@ pub(super) fn present(stage: &Stage, log: &FlightLog) -> Result<Vec<usize>, NoRe
     if seen.is_empty() { Err(NoReplay::Empty) } else { Ok(seen.into_iter().collect()) }
 }
 
-/// The vehicles that are drawn, in order: of those that are there those of the moments, the weightiest first, and evenly chosen
-/// others, as many as there is room for beside an instant of each moment.
+/// Returns the drawn vehicles in order: those of the findings, the gravest first, and evenly chosen others, up to the
+/// number that fits beside an instant of each finding.
 pub(super) fn shown(times_s: &[f64], present: &[usize], moments: &[Moment], room_bytes: usize) -> Vec<usize> {
-    // Findings have three quarters of the instants.
+    // Findings take three quarters of the instants.
     let worst: BTreeSet<_> = moments.iter().flat_map(|moment| around_worst(times_s, &moment.span)).collect();
     let instants = times_s.len().min((worst.len() * 3 / 2).max(FEWEST_INSTANTS));
     // A share of the room is for everything else.
@@ -122,8 +127,8 @@ pub(super) fn shown(times_s: &[f64], present: &[usize], moments: &[Moment], room
     shown.into_iter().collect()
 }
 
-/// Where vehicles that are there at an instant and at the one before were not in between: places of instant and vehicle, in
-/// order.
+/// Returns the instants and vehicles, as indices in order, of vehicles that are present at an instant and at the
+/// previous one, but were absent in between.
 pub(super) fn breaks(log: &FlightLog, times_s: &[f64], place: impl Fn(usize) -> Option<usize>) -> Vec<[usize; 2]> {
     let found: BTreeSet<_> = log
         .gaps
@@ -137,7 +142,7 @@ pub(super) fn breaks(log: &FlightLog, times_s: &[f64], place: impl Fn(usize) -> 
     found.into_iter().collect()
 }
 
-/// Place of a vehicle of the weightiest moment at that moment \[m\]: drawing is most precise there.
+/// Returns the position of a vehicle of the gravest finding at its time \[m\], where the drawing is most precise.
 pub(super) fn place_of_weightiest(log: &FlightLog, moments: &[Moment]) -> Option<Vector3<f64>> {
     let weightiest = moments.iter().find(|moment| !moment.vehicles.is_empty())?;
     let keyframes = log.keyframes();
@@ -169,14 +174,14 @@ mod tests {
             let kept = chosen(&times, &spans, most);
             prop_assert!(kept.len() <= most && kept.len() <= count && kept.is_sorted_by(|a, b| a < b));
             prop_assert!(count == 0 || (kept.first() == Some(&0) && kept.last() == Some(&(count - 1))));
-            // Evenly, too: a quarter of the room is for that.
+            // The rest is spread evenly, for which a quarter of the room is reserved.
             let widest = kept.windows(2).map(|two| two[1] - two[0]).max().unwrap_or(1);
             prop_assert!(widest <= 1 + count.div_ceil((most / 4).max(1)));
         }
     }
 
     #[test]
-    fn the_worst_time_of_each_comes_before_the_neighbours_of_any() {
+    fn worst_instants_come_before_neighbours() {
         let times: Vec<f64> = (0..10_000).map(f64::from).collect();
         let at = |k: u32| f64::from(60 * k) + f64::from(k % 2) * 0.5;
         let spans: Vec<_> = (0..150).map(|k| span(at(k) - 20.0, at(k) + 20.0)).collect();
@@ -186,12 +191,12 @@ mod tests {
     }
 
     #[test]
-    fn every_instant_of_a_span_is_kept_and_two_beside_it() {
+    fn keeps_all_instants_of_a_span_and_two_beside_it() {
         let times: Vec<f64> = (0..100_000).map(f64::from).collect();
         let kept = chosen(&times, &[span(5000.5, 5100.5), span(70_000.0, 70_000.0)], 500);
         assert!((4999..=5102).chain(69_998..=70_002).all(|k| kept.contains(&k)), "{kept:?}");
         assert!(kept.len() > 250, "the rest of the room is used: {}", kept.len());
-        // One that does not fit is kept where it is worst.
+        // A span that does not fit keeps its worst instant.
         let kept = chosen(&times, &[span(5000.0, 9000.0)], 500);
         assert!((6998..=7002).all(|k| kept.contains(&k)) && kept.len() <= 500);
     }

@@ -1,11 +1,11 @@
-//! A flight packed into a page, where a script replays it.
+//! Flights packed into a page, where a script replays them.
 //!
-//! A [`FlightLog`](crate::flight_log::FlightLog) holds the motion. A [`Stage`] holds what does not move: vehicles, shells,
-//! obstacles, slots. [`Moment`]s are the findings of the judge. [`Replay::new`] packs the three into JSON of a bounded number
-//! of bytes, which the page holds as data; `assets/replay.js` draws it.
+//! A [`FlightLog`](crate::flight_log::FlightLog) holds the motion. A [`Stage`] holds vehicles, shells, obstacles and
+//! slots. [`Moment`]s are the findings of the audit. [`Replay::new`] packs the three into JSON of a bounded size, which
+//! the page holds as data. `assets/replay.js` draws it.
 //!
-//! Packed positions are for the eye. They are rounded to a grid ([`Replay::rounding_m`]) and thinned; every distance, time and
-//! verdict that is shown is the judge's own. The same flight gives the same bytes.
+//! Packed positions serve the drawing only: they are rounded to a grid ([`Replay::rounding_m`]) and thinned. Every
+//! displayed distance, time and verdict is that of the audit. Equal flights give equal bytes.
 
 mod chart;
 mod data;
@@ -26,28 +26,28 @@ use nalgebra::Vector3;
 use tautline_audit::{ObjectPair, Violation};
 use tautline_core::text::{exact, fixed, metres_below};
 
-/// Room for the replays of a page \[bytes\].
+/// Largest size of the replays of a page \[bytes\].
 pub const PAGE_BYTES: usize = 1_000_000;
-/// Most letters of a name.
+/// Largest length of a name in characters.
 pub const LONGEST_NAME: usize = 40;
-/// Most letters of a sentence.
+/// Largest length of a sentence in characters.
 const LONGEST_SENTENCE: usize = 240;
 
 /// Kind of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The closest approach of all.
+    /// Closest approach of all pairs.
     Closest,
-    /// Two vehicles were too close, or a vehicle too near to an obstacle.
+    /// Two vehicles were too close, or a vehicle was too close to an obstacle.
     Violation,
-    /// The judge cannot decide.
+    /// The audit cannot decide.
     Undecided,
-    /// A vehicle was not seen, so that the judge cannot decide.
+    /// A vehicle was not seen, so the audit cannot decide.
     Unseen,
 }
 
 impl Kind {
-    /// Its name in the data of a page.
+    /// Returns the name of the kind in the data of a page.
     fn name(self) -> &'static str {
         match self {
             Self::Closest => "closest",
@@ -57,20 +57,20 @@ impl Kind {
     }
 }
 
-/// A finding of the judge, to which a replay jumps.
+/// A finding of the audit, to which a replay can jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// Its kind.
+    /// Kind of the finding.
     pub kind: Kind,
-    /// The vehicles, from 0.
+    /// Vehicles, from 0.
     pub vehicles: Vec<usize>,
-    /// The obstacle, from 0, where there is one.
+    /// Obstacle, from 0, if one is involved.
     pub obstacle: Option<usize>,
-    /// When it began and ended, and when it was at its worst \[s\].
+    /// Start, end and worst instant \[s\].
     pub span: Span,
-    /// The finding in a few words, while it lasts.
+    /// Finding in a few words, shown while it lasts.
     pub brief: String,
-    /// The finding in a sentence, with the judge's distance and time.
+    /// Finding in a sentence, with the distance and time of the audit.
     pub said: String,
 }
 
@@ -106,31 +106,31 @@ impl Moment {
     }
 }
 
-/// Why a flight has no replay.
+/// Reason why a flight has no replay.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoReplay {
-    /// No vehicle is ever there.
-    #[error("nothing is there to be drawn")]
+    /// No vehicle is ever present.
+    #[error("no vehicle is ever present")]
     Empty,
-    /// A place is too far away for single precision.
-    #[error("vehicle {name} is beyond {farthest_m:e} m at {time_s} s")]
+    /// A position is too far away for single precision.
+    #[error("vehicle {name} is farther than {farthest_m:e} m from the origin at {time_s} s")]
     TooFar {
         /// Name of the vehicle.
         name: String,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// The farthest that is drawn \[m\].
+        /// Largest drawn coordinate \[m\].
         farthest_m: f64,
     },
-    /// Two instants would not fit.
+    /// Two instants do not fit.
     #[error("it does not fit into {room_bytes} bytes")]
     NoRoom {
-        /// The room \[bytes\].
+        /// Largest size \[bytes\].
         room_bytes: usize,
     },
 }
 
-/// Cuts a text after so many letters.
+/// Cuts a text after `most` characters.
 #[must_use]
 pub fn cut(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
@@ -139,12 +139,12 @@ pub fn cut(text: &str, most: usize) -> String {
     }
 }
 
-/// Doubles as base64 of their bytes, the least first.
+/// Returns doubles as base64 of their little-endian bytes.
 fn doubles(numbers: impl Iterator<Item = f64>) -> String {
     base64_of(numbers.flat_map(f64::to_le_bytes))
 }
 
-/// Places in single precision as base64 of their bytes, the least first.
+/// Returns positions in single precision as base64 of their little-endian bytes.
 #[expect(clippy::cast_possible_truncation, reason = "drawn in single precision")]
 fn singles<'a>(places: impl IntoIterator<Item = &'a Vector3<f64>>) -> String {
     base64_of(places.into_iter().flatten().flat_map(|&x| (x as f32).to_le_bytes()))
@@ -154,7 +154,7 @@ fn base64_of(bytes: impl Iterator<Item = u8>) -> String {
     BASE64.encode(bytes.collect::<Vec<_>>())
 }
 
-/// Length of the base64 of so many bytes.
+/// Returns the length of the base64 of this many bytes.
 fn base64_bytes(bytes: usize) -> usize {
     4 * bytes.div_ceil(3)
 }

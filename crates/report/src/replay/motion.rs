@@ -2,37 +2,38 @@
 
 use nalgebra::Vector3;
 
-/// Stands for a point that is not there, in the place of its step along x.
+/// Marks an absent point, in place of its step along x.
 const ABSENT: i16 = i16::MIN;
-/// Largest step.
+/// Largest step in cells.
 const LARGEST: f64 = 32_766.0;
-/// Cells of the grid between the middle and the farthest point, at most: a start is a whole number of 32 bits.
+/// Largest number of cells between the middle and the farthest point, so that a start fits into 32 bits.
 const MOST_CELLS: f64 = 1_073_741_824.0;
 /// Smallest cell \[m\].
 const SMALLEST_M: f64 = 1e-9;
-/// Cells up to the largest coordinate, at most: every place on the grid is a double, exactly.
+/// Largest number of cells up to the largest coordinate, so that every position on the grid is exactly a double.
 const MOST_WHOLE: f64 = 2_251_799_813_685_248.0;
 
-/// The motion of points, on a grid whose cells are the smallest power of two in which no step is too long for 16 bits.
+/// Motion of points on a grid. The cell is the smallest power of two for which every step fits into 16 bits.
 ///
-/// A point is rounded to the nearest place of the grid, and steps lead from place to place: rounding does not add up.
+/// Points are rounded to the nearest position on the grid, and steps lead between these, so rounding errors do not add
+/// up.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PackedMotion {
-    /// Middle of all points \[m\], from which places are counted.
+    /// Origin of the grid, the middle of all points \[m\].
     pub(super) middle_m: [f64; 3],
     /// Edge of a cell \[m\].
     pub(super) cell_m: f64,
-    /// Cells from the middle to where each point is first seen; 0 where it never is.
+    /// Cells from the origin to the first position of each point; 0 for a point that is never present.
     starts: Vec<[i32; 3]>,
-    /// Steps of every point at every instant, one instant after the other; the first is none.
+    /// Steps of all points, instant by instant; the first step is zero.
     steps: Vec<[i16; 3]>,
 }
 
 impl PackedMotion {
-    /// Packs points at instants: the same number of points at each, none where one is not there. A point with a coordinate that is
-    /// no finite number is not there.
+    /// Packs the points of each instant. Every instant has the same number of points, with `None` for an absent one. A
+    /// point with a coordinate that is not finite counts as absent.
     ///
-    /// Coordinates of more than 1e9 m make cells of more than 1e-6 m.
+    /// Coordinates above 1e9 m give cells above 1e-6 m.
     pub(super) fn new(instants: &[Vec<Option<Vector3<f64>>>]) -> Self {
         let points = instants.first().map_or(0, Vec::len);
         let there = |k: usize, point: usize| instants[k].get(point).copied().flatten().filter(is_finite);
@@ -54,7 +55,7 @@ impl PackedMotion {
         }
         let reach_m = (0.5 * (high - low)).amax();
         let farthest_m = low.amax().max(high.amax());
-        // A step between two places of the grid is at most a cell longer than the way.
+        // A step on the grid is at most one cell longer than the motion.
         let cell_m = power_of_two(
             (longest_m / (LARGEST - 1.0))
                 .max(reach_m / (MOST_CELLS - 2.0))
@@ -84,24 +85,24 @@ impl PackedMotion {
         Self { middle_m: (middle * cell_m).into(), cell_m, starts, steps }
     }
 
-    /// Most that a coordinate is rounded by \[m\]: half of a cell.
+    /// Returns the largest rounding error of a coordinate \[m\], half a cell.
     pub(super) fn rounding_m(&self) -> f64 {
         0.5 * self.cell_m
     }
 
-    /// Starts in cells from the middle: 32-bit whole numbers, least byte first, x, y, z of one point after the other.
+    /// Returns the starts in cells as little-endian 32-bit integers: x, y, z, point by point.
     pub(super) fn start_bytes(&self) -> Vec<u8> {
         self.starts.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
     }
 
-    /// Steps in cells from where the point was last seen: 16-bit whole numbers, least byte first, x, y, z of one point after the
-    /// other, one instant after the other. A step of -32768 along x stands for a point that is not there.
+    /// Returns the steps in cells from the last position of each point, as little-endian 16-bit integers: x, y, z,
+    /// point by point, instant by instant. A step of -32768 along x marks an absent point.
     pub(super) fn step_bytes(&self) -> Vec<u8> {
         self.steps.iter().flatten().flat_map(|cells| cells.to_le_bytes()).collect()
     }
 }
 
-/// The smallest power of two that is not less than a normal positive number.
+/// Returns the smallest power of two that is not below a positive normal number.
 fn power_of_two(least: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff << 52;
     let below = f64::from_bits(least.to_bits() & EXPONENT);
@@ -145,7 +146,7 @@ mod tests {
         prop_oneof![6 => at, 1 => Just(None)]
     }
 
-    /// The points at every instant as a page draws them \[m\].
+    /// Returns the points at every instant as a page draws them \[m\].
     fn unpacked(motion: &PackedMotion) -> Vec<Vec<Option<Vector3<f64>>>> {
         let mut cells: Vec<_> = motion.starts.iter().map(|start| Vector3::from(start.map(f64::from))).collect();
         let instants = motion.steps.chunks(motion.starts.len().max(1)).map(|steps| {
@@ -160,7 +161,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_unpacked_is_within_half_a_cell_and_who_is_not_there_stays_away(
+        fn unpacked_points_are_within_half_a_cell(
             instants in (1..5_usize).prop_flat_map(|points| {
                 prop::collection::vec(prop::collection::vec(point(), points), 1..30)
             }),
@@ -179,14 +180,14 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_as_small_as_steps_allow_and_half_as_large_ones_would_not_do() {
+    fn cells_are_as_small_as_the_steps_allow() {
         let at = |x: f64| vec![Some(Vector3::new(x, 0.0, 0.0))];
         let instants: Vec<_> = (0..1000).map(|k| at(0.1 * f64::from(k))).collect();
         let motion = PackedMotion::new(&instants);
         assert!((0.1 / LARGEST..0.2 / LARGEST * 1.01).contains(&motion.cell_m), "{}", motion.cell_m);
         let largest = motion.steps.iter().map(|step| i32::from(step[0])).max().expect("a step");
         assert!(2 * largest > 32_767, "twice as many cells would not fit: {largest}");
-        // One that never moves is where it is.
+        // A point at rest keeps its exact position.
         let still = PackedMotion::new(&vec![at(3.25); 5]);
         assert_eq!(unpacked(&still)[4][0], Some(Vector3::new(3.25, 0.0, 0.0)));
         assert_eq!(unpacked(&PackedMotion::new(&[])).len(), 0);

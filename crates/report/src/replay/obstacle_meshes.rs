@@ -1,4 +1,4 @@
-//! Obstacles and the ground as a page holds them: triangles, lines and ways.
+//! Meshes of obstacles and the ground in a page: triangles, lines and paths.
 
 use nalgebra::{Rotation3, Vector3};
 use serde::Serialize;
@@ -8,28 +8,29 @@ use super::{LONGEST_NAME, cut, singles};
 use crate::simplify::needed;
 use tautline_audit::{Obstacle, Shape};
 
-/// What is in the way.
+/// An obstacle as data of a page.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Thing {
     name: String,
-    /// Of a ball \[m\], which has no triangles.
+    /// Radius of a ball \[m\], which has no triangles.
     radius_m: Option<f64>,
-    /// Triangles, and lines, in single precision from its place \[m\].
+    /// Triangles and lines in single precision, relative to its position \[m\].
     solid: String,
     rims: String,
     opacity: f64,
-    /// When \[s\] it is where \[m\].
+    /// Times \[s\] and positions \[m\].
     path: Vec<[f64; 4]>,
-    /// Most that it is drawn off its way \[m\].
+    /// Largest distance of the drawn path from the true one \[m\].
     #[serde(skip)]
     pub(super) off_m: f64,
 }
 
-/// Bytes that a point of a way takes, at most.
+/// Largest size of a point of a path \[bytes\].
 pub(super) const POINT_BYTES: usize = 4 * 26;
 
 impl Thing {
-    /// As it is drawn, on a way of so many points and where it was at these times \[s\].
+    /// Returns the data of an obstacle, with a path of about `most` points that includes its positions at `times_s`
+    /// \[s\].
     pub(super) fn of(obstacle: &Obstacle, extent: &Extent, times_s: &[f64], most: usize) -> Self {
         let place_m = obstacle.path.first().map_or(Vector3::zeros(), |point| point.1);
         let mesh = Mesh::of(&obstacle.shape, extent.middle_m() - place_m, 1.5 * extent.reach_m());
@@ -53,8 +54,8 @@ impl Thing {
     }
 }
 
-/// Points of a way that are kept, at most about so many: the first and the last, those around these times, and those
-/// farthest off. And the largest distance of a dropped point \[m\].
+/// Returns the kept points of a path, about `most`: the first and the last, those around `times_s`, and the farthest
+/// from the simplified path. Also returns the largest distance of a dropped point \[m\].
 fn simplified(path: &[(f64, Vector3<f64>)], times_s: &[f64], most: usize) -> (Vec<usize>, f64) {
     let Some(last) = path.len().checked_sub(1) else { return (Vec::new(), 0.0) };
     let around = times_s.iter().flat_map(|&at_s| {
@@ -75,16 +76,16 @@ fn simplified(path: &[(f64, Vector3<f64>)], times_s: &[f64], most: usize) -> (Ve
     (kept, off_m)
 }
 
-/// Parts of a turn, and of a quarter of one, of a capsule.
+/// Number of segments of a full turn, and of a quarter turn, of a capsule.
 const TURN: u32 = 24;
 const QUARTER: i32 = 4;
-/// Lines across a plane.
+/// Number of lines across a plane.
 const HATCHES: u32 = 8;
-/// Squares of the ground from the middle of the flight to its end, about.
+/// Approximate number of ground squares from the middle of the flight to its end.
 const SQUARES: f64 = 5.0;
 
-/// Triangles, each corner a place and a normal (none where light plays no part), and lines, each two places, from the place of
-/// the obstacle \[m\].
+/// Triangles, each corner a position and a normal (zero without shading), and lines, each two positions, relative to
+/// the position of the obstacle \[m\].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Mesh {
     pub(super) solid: Vec<Vector3<f64>>,
@@ -92,8 +93,8 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    /// That of an obstacle; a plane is drawn around its point below the middle of the flight, which is so far from the place
-    /// \[m\], and as far as the flight goes. A ball has none: it is drawn as the vehicles are.
+    /// Returns the mesh of an obstacle. A plane is drawn around its point below the middle of the flight, `middle`
+    /// relative to the obstacle \[m\], up to `reach_m`. A ball has no mesh, because it is drawn like the vehicles.
     pub(super) fn of(shape: &Shape, middle: Vector3<f64>, reach_m: f64) -> Self {
         match *shape {
             Shape::Ball { .. } => Self::default(),
@@ -163,8 +164,8 @@ impl Mesh {
     }
 }
 
-/// Squares on the ground at a height \[m\], under everything between two corners \[m\]: their side, 1, 2 or 5 times a power of ten,
-/// and lines.
+/// Returns the side and the lines of squares on the ground at a height \[m\], below everything between two corners
+/// \[m\]. The side is 1, 2 or 5 times a power of ten.
 pub(super) fn ground(low: Vector3<f64>, high: Vector3<f64>, height_m: f64) -> (f64, Vec<Vector3<f64>>) {
     let rough = (0.5 * (high - low)).xy().amax() / SQUARES;
     let mut ten = 1e-9;
@@ -195,8 +196,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_long_way_the_points_that_matter_are_kept_and_how_far_off_it_is_drawn_is_known() {
-        // At rest but for a leap of five points.
+    fn simplified_paths_keep_extremes_and_report_their_error() {
+        // At rest except for a jump of five points.
         let x = |k: u32| if (2003..2008).contains(&k) { 5.0 } else { 0.0 };
         let path: Vec<_> = (0..5000).map(|k| (f64::from(k), Vector3::new(x(k), 0.0, 0.0))).collect();
         let (kept, off_m) = simplified(&path, &[], 100);
@@ -214,14 +215,14 @@ mod tests {
         let farthest_m = path.iter().map(|&(at_s, at)| (line(at_s) - at).norm()).fold(0.0, f64::max);
         assert!((farthest_m - off_m).abs() < 1e-9, "{farthest_m} and {off_m}");
         assert_eq!(simplified(&[], &[0.0], 9), (Vec::new(), 0.0));
-        // Through the farthest point alone the line is farther off than without it.
+        // With the farthest point alone the path is farther off than without it.
         let path = [0.0, -0.9, 1.0, 0.0].map(|x| Vector3::new(x, 0.0, 0.0));
         let path: Vec<_> = path.into_iter().enumerate().map(|(k, at)| (k as f64, at)).collect();
         assert_eq!(simplified(&path, &[], 3), (vec![0, 3], 1.0));
     }
 
     #[test]
-    fn every_corner_lies_on_the_surface_and_normals_point_out() {
+    fn corners_are_on_the_surface_and_normals_point_outwards() {
         let middle = Vector3::new(1.0, 2.0, 3.0);
         let shapes = [
             Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.4 },
@@ -254,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn squares_lie_under_everything_and_are_neither_many_nor_few() {
+    fn ground_squares_cover_the_box_in_moderate_number() {
         for reach_m in [1e-3, 0.7, 3.0, 49.0, 1e6] {
             let (low, high) = (Vector3::repeat(-reach_m), Vector3::new(reach_m, 0.5 * reach_m, 0.0));
             let (side_m, lines) = ground(low, high, -1.0);

@@ -11,39 +11,38 @@ use tautline_laws::formation::Formation;
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
-/// Vehicles, the shells around them, their formations and the obstacles.
+/// Vehicles, their shells, their formations and the obstacles.
 #[derive(Clone, Debug)]
 pub struct Stage {
     /// Names of the vehicles.
     pub vehicles: Vec<String>,
-    /// Radius of each vehicle \[m\]; none where it is not known.
+    /// Radius of each vehicle \[m\]; `None` if unknown.
     pub radius_m: Vec<Option<f64>>,
-    /// Half axes of the shell around each vehicle \[m\], half of what two centres must keep; none where there is no such
-    /// distance.
+    /// Half axes of the shell around each vehicle \[m\], half of the limit of two centres; `None` without such a limit.
     pub shell_m: Option<[f64; 3]>,
-    /// Formations and graph, where they are known.
+    /// Formations and graph, if known.
     pub plan: Option<Plan>,
-    /// What is in the way.
+    /// Obstacles.
     pub obstacles: Vec<Obstacle>,
 }
 
-/// Radius of a vehicle of which nothing is known, at most \[m\].
+/// Largest drawn radius of a vehicle with unknown radius \[m\].
 const UNKNOWN_RADIUS_M: f64 = 0.1;
 
 impl Stage {
-    /// Formations and graph, with the changes of the target during the flight.
+    /// Returns formations and graph, with the changes of the target during the flight.
     pub(super) fn plan_of(&self, log: &FlightLog) -> Option<Plan> {
         let mut plan = self.plan.clone()?;
         log.targets().iter().for_each(|event| plan.note(event));
         Some(plan)
     }
 
-    /// What a vehicle of unknown radius is drawn with \[m\]: two that keep their distance do not touch.
+    /// Returns the drawn radius of a vehicle with unknown radius \[m\]. Two vehicles at their limit do not touch.
     pub(super) fn unknown_radius_m(&self) -> f64 {
         self.shell_m.into_iter().flatten().fold(UNKNOWN_RADIUS_M, f64::min)
     }
 
-    /// How many of these vehicles have no known radius, where there are any, and what they are drawn with \[m\].
+    /// Returns the number of these vehicles without a known radius, if there are any, and their drawn radius \[m\].
     pub(super) fn unknown_radii(&self, vehicles: &[usize]) -> Option<(usize, f64)> {
         let unknown =
             vehicles.iter().filter(|&&vehicle| self.radius_m.get(vehicle).copied().flatten().is_none()).count();
@@ -54,7 +53,8 @@ impl Stage {
         self.radius_m.get(vehicle).copied().flatten().unwrap_or_else(|| self.unknown_radius_m())
     }
 
-    /// The stage of a scenario, with its obstacles as they are judged. Later changes of the target are in the log.
+    /// Returns the stage of a scenario, with its obstacles in the form of the audit. Later changes of the target are in
+    /// the log.
     #[must_use]
     pub fn of(scenario: &Scenario, obstacles: Vec<Obstacle>) -> Self {
         Self {
@@ -67,10 +67,10 @@ impl Stage {
     }
 }
 
-/// Least half of an edge \[m\].
+/// Smallest half edge of the box \[m\].
 const LEAST_M: f64 = 1e-6;
 
-/// A box around a flight, with the shells and with the obstacles that are not far larger than it.
+/// A box around a flight with the shells, and with obstacles that are not far larger than the flight.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
     pub(super) low_m: Vector3<f64>,
@@ -78,7 +78,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// That of the vehicles that are shown.
+    /// Returns the box of the drawn vehicles.
     pub(super) fn of(stage: &Stage, log: &FlightLog, shown: &[usize]) -> Self {
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         let places =
@@ -114,7 +114,7 @@ impl Extent {
     }
 }
 
-/// A box around an obstacle at each point of its way; none around one without an end.
+/// Returns a box around an obstacle at each point of its path; empty for an unbounded obstacle.
 fn boxes(obstacle: &Obstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let (low, high) = match obstacle.shape {
         Shape::Ball { radius_m } => (Vector3::repeat(-radius_m), Vector3::repeat(radius_m)),
@@ -127,41 +127,42 @@ fn boxes(obstacle: &Obstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     obstacle.path.iter().map(|(_, at)| (at + low, at + high)).collect()
 }
 
-/// Most links that are drawn: more hide what they join.
+/// Largest number of drawn links. More links would hide each other.
 const MOST_LINKS: usize = 2100;
 
 /// Links of the graph, and the slots of the vehicles.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Targets {
-    /// Places in the list of vehicles, two 16-bit numbers for a link.
+    /// Indices in the list of vehicles, two 16-bit numbers for a link.
     links: String,
-    /// Whether links have an edge tension with its barrier at `delta_m`, and are no springs.
+    /// Whether links have an edge tension with its barrier at `delta_m`; otherwise they are springs.
     tension: bool,
     delta_m: f64,
     formations: Vec<Target>,
-    /// Length of the axes that carry slots \[m\].
+    /// Length of the axes that carry the slots \[m\].
     axis_m: f64,
-    /// The first of four points, the middle of the slots and the ends of their axes; null where there are none.
+    /// First of four points: the middle of the slots and the ends of their axes; null without slots.
     axes: Option<usize>,
-    /// The point at the reference; null where there is none.
+    /// Point at the reference; null without a reference.
     reference: Option<usize>,
 }
 
 #[derive(Clone, Debug, Serialize)]
 struct Target {
     from_s: f64,
-    /// The slot of each vehicle from their middle \[m\], in single precision.
+    /// Slot of each vehicle relative to their middle \[m\], in single precision.
     slots: String,
 }
 
-/// Points that are packed beside vehicles.
+/// Points that are packed beside the vehicles.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Guides {
     axis_m: Option<f64>,
     reference: bool,
 }
 
-/// What a plan has for the vehicles that are shown, and what of it moves. Slots that take more than `room_bytes` are left out.
+/// Returns the links and slots of a plan for the drawn vehicles, and the guides that move. Slots that take more than
+/// `room_bytes` are omitted.
 pub(super) fn targets_of(plan: Option<&Plan>, shown: &[usize], begin_s: f64, room_bytes: usize) -> (Targets, Guides) {
     let Some(plan) = plan else { return (Targets::default(), Guides::default()) };
     let place = |vehicle: usize| shown.binary_search(&vehicle).ok().and_then(|at| u16::try_from(at).ok());
@@ -210,7 +211,7 @@ impl Guides {
         4 * usize::from(self.axis_m.is_some()) + usize::from(self.reference)
     }
 
-    /// Where they are at a time \[s\] \[m\].
+    /// Returns the positions of the guides at a time \[s\] \[m\].
     pub(super) fn at(self, plan: Option<&Plan>, time_s: f64, positions_m: &Rows) -> Vec<Option<Vector3<f64>>> {
         let laid = plan.and_then(|plan| Some((plan, plan.laid_at(time_s, positions_m)?)));
         let axes = self.axis_m.map(|axis_m| {

@@ -1,4 +1,4 @@
-//! Statements of a replay in the course of a flight: on the nearest pair so far, and on the verdict.
+//! Statements of a replay over time: on the closest pair so far, and on the verdict.
 
 use std::collections::BTreeSet;
 
@@ -6,26 +6,26 @@ use super::{Kind, Moment, base64_of, doubles};
 use tautline_audit::{Approach, Slice, Slices};
 use tautline_core::text::{at_least, at_most, seconds};
 
-/// Decimals of a distance.
+/// Number of decimals of a distance.
 const DECIMALS: u8 = 3;
-/// Place of a vehicle that is not drawn.
+/// Index of a vehicle that is not drawn.
 const NOT_DRAWN: u16 = u16::MAX;
 
-/// A statement on the nearest pair and the time from which on it holds \[s\].
+/// A statement on the closest pair, with the time from which it holds \[s\].
 pub(super) type Statement = (f64, String);
 
-/// How it is said.
+/// Wording of statements.
 pub(super) struct Words<'a, N> {
-    /// What distances are counted in.
+    /// Unit of distances.
     pub(super) unit: &'a str,
-    /// Whether something is not known of some of the time.
+    /// Whether distances are unknown at some times.
     pub(super) has_gaps: bool,
-    /// The name of a vehicle.
+    /// Function that returns the name of a vehicle.
     pub(super) name: N,
 }
 
-/// What is said of the nearest so far, no more than so often (at least twice), of as many slices as leave room for that. In a slice
-/// in which it came to less, that is what it was at most.
+/// Returns the statements on the closest pair so far, at most `most` (at least two). Slices are merged until they fit.
+/// Within a slice with a new minimum, the statement gives an upper bound.
 pub(super) fn so_far<N: Fn(usize) -> Option<String>>(
     slices: &Slices,
     words: &Words<'_, N>,
@@ -55,7 +55,7 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
             if let Some(before) = least {
                 say(*from_s, self.at_most(&before));
             }
-            // What comes later is of a later slice.
+            // A later minimum belongs to a later slice.
             if closest.time_s > *to_s {
                 continue;
             }
@@ -66,7 +66,7 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
     }
 
     fn begin(&self) -> &'static str {
-        if self.has_gaps { "nearest known so far" } else { "nearest so far" }
+        if self.has_gaps { "closest known so far" } else { "closest so far" }
     }
 
     fn so_far(&self, of: &Approach) -> String {
@@ -85,7 +85,8 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
     }
 }
 
-/// From when \[s\] on which two are the nearest, as doubles and as two 16-bit places each; 65535 is a vehicle that is not drawn.
+/// Returns the times \[s\] from which a pair is the closest, as doubles, and the pairs, as two 16-bit indices each;
+/// 65535 is a vehicle that is not drawn.
 pub(super) fn pairs(slices: &[Slice], end_s: f64, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
     let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);
@@ -98,10 +99,10 @@ pub(super) fn pairs(slices: &[Slice], end_s: f64, place: impl Fn(usize) -> Optio
     [doubles(from_s.into_iter()), base64_of(who.iter().flatten().flat_map(|at| at.to_le_bytes()))]
 }
 
-/// From when on \[s\], whether there is a violation, what is said, and the place of the violation under way that it is said of.
+/// Start \[s\], whether a violation is present, the statement, and the index of the violation that it names.
 pub(super) type VerdictStatement = (f64, bool, String, Option<usize>);
 
-/// What is under way, by place in the list of moments, and what has begun.
+/// Indices of the present findings, and counts of those that have begun.
 #[derive(Default)]
 struct State<'a> {
     violations: BTreeSet<usize>,
@@ -111,9 +112,9 @@ struct State<'a> {
     is_else_known: bool,
 }
 
-/// What is said from the beginning on, no more than so often (at least once), of moments of which the weightiest come first.
+/// Returns the statements from `begin_s` on, at most `most` (at least one). `moments` are in order of gravity.
 pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, most: usize) -> Vec<VerdictStatement> {
-    // When each begins, and from when on it is over.
+    // Start of each finding, and the time from which it is over.
     let mut events: Vec<(f64, bool, usize)> = Vec::new();
     for (k, of) in moments.iter().enumerate().filter(|(_, of)| of.kind != Kind::Closest) {
         events.extend([(of.span.from_s.max(begin_s), true, k), (of.span.to_s.max(begin_s).next_up(), false, k)]);
@@ -123,7 +124,7 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
     let mut groups: Vec<_> = events.chunk_by(|a, b| a.0 == b.0).collect();
     let mut statements = Vec::new();
     if groups.first().is_none_or(|first| first[0].0 > begin_s) {
-        statements.push((begin_s, false, state.said(), None));
+        statements.push((begin_s, false, state.statement(), None));
     }
     let together = groups.len().div_ceil(most.max(1)).max(1);
     while !groups.is_empty() {
@@ -135,9 +136,9 @@ pub(super) fn over_time(moments: &[Moment], is_else_known: bool, begin_s: f64, m
             state.take(group, &mut seen);
         }
         statements.push(match end_s.filter(|_| together > 1) {
-            Some(end_s) => state.said_of_several(&seen, from_s, end_s),
-            None if together > 1 => state.said_of_several(&seen, from_s, f64::INFINITY),
-            None => (from_s, !state.violations.is_empty(), state.said(), state.violations.first().copied()),
+            Some(end_s) => state.merged_statement(&seen, from_s, end_s),
+            None if together > 1 => state.merged_statement(&seen, from_s, f64::INFINITY),
+            None => (from_s, !state.violations.is_empty(), state.statement(), state.violations.first().copied()),
         });
         groups = rest;
     }
@@ -159,7 +160,7 @@ impl State<'_> {
         }
     }
 
-    fn said(&self) -> String {
+    fn statement(&self) -> String {
         let begun = match self.begun[0] {
             0 => String::new(),
             1 => "1 violation so far".to_owned(),
@@ -172,13 +173,13 @@ impl State<'_> {
             (None, Some(doubt)) => format!("{begun}; undecided: {doubt}"),
             (None, None) if begun.is_empty() && open => "undecided so far".to_owned(),
             (None, None) if begun.is_empty() => "no violation so far".to_owned(),
-            (None, None) if open => format!("{begun}, not all is known"),
+            (None, None) if open => format!("{begun}, some times undecided"),
             (None, None) => begun,
         }
     }
 
-    /// Of a time in which more changes than can be said one by one.
-    fn said_of_several(
+    /// Returns the statement on an interval with more changes than statements.
+    fn merged_statement(
         &self,
         [violations, undecided]: &[BTreeSet<usize>; 2],
         from_s: f64,
@@ -189,11 +190,11 @@ impl State<'_> {
         match (self.first_of(violations), self.first_of(undecided)) {
             (Some(violation), _) => (from_s, true, format!("violation {around}: {violation}"), None),
             (None, Some(doubt)) => (from_s, false, format!("undecided {around}: {doubt}"), None),
-            (None, None) => (from_s, false, self.said(), None),
+            (None, None) => (from_s, false, self.statement(), None),
         }
     }
 
-    /// The weightiest of some in short, and how many others there are.
+    /// Returns the gravest of some findings in brief, and the number of the others.
     fn first_of(&self, some: &BTreeSet<usize>) -> Option<String> {
         let first = &self.moments[*some.first()?].brief;
         Some(if some.len() > 1 { format!("{first}, and {} more", some.len() - 1) } else { first.clone() })
@@ -218,37 +219,37 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_of_a_slice_that_has_not_ended_but_what_it_was_at_most() {
+    fn open_slices_give_an_upper_bound() {
         let slices = [[4.0; 2], [2.0; 2], [3.0; 2], [1.0; 2]];
         let slices: Vec<_> = slices.into_iter().zip(0..).map(|(of, k)| slice(f64::from(k), of)).collect();
-        let so_far = |metres: &str| format!("nearest so far {metres} m, 1 and 2");
+        let so_far = |metres: &str| format!("closest so far {metres} m, 1 and 2");
         let expected = [
-            (1.0, "nearest so far at most 4.000 m".to_owned()),
+            (1.0, "closest so far at most 4.000 m".to_owned()),
             (2.0, so_far("2.000")),
-            (3.0, "nearest so far at most 2.000 m".to_owned()),
+            (3.0, "closest so far at most 2.000 m".to_owned()),
             (4.0, so_far("1.000")),
         ];
         assert_eq!(nearest_said(&slices, false), expected);
-        assert_eq!(nearest_said(&slices[..1], true), [(1.0, "nearest known so far 4.000 m, 1 and 2".to_owned())]);
+        assert_eq!(nearest_said(&slices[..1], true), [(1.0, "closest known so far 4.000 m, 1 and 2".to_owned())]);
     }
 
     #[test]
-    fn a_bound_is_said_as_one() {
+    fn lower_bounds_are_marked() {
         let found = nearest_said(&[slice(0.0, [0.0, 6.0]), slice(1.0, [0.0, 0.0])], false);
-        assert_eq!(found, [(1.0, "nearest so far at least 0.000 m, 1 and 2".to_owned())]);
+        assert_eq!(found, [(1.0, "closest so far at least 0.000 m, 1 and 2".to_owned())]);
         let found = nearest_said(&[slice(0.0, [2.0, f64::INFINITY]), slice(1.0, [1.0, 3.0])], false);
-        let expected = [(1.0, String::new()), (2.0, "nearest so far at least 1.000 m, 1 and 2".to_owned())];
+        let expected = [(1.0, String::new()), (2.0, "closest so far at least 1.000 m, 1 and 2".to_owned())];
         assert_eq!(found, expected);
     }
 
     #[test]
-    fn however_often_it_falls_no_more_is_said_than_there_is_room_for() {
+    fn number_of_statements_is_bounded() {
         let mut slices = Slices::new(5000);
         (0..4000).map(f64::from).for_each(|k| slices.take(slice(k, [5000.0 - k; 2])));
         let words = Words { unit: "m", has_gaps: false, name: |_| None };
         let said = so_far(&slices, &words, 40);
         assert!(said.len() <= 40 && said.len() > 24, "{}", said.len());
-        assert_eq!(said.last(), Some(&(4000.0, "nearest so far 1001.000 m".to_owned())));
+        assert_eq!(said.last(), Some(&(4000.0, "closest so far 1001.000 m".to_owned())));
     }
 
     fn moment(kind: Kind, from_s: f64, to_s: f64, brief: &str) -> Moment {
@@ -262,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_violation_is_said_while_it_lasts_and_counted_after_it() {
+    fn violations_are_named_while_they_last_and_counted_later() {
         let deep = moment(Kind::Violation, 3.0, 5.0, "a and b");
         let moments = [deep, moment(Kind::Violation, 4.0, 4.0, "c and d"), moment(Kind::Closest, 4.0, 4.0, "e")];
         let statements = over_time(&moments, true, 0.0, 100);
@@ -279,14 +280,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_said_and_never_that_there_was_no_violation() {
+    fn undecided_times_never_read_as_no_violation() {
         let moments = [moment(Kind::Violation, 14.0, 15.0, "a and c"), moment(Kind::Unseen, 3.0, 8.0, "b is not seen")];
         let statements = over_time(&moments, true, 0.0, 100);
         assert_eq!(said(&statements, 2.9), (false, "no violation so far"));
         assert_eq!(said(&statements, 5.0), (false, "undecided: b is not seen"));
         assert_eq!(said(&statements, 10.0), (false, "undecided so far"));
         assert_eq!(said(&statements, 14.5), (true, "violation: a and c"));
-        assert_eq!(said(&statements, 16.0), (false, "1 violation so far, not all is known"));
+        assert_eq!(said(&statements, 16.0), (false, "1 violation so far, some times undecided"));
         assert_eq!(said(&over_time(&moments[..1], false, 0.0, 100), 0.0), (false, "undecided so far"));
         let last = moment(Kind::Undecided, 20.0, 21.0, "too near?");
         let statements = over_time(&[moments[0].clone(), last], true, 0.0, 100);
@@ -294,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn of_more_than_there_is_room_for_no_time_is_said_to_be_free_of_one_that_has_it() {
+    fn merged_statements_never_hide_a_violation() {
         let moments: Vec<_> =
             (0..1000).map(f64::from).map(|k| moment(Kind::Violation, 2.0 * k, 2.0 * k + 0.5, "a and b")).collect();
         let statements = over_time(&moments, true, 0.0, 50);

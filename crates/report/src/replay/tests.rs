@@ -1,4 +1,4 @@
-//! What a page holds of a flight: its limits, and what is never lost.
+//! Tests of the data of a replay: bounds of size, and findings that are always kept.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -24,7 +24,7 @@ fn stage(vehicles: usize) -> Stage {
     }
 }
 
-/// Vehicles on a line, 2 m apart, that fly 1 m/s, at 10 Hz.
+/// Returns a log of vehicles on a line, 2 m apart, at 1 m/s, sampled at 10 Hz.
 fn log(vehicles: usize, samples: usize) -> FlightLog {
     let mut log = FlightLog::default().within(usize::MAX);
     for k in 0..samples {
@@ -67,14 +67,14 @@ fn doubles(data: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn a_short_flight_is_there_whole() {
+fn keeps_a_short_flight_completely() {
     let (replay, data) = packed(&stage(3), &log(3, 100), &[violation(2, 3.0, 4.0)], PAGE_BYTES);
     assert_eq!((replay.instants, replay.vehicles, replay.moments), ([100, 100], [3, 3], [1, 1]));
     let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
     assert_eq!(doubles(&data["times_s"]), times);
-    // The first slice is the first instant alone.
+    // The first slice is the first instant.
     assert_eq!(doubles(&data["near_s"]), [&[0.0, 0.0][..], &times[1..99]].concat());
-    assert_eq!(data["nearest"], serde_json::json!([[0.0, "nearest so far 2.000 m, 1 and 2"]]));
+    assert_eq!(data["nearest"], serde_json::json!([[0.0, "closest so far 2.000 m, 1 and 2"]]));
     let verdicts = data["verdicts"].as_array().expect("verdicts");
     let said: Vec<_> = verdicts.iter().map(|told| (&told[1], told[2].as_str().expect("words"))).collect();
     assert_eq!(
@@ -92,7 +92,7 @@ fn a_short_flight_is_there_whole() {
 }
 
 #[test]
-fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
+fn thins_long_flights_and_keeps_samples_of_violations() {
     let log = log(5, 40_000);
     for room_bytes in [PAGE_BYTES, 60_000, 30_000] {
         let (replay, data) = packed(&stage(5), &log, &[violation(3, 1234.5, 1236.0)], room_bytes);
@@ -109,19 +109,19 @@ fn what_does_not_fit_is_thinned_and_every_sample_of_a_violation_stays() {
 }
 
 #[test]
-fn of_a_hundred_thousand_vehicles_those_that_matter_are_drawn() {
+fn draws_the_vehicles_of_findings_among_a_hundred_thousand() {
     let vehicles = 100_000;
     let (replay, data) = packed(&stage(vehicles), &log(vehicles, 3), &[violation(77_777, 0.1, 0.1)], PAGE_BYTES);
     assert_eq!(replay.vehicles, [MOST_VEHICLES, vehicles]);
     let names = data["vehicles"].as_array().expect("names");
-    let at = names.iter().position(|name| name == "77778").expect("the one that violated");
+    let at = names.iter().position(|name| name == "77778").expect("the vehicle of the violation");
     assert_eq!(data["moments"][0]["who"], serde_json::json!([at]));
-    // The first of the two nearest is drawn, too; the second is among those left out.
+    // Vehicle 1 of the closest pair is drawn too; vehicle 2 is omitted.
     assert!(names.iter().any(|name| name == "1") && names.iter().all(|name| name != "2"));
 }
 
 #[test]
-fn one_vehicle_one_sample_and_nobody() {
+fn handles_one_vehicle_one_sample_and_no_vehicle() {
     let (replay, data) = packed(&stage(1), &log(1, 1), &[], PAGE_BYTES);
     assert_eq!((replay.instants, doubles(&data["near_s"]).len()), ([1, 1], 0));
     assert_eq!(Replay::new(&stage(2), &FlightLog::default(), &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
@@ -129,11 +129,11 @@ fn one_vehicle_one_sample_and_nobody() {
     assert_eq!(Replay::new(&stage(2), &nowhere, &[], JUDGED, PAGE_BYTES), Err(NoReplay::Empty));
     let far = FlightLog::recorded(vec![0.5], vec![Rows::repeat(1, 2e9)], Slices::default(), 1);
     let refused = Replay::new(&stage(1), &far, &[], JUDGED, PAGE_BYTES).expect_err("too far");
-    assert_eq!(refused.to_string(), "vehicle 1 is beyond 1e9 m at 0.5 s");
+    assert_eq!(refused.to_string(), "vehicle 1 is farther than 1e9 m from the origin at 0.5 s");
 }
 
 #[test]
-fn who_is_not_there_for_a_time_is_not_packed() {
+fn absent_vehicles_are_not_packed() {
     let at = |x: f64| Rows::from_row_slice(&[x, 0.0, 0.0, x, 5.0, 0.0]);
     let mut gone = at(1.0);
     gone.row_mut(1).fill(f64::NAN);
@@ -142,11 +142,11 @@ fn who_is_not_there_for_a_time_is_not_packed() {
     let steps = BASE64.decode(data["steps"].as_str().expect("base64")).expect("base64");
     let along_x: Vec<_> = steps.chunks_exact(6).map(|step| i16::from_le_bytes([step[0], step[1]])).collect();
     assert_eq!(along_x.iter().map(|&x| x == i16::MIN).collect::<Vec<_>>(), [false, false, false, true, false, false]);
-    assert_eq!(i32::from(along_x[5]), 2 * i32::from(along_x[2]), "from where it was last seen");
+    assert_eq!(i32::from(along_x[5]), 2 * i32::from(along_x[2]), "relative to its last position");
 }
 
 #[test]
-fn foreign_text_neither_ends_the_script_nor_fills_the_page() {
+fn foreign_text_is_escaped_and_cut() {
     let mut hostile = stage(2);
     hostile.vehicles = vec!["</script><script>alert(1)</script>".to_owned(), "ü".repeat(5_000_000)];
     hostile.obstacles = vec![Obstacle {
@@ -164,10 +164,10 @@ fn foreign_text_neither_ends_the_script_nor_fills_the_page() {
 }
 
 #[test]
-fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
+fn packs_slots_links_and_reference() {
     let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
     let mut log = FlightLog::default();
-    // Every vehicle in its slot, turned by a quarter and moved.
+    // Every vehicle is in its slot, with the formation turned by a quarter and moved.
     let slots_m = &scenario.legs[0].formation.slots_m;
     let turned = Rows::from_fn(slots_m.nrows(), |i, axis| match axis {
         0 => 3.0 - slots_m[(i, 1)],
@@ -199,7 +199,7 @@ fn slots_links_and_reference_of_a_scenario_go_with_the_flight() {
     }
 }
 
-/// Two instants of vehicles on a line, 2 m apart.
+/// Returns a log of two instants of vehicles on a line, 2 m apart.
 fn two_instants(vehicles: usize) -> FlightLog {
     let at = |x: f64| Rows::from_fn(vehicles, |i, axis| if axis == 0 { x + 2.0 * i as f64 } else { 0.0 });
     FlightLog::recorded(vec![0.0, 10.0], vec![at(0.0), at(1.0)], Slices::default(), 2)
@@ -211,13 +211,13 @@ fn with_gaps(mut log: FlightLog, gaps: Vec<(usize, [f64; 2])>) -> FlightLog {
 }
 
 #[test]
-fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
+fn absence_between_two_kept_instants_breaks_the_path() {
     let gaps = vec![(1, [3.0, 5.0]), (1, [6.0, 7.0]), (7, [1.0, 2.0]), (2, [4.0, 11.0])];
     let (_, data) = packed(&stage(3), &with_gaps(two_instants(3), gaps), &[], PAGE_BYTES);
     let bytes = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64");
     assert_eq!(bytes, [1, 0, 1, 0], "at instant 1 vehicle 1");
     assert_eq!(data["holds"], false);
-    // Where there is no room for that, it is not there.
+    // Without room for breaks, the vehicle is absent at the instants.
     let many = (0..200).map(|vehicle| (vehicle, [3.0, 5.0])).collect();
     let (_, data) = packed(&stage(200), &with_gaps(two_instants(200), many), &[], 15_000);
     let breaks = BASE64.decode(data["breaks"].as_str().expect("base64")).expect("base64").len() / 4;
@@ -227,7 +227,7 @@ fn who_was_away_between_two_instants_that_are_kept_does_not_fly_across() {
 }
 
 #[test]
-fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
+fn findings_keep_their_instant_or_are_counted_as_inexact() {
     let vehicles = 1000;
     let mut log = FlightLog::default();
     for k in 0..600_u32 {
@@ -239,7 +239,7 @@ fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
     let times = doubles(&data["times_s"]);
     let missing = moments.iter().filter(|of| !times.contains(&of.span.at_s.max(0.0))).count();
     assert_eq!((missing, replay.inexact), (0, 0), "{:?} and {:?}", replay.instants, replay.vehicles);
-    // Those that are not listed have theirs as long as there is room, and where there is none it is said.
+    // Findings beyond the list keep their instants while there is room; otherwise they count as inexact.
     let at = |k: u32| 0.2 * f64::from(k);
     let moments: Vec<_> = (0..300).map(|k| violation(0, at(k), at(k))).collect();
     let longer = self::log(2, 4000);
@@ -247,13 +247,13 @@ fn each_of_many_findings_has_its_instant_and_what_has_none_is_counted() {
     assert_eq!((replay.moments, replay.inexact), ([200, 300], 0), "{:?}", replay.instants);
     let alarms = data["verdicts"].as_array().expect("verdicts").iter().filter(|told| told[1] == true);
     let named: Vec<_> = alarms.map(|told| told[3].as_array().map_or(0, Vec::len)).collect();
-    assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "those that are not listed are said with who they are");
+    assert_eq!(named, [vec![0; 200], vec![1; 100]].concat(), "unlisted findings name their vehicles");
     let (replay, _) = packed(&stage(2), &longer, &moments, 36_000);
     assert!(replay.inexact > 0, "{:?}", replay.instants);
 }
 
 #[test]
-fn of_those_that_were_not_asked_for_nobody_is_drawn() {
+fn unselected_vehicles_are_not_drawn() {
     let mut at = Rows::repeat(5000, f64::NAN);
     for k in [7, 4321] {
         set_row(&mut at, k, Vector3::zeros());
@@ -264,18 +264,18 @@ fn of_those_that_were_not_asked_for_nobody_is_drawn() {
 }
 
 #[test]
-fn far_from_others_drawing_is_precise_where_the_weightiest_finding_is() {
+fn drawing_is_most_precise_at_the_gravest_finding() {
     let at = |x: f64| Rows::from_row_slice(&[5e5 + x, 4e6, 0.0, 5e5, 4e6, 0.0, 0.0, 0.0, 0.0]);
     let log = FlightLog::recorded(vec![0.0, 1.0], vec![at(1.0), at(0.35)], Slices::default(), 2);
     let (replay, data) = packed(&stage(3), &log, &[violation(0, 1.0, 1.0)], PAGE_BYTES);
     let numbers = |key: &str| serde_json::from_value::<Vec<f64>>(data[key].clone()).expect("numbers");
     assert_eq!(numbers("origin_m"), [5e5 + 0.35, 4e6, 0.0]);
-    assert!(replay.rounding_m > 0.2, "what is far away is rounded to single precision: {}", replay.rounding_m);
+    assert!(replay.rounding_m > 0.2, "far positions are rounded to single precision: {}", replay.rounding_m);
     assert!(packed(&stage(2), &two_instants(2), &[], PAGE_BYTES).0.rounding_m < 1e-3);
 }
 
 #[test]
-fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
+fn unknown_radii_are_assumed_and_reported() {
     let unknown = |half_m: f64| Stage { radius_m: vec![None, Some(0.3)], shell_m: Some([half_m; 3]), ..stage(2) };
     for (half_m, drawn_m) in [(0.025, 0.025), (1.0, 0.1)] {
         let (replay, data) = packed(&unknown(half_m), &two_instants(2), &[], PAGE_BYTES);
@@ -285,7 +285,7 @@ fn a_size_that_nobody_knows_is_made_up_so_that_nobody_touches_and_it_is_said() {
 }
 
 #[test]
-fn findings_lie_within_the_flight_and_the_nearest_stops_at_a_gap() {
+fn findings_are_cut_to_the_flight_and_gaps_end_the_closest_pair() {
     let pair = ObjectPair::Vehicles(Pair::new(0, 1));
     let slice = |from_s: f64, to_s: f64| {
         let closest = Approach { pair, lower_m: 2.0, upper_m: 2.0, time_s: from_s, limit_m: 1.0 };

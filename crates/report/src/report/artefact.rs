@@ -1,7 +1,7 @@
-//! Files that are written whole or not at all.
+//! Atomic writes of files.
 //!
-//! `tempfile` would spare five lines, the temporary name and its removal, and cost a cold build 5 core-seconds: links,
-//! pipes and the way to the disk are settled here in any case.
+//! The crate `tempfile` would replace five lines here, the temporary name and its removal, and cost 5 core-seconds of a
+//! cold build. Links, pipes and the sync to the disk need the code of this module in any case.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -9,16 +9,16 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Files that this process began to write: a part of their names until they are whole.
+/// Number of files that this process began to write. It is part of their temporary names.
 static WRITTEN: AtomicU64 = AtomicU64::new(0);
 
-/// A file could not be written.
+/// Error of a file that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}")]
 pub struct ArtefactError {
-    /// The file.
+    /// Path of the file.
     pub path: String,
-    /// What the system said.
+    /// Error of the operating system.
     pub source: io::Error,
 }
 
@@ -28,10 +28,12 @@ impl ArtefactError {
     }
 }
 
-/// Writes a file so that nobody ever sees a part of it: the bytes go to a temporary name in the same folder, down to the
-/// disk, and the file is then renamed over `path`. An error leaves `path` as it was and no temporary file behind.
+/// Writes a file as a whole: the bytes go to a temporary file in the same folder, are synced to the disk, and the file
+/// is then renamed to `path`. A reader never sees a part of the file. An error leaves `path` unchanged and no temporary
+/// file behind.
 ///
-/// A link stays one: what it leads to is replaced. What is no file, such as a pipe or a device, is written into.
+/// The target of a symbolic link is replaced, and the link stays. A path that is not a regular file, such as a pipe or
+/// a device, is written into directly.
 ///
 /// # Errors
 /// [`ArtefactError`] when the system refuses.
@@ -39,7 +41,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> 
     write_atomically_with(path, |file| file.write_all(bytes).map_err(|source| ArtefactError::new(path, source)))
 }
 
-/// Like [`write_atomically`] for what is written piece by piece.
+/// Writes a file like [`write_atomically`], piece by piece.
 ///
 /// # Errors
 /// The error of `write`, or [`ArtefactError`] when the system refuses.
@@ -52,10 +54,10 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
         return write(&mut File::options().write(true).open(path).map_err(error)?);
     }
     let target = behind_links(path);
-    let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "it names no file"));
+    let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
     let mut temporary = OsString::from(".");
     temporary.push(target.file_name().ok_or_else(no_name)?);
-    // Two processes, or threads, may write the same file; the later one wins, whole.
+    // Two processes or threads may write the same file; the later one wins, as a whole.
     let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
     temporary.push(format!(".{}.{number}.partial", std::process::id()));
     let temporary = target.with_file_name(temporary);
@@ -66,12 +68,12 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
     });
     let renamed = written.and_then(|written| fs::rename(&temporary, &target).map(|()| written).map_err(error));
     renamed.inspect_err(|_| {
-        // The first error is the one to report.
+        // The first error is reported; an error of the removal is ignored.
         let _ = fs::remove_file(&temporary);
     })
 }
 
-/// The file that a path leads to, also where it is yet to be made.
+/// Returns the file that a path leads to through symbolic links, whether or not it exists.
 fn behind_links(path: &Path) -> PathBuf {
     match fs::read_link(path) {
         Ok(next) => fs::canonicalize(path).unwrap_or_else(|_| path.with_file_name(next)),
@@ -89,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_as_a_whole_and_nothing_else_is_left() {
+    fn replaces_the_whole_file_and_leaves_no_other() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("report.json");
         write_atomically(&path, b"the first, longer one").expect("writes");
@@ -99,10 +101,10 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_leaves_the_file_as_it_was_and_names_it() {
+    fn error_leaves_the_file_unchanged_and_names_it() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("report.json");
-        // A folder of that name with something in it cannot be replaced by a file.
+        // A folder that is not empty cannot be replaced by a file.
         fs::create_dir(&path).expect("a folder");
         fs::write(path.join("inside"), b"kept").expect("writes");
         let error = write_atomically(&path, b"new").expect_err("refused");
@@ -112,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_does_not_exist_and_a_path_without_a_name_are_errors() {
+    fn rejects_missing_folders_and_paths_without_a_name() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(write_atomically(&folder.path().join("missing/report.json"), b"").is_err());
         assert!(write_atomically(Path::new("/"), b"").is_err());
@@ -121,7 +123,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_stays_a_link_and_what_is_no_file_is_written_into() {
+    fn keeps_links_and_writes_into_pipes() {
         use std::io::Read as _;
         use std::os::unix::{fs::FileTypeExt as _, fs::symlink};
 
@@ -137,7 +139,7 @@ mod tests {
             assert_eq!(fs::read(at(target)).expect("reads"), b"new");
         }
         assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().expect("runs").success());
-        // Opened for both, so that neither end waits for the other.
+        // Opened for reading and writing, so that neither end blocks.
         let mut pipe = File::options().read(true).write(true).open(at("pipe")).expect("a pipe");
         write_atomically(&at("pipe"), b"through").expect("writes");
         let mut through = [0; 7];

@@ -1,4 +1,4 @@
-//! `report.json`.
+//! Content of `report.json` and its construction from a flight.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
-use super::verdict::{Fails, Verdict, at_rest, rises};
+use super::verdict::{Fails, Verdict, at_rest, energy_rises};
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
@@ -19,67 +19,68 @@ use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{Failure, FailureKind, Scenario};
 use tautline_sim::sim::{Breakdown, Ending, Flight};
 
-/// Version of the keys: raised when one is renamed, removed or changes its meaning.
+/// Version of the keys. It increases when a key is renamed or removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// The content of `report.json`.
+/// Content of `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// What was flown.
+    /// Scenario of the flight.
     pub scenario: ScenarioIdentity,
-    /// What flew it.
+    /// Program that flew the scenario.
     pub tool: Tool,
-    /// The judgement.
+    /// Verdict on the flight.
     pub verdict: Verdict,
-    /// How close vehicles came.
+    /// Smallest separation and certificate.
     pub separation: Separation,
-    /// What the judgement rests on.
+    /// Findings of the audit.
     pub audit: Audit,
-    /// What was asked of bodies that turn.
+    /// Extremes of tilt and thrust of quadrotors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<VehicleNumbers>,
-    /// What became of messages, where they were sent one by one.
+    /// Statistics of the network, if messages are sent one by one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network: Option<Traffic>,
-    /// Vehicles of which a part failed, in the scenario's order.
+    /// Vehicles with a failed part, in the order of the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<FailedVehicle>,
-    /// How vehicles kept clear of obstacles, where there are any.
+    /// Findings on obstacles, if the scenario has any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<Obstacles>,
-    /// What solid hulls did, or would have done.
+    /// Collisions of hulls, or pairs of points whose hulls would have collided.
     #[serde(default)]
     pub hulls: Hulls,
-    /// How near the formation of the last leg that began was at the end.
+    /// Errors of the formation at the end, for the last leg that began.
     pub formation: FormationNumbers,
-    /// Each leg of a flight of several, in their order.
+    /// Legs in their order, if the scenario has several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegNumbers>,
-    /// Every time that slots were spread to let vehicles past each other.
+    /// Times at which the slots were spread to let vehicles pass each other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub deadlock_recoveries: Vec<DeadlockRecovery>,
     /// Every time that interchangeable vehicles were given other slots.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assignments: Vec<Reassignment>,
-    /// The law's energy.
+    /// Energy of the law.
     pub energy: Energy,
     /// Commanded accelerations.
     pub control: Control,
     /// Velocities at the end.
     pub velocity: Velocity,
-    /// Facts of the run.
+    /// Duration, steps and hash of the run.
     pub run: Run,
-    /// What flying again at half the step changed, where that was asked for.
+    /// Result of the second flight at half the step, if the request asks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
-    /// Wall-clock times, the only part that differs between two runs of one scenario; left out where a campaign flies a run again.
+    /// Wall-clock times, the only part that differs between two runs of one scenario. Absent if a campaign repeats a
+    /// run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub performance: Option<Performance>,
 }
 
-/// Which scenario it was.
+/// Identity of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScenarioIdentity {
     /// Name of the scenario.
@@ -88,7 +89,7 @@ pub struct ScenarioIdentity {
     pub sha256: String,
 }
 
-/// Which program it was.
+/// Identity of the program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tool {
     /// Name of the program.
@@ -97,31 +98,32 @@ pub struct Tool {
     pub version: String,
 }
 
-/// How close vehicles came.
+/// Smallest separation of two vehicles, and the certificate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Separation<Delta = f64> {
-    /// Safety distance delta \[m\]; of a recording, none where radii alone were asked about.
+    /// Safety distance delta \[m\]; `None` for a recording that is judged by radii alone.
     pub delta_m: Delta,
-    /// Smallest distance of two centres over the whole run \[m\].
+    /// Smallest separation of any pair over the flight \[m\].
     pub min_m: Option<f64>,
-    /// When it occurred \[s\].
+    /// Time of `min_m` \[s\].
     pub min_at_s: Option<f64>,
-    /// Which pair.
+    /// The two vehicles, numbered from 1.
     pub min_pair: Option<[usize; 2]>,
-    /// Distance that the law's certificate promised before the first step, and anew wherever slots were spread \[m\].
+    /// Separation that the law certified before the first step, or after slots were spread if that is smaller \[m\].
     pub certified_m: Option<f64>,
-    /// Up to when it is promised \[s\]; null where it holds for ever, or nothing is promised.
+    /// Time up to which `certified_m` holds \[s\]; null if it has no end or nothing is certified.
     #[serde(default)]
     pub certified_until_s: Option<f64>,
-    /// Why the certificate is void, a sentence each; empty where it holds.
+    /// Reasons why nothing is certified, a sentence each.
     pub certificate_void: Vec<String>,
-    /// Where an ellipsoid must stay empty around each vehicle: distances above, and in the audit, are scaled lengths then.
+    /// Ellipsoid that must stay empty around each vehicle. The distances above and in the audit are then scaled
+    /// lengths.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ellipsoid: Option<Ellipsoid>,
 }
 
 impl<Delta> Separation<Delta> {
-    /// The closest approach of two vehicles over the whole run.
+    /// Returns the closest approach of two vehicles over the flight.
     #[must_use]
     pub fn closest(&self) -> Option<ClosestApproach> {
         let (separation_m, time_s, [first, second]) = (self.min_m?, self.min_at_s?, self.min_pair?);
@@ -129,103 +131,102 @@ impl<Delta> Separation<Delta> {
         (first != second).then(|| ClosestApproach { pair: Pair::new(first, second), separation_m, time_s })
     }
 
-    /// Whether what was promised was promised of the time at which two came closest.
+    /// Returns whether the certificate covers the time of the closest approach.
     pub(super) fn is_promised(&self) -> bool {
         self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)
     }
 }
 
-/// What the judgement rests on.
+/// Findings of the audit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audit {
-    /// Verdict on separation, and on obstacles where there are any: the worse of the two. Undecided at best where the flight ended
-    /// early.
+    /// Status of separations and obstacles, the worse of the two. At best undecided if the flight ended early.
     pub status: Status,
-    /// Every time that a pair was closer than delta.
+    /// Intervals in which a pair was below delta.
     pub violations: Vec<Violation>,
-    /// Times at which it cannot be told of two vehicles, whatever else there was.
+    /// Number of undecided times of pairs, counted beside violations too.
     pub undecided: u64,
     /// Steps swept.
     pub steps: u64,
     /// Pairs swept, summed over all steps.
     pub pairs_checked: u64,
-    /// The closed-form sweep, which decides.
+    /// Result of the closed-form sweep, which decides.
     pub closed_form: ClosedForm,
-    /// The shape cast, which must agree.
+    /// Result of the shape cast, which must agree.
     pub parry: Parry,
-    /// The engine's own collision detection, which is evidence alone.
+    /// Contacts of the engine's own collision detection, which are evidence only.
     pub rapier: Rapier,
 }
 
-/// A time during which a pair was closer than delta.
+/// An interval in which a pair was below delta.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Violation {
-    /// The pair.
+    /// The two vehicles.
     pub pair: Pair,
-    /// When it began \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// When it ended, or the end of the run \[s\].
+    /// End, or the end of the run \[s\].
     pub to_s: f64,
-    /// Smallest distance within \[m\].
+    /// Smallest separation in the interval \[m\].
     pub min_m: f64,
-    /// When that was \[s\].
+    /// Time of `min_m` \[s\].
     pub min_at_s: f64,
 }
 
 impl Violation {
-    /// Of two vehicles, whichever audit found it.
+    /// Returns the violation of a pair that an audit found.
     pub(super) fn new<P>(pair: Pair, found: &audit::Violation<P>) -> Self {
         let &audit::Violation { from_s, to_s, min_m, min_at_s, .. } = found;
         Self { pair, from_s, to_s, min_m, min_at_s }
     }
 }
 
-/// The closed-form sweep.
+/// Result of the closed-form sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClosedForm {
-    /// Smallest distance of two centres \[m\].
+    /// Smallest separation \[m\].
     pub min_m: Option<f64>,
 }
 
-/// The shape cast.
+/// Result of the shape cast.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parry {
-    /// Earliest contact of two keep-out balls \[s\]; null where there was none.
+    /// Time of the first contact of two keep-out balls \[s\]; null without a contact.
     pub min_toi_s: Option<f64>,
-    /// Casts that contradict the closed form.
+    /// Number of casts that contradict the closed form.
     pub disagreements: u64,
 }
 
-/// The engine's own collision detection.
+/// Contacts of the engine's own collision detection.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rapier {
-    /// Pairs whose keep-out balls it saw overlap at the end of some step; null for a plant without one.
+    /// Number of pairs whose keep-out balls overlapped at the end of a step; null for a plant without an engine.
     pub contact_pairs: Option<u64>,
 }
 
-/// How near the formation was.
+/// Errors of the formation at the end, and its arrival.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FormationNumbers {
-    /// Whether it was reached and kept to the end; never of a flight that ended early.
+    /// Whether the formation was reached and kept to the end. False for a flight that ended early.
     pub reached: bool,
-    /// From when on \[s\].
+    /// Time of arrival \[s\].
     pub reached_at_s: Option<f64>,
-    /// How long everything had been within the limits at the end \[s\]; null where something was not.
+    /// Time over which all errors had stayed within their limits at the end \[s\]; null if an error exceeds its limit.
     pub held_s: Option<f64>,
-    /// The number that keeps the formation from being reached; null where it is.
+    /// Criterion that keeps the formation from being reached; null if it is reached.
     pub fails: Option<Fails>,
-    /// Where it is not reached: whether the vehicles have come to rest elsewhere, relative to each other; null where that
-    /// is not known.
+    /// Whether the vehicles have come to rest elsewhere, relative to each other; null if the formation is reached or
+    /// this is unknown.
     pub at_rest: Option<bool>,
     /// Largest error of a desired distance at the end \[m\].
     pub max_edge_error_m: Option<f64>,
-    /// Root mean square distance from the best-placed formation at the end \[m\].
+    /// Root mean square distance of the vehicles from the best-placed formation at the end \[m\].
     pub rms_position_error_m: Option<f64>,
-    /// Distance of the vehicle that is then farthest from its slot \[m\].
+    /// Largest distance of a vehicle from its slot in the best-placed formation at the end \[m\].
     pub max_position_error_m: Option<f64>,
 }
 
-/// The law's energy \[m^2/s^2\].
+/// Energy of the law \[m^2/s^2\].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// At the start.
@@ -233,17 +234,18 @@ pub struct Energy {
     /// At the end.
     #[serde(rename = "final")]
     pub at_end: Option<f64>,
-    /// Largest over all steps, as a ratio to the initial one.
+    /// Largest energy of any step over the initial energy.
     pub max_over_initial: Option<f64>,
-    /// Largest over all steps, as a ratio to what it was when the target was last changed.
+    /// Largest energy of any step over the energy at the last change of the target.
     #[serde(default)]
     pub max_over_leg_start: Option<f64>,
-    /// Whether it rose above its start, on any leg, by more than integration and rounding explain, where it is proved never to grow.
+    /// Whether the energy rose on any leg by more than integration and rounding explain, although it is proved never to
+    /// grow.
     #[serde(default)]
     pub rose: bool,
 }
 
-/// Commanded accelerations, the largest of any vehicle.
+/// Largest commanded acceleration of any vehicle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Control {
     /// Over all steps \[m/s^2\].
@@ -261,38 +263,38 @@ pub struct Velocity {
     pub common_m_s: Option<f64>,
 }
 
-/// What must stay empty around a vehicle, and how close vehicles came in metres.
+/// Ellipsoid that must stay empty around a vehicle, and the smallest separation in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ellipsoid {
-    /// Its half axes \[m\]: a scaled length is a level one in metres, and a height divided by the third over the first.
+    /// Half axes \[m\]. A scaled length divides heights by the ratio of the third half axis to the first.
     pub half_axes_m: [f64; 3],
-    /// Smallest distance of two centres over the whole run \[m\], unscaled.
+    /// Smallest separation over the flight, unscaled \[m\].
     pub min_distance_m: Option<f64>,
-    /// When it occurred \[s\].
+    /// Time of `min_distance_m` \[s\].
     pub min_distance_at_s: Option<f64>,
-    /// Which pair.
+    /// The two vehicles, numbered from 1.
     pub min_distance_pair: Option<[usize; 2]>,
 }
 
-/// Numbers of quadrotors, over all samples.
+/// Extremes of quadrotors over all samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VehicleNumbers {
-    /// Name of their model.
+    /// Name of the quadrotor model.
     pub model: String,
     /// Largest angle between a vehicle's thrust and the vertical \[deg\].
     pub max_tilt_deg: f64,
-    /// Largest thrust of a rotor over the most that it has.
+    /// Largest thrust of a rotor over its maximum.
     pub thrust_share: f64,
 }
 
-/// A vehicle of which a part failed, for the rest of the flight.
+/// A vehicle with a failed part. The failure lasts to the end of the flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FailedVehicle {
-    /// The vehicle, from 1.
+    /// Number of the vehicle, from 1.
     pub vehicle: u64,
-    /// From when on \[s\].
+    /// Start of the failure \[s\].
     pub at_s: f64,
-    /// What failed, as the scenario names it: `dead`, `rotor`, `silent` or `frozen`.
+    /// Kind of the failure, as in the scenario: `dead`, `rotor`, `silent` or `frozen`.
     pub kind: String,
 }
 
@@ -308,10 +310,10 @@ impl From<&Failure> for FailedVehicle {
     }
 }
 
-/// Why a run ended that its user stopped.
+/// Reason of a run that its user stopped.
 pub const INTERRUPTED: &str = "interrupted";
 
-/// Facts of the run.
+/// Duration, steps and hash of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// Time flown \[s\].
@@ -320,13 +322,14 @@ pub struct Run {
     pub dt_s: f64,
     /// Steps flown.
     pub steps: u64,
-    /// Those of them that were flown in parts, for a law too fast for them or vehicles too near each other.
+    /// Steps that were flown in parts, because the law was too fast for them or vehicles were too close.
     #[serde(default)]
     pub refined_steps: u64,
-    /// Those of which even the shortest part was longer than the law allows: what was flown is not the law's motion.
+    /// Steps whose shortest part was still longer than the law allows. From there on the motion is not that of
+    /// the law.
     #[serde(default)]
     pub overlong_steps: u64,
-    /// Why the run ended before its time, such as [`INTERRUPTED`]; null where it did not.
+    /// Reason why the run ended early, such as [`INTERRUPTED`]; null if it did not.
     pub ended_early: Option<String>,
     /// Number of vehicles N.
     pub vehicles: usize,
@@ -334,12 +337,12 @@ pub struct Run {
     pub state_hash: String,
 }
 
-/// Wall-clock times. Work done side by side counts in each kind.
+/// Wall-clock times. Times of parallel work are added up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Performance {
     /// From first to last step \[s\].
     pub wall_s: f64,
-    /// Time flown over `wall_s`; null where that took no time.
+    /// `duration_s` over `wall_s`; null if `wall_s` is zero.
     pub real_time_factor: Option<f64>,
     /// In the law \[s\].
     pub law_s: f64,
@@ -348,19 +351,19 @@ pub struct Performance {
     pub energy_s: f64,
     /// In the plant \[s\].
     pub physics_s: f64,
-    /// Of that, in the forces, rotors and attitude loops of vehicles that have them \[s\].
+    /// Part of `physics_s` in forces, rotors and attitude loops \[s\].
     #[serde(default)]
     pub airframe_s: f64,
-    /// In the judge \[s\].
+    /// In the audit \[s\].
     pub audit_s: f64,
     /// In the recorders \[s\].
     pub record_s: f64,
 }
 
-/// The same flight with every step half as long, and what that changed.
+/// Result of a second flight with every step half as long.
 ///
-/// What bounces hard off a barrier is chaotic: 10 to 20 of a hundred such flights end elsewhere however fine the step is. A
-/// verdict that two steps agree on is called firm.
+/// A flight that bounces hard off a barrier is chaotic: 10 to 20 of 100 such flights end elsewhere at any step. A
+/// verdict on which both steps agree is called firm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verification {
     /// Longest step of the second flight \[s\].
@@ -371,42 +374,42 @@ pub struct Verification {
     pub min_m: Option<f64>,
     /// When the second flight reached its formation \[s\].
     pub reached_at_s: Option<f64>,
-    /// Whether both flights have the same verdict, and smallest separations that differ by at most 1 % of delta.
+    /// Whether both flights have the same verdict and smallest separations within 1 % of delta.
     pub firm: bool,
 }
 
-/// A flight and everything else that its report is made of.
+/// A flight, with all other inputs of its report.
 #[derive(Clone, Copy, Debug)]
 pub struct FlightResult<'a> {
     /// The scenario.
     pub scenario: &'a Scenario,
-    /// Findings before the first step, under the law that was flown.
+    /// Findings of the check before the first step, under the law that was flown.
     pub preflight: &'a Preflight,
     /// The flight.
     pub flight: &'a Flight,
-    /// Numbers of the samples.
+    /// Statistics of the samples.
     pub summary: &'a Summary,
-    /// Legs that another one followed.
+    /// Legs that ended before the last one.
     pub ended_legs: &'a [LegSummary],
-    /// Strain of bodies that turn.
+    /// Extremes of tilt and thrust, for quadrotors.
     pub strain: Option<Strain>,
     /// [`tautline_core::record::StateHash`] of the recorded states.
     pub state_hash: &'a str,
 }
 
 impl FlightResult<'_> {
-    /// Returns when the last formation was reached \[s\], where it was kept to the end of a flight that was flown to its end.
+    /// Returns the time of the last arrival \[s\] if the formation was kept to the end of a completed flight.
     pub(super) fn reached_at_s(&self) -> Option<f64> {
         self.summary.reached_at_s.filter(|_| self.flight.ending == Ending::Completed)
     }
 
-    /// Whether a disturbance or a body may keep vehicles at rest that are commanded to move.
+    /// Returns whether a disturbance or the airframe may hold vehicles at rest although they are commanded to move.
     pub(super) fn is_disturbed(&self) -> bool {
         !self.scenario.wind.is_still() || !self.scenario.is_exact() || !self.scenario.airframe.is_point()
     }
 
-    /// Whether the energy is proved never to grow: relative velocities are damped in still air, and nothing voids the proof
-    /// but that it certifies no distance.
+    /// Returns whether the energy is proved never to grow: relative velocities are damped in still air, and the
+    /// certificate is void only for reasons that leave the energy bound intact.
     pub(super) fn energy_falls(&self) -> bool {
         let holds = |void: &Void| {
             matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::StepsTooLong | Void::Unresolved)
@@ -416,7 +419,7 @@ impl FlightResult<'_> {
             && self.flight.certificate.void.iter().all(holds)
     }
 
-    /// Why the run ended before its time, with a remedy.
+    /// Returns the reason why the run ended early, with a remedy.
     fn ended_early(&self) -> Option<String> {
         match &self.flight.ending {
             Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
@@ -511,7 +514,7 @@ impl FlightResult<'_> {
 }
 
 impl Report {
-    /// The report on a flight.
+    /// Returns the report on a flight.
     #[must_use]
     pub fn new(result: &FlightResult<'_>) -> Self {
         let FlightResult { scenario, flight, summary, .. } = *result;
@@ -546,7 +549,7 @@ impl Report {
                 at_end: summary.energy_final.and_then(finite),
                 max_over_initial: summary.energy_max_over_initial.and_then(finite),
                 max_over_leg_start: flight.energy_rise.and_then(|rise| finite(rise.to / rise.from)),
-                rose: rises(result),
+                rose: energy_rises(result),
             },
             control: Control {
                 peak_m_s2: finite(summary.peak_control_m_s2),
@@ -564,7 +567,7 @@ impl Report {
         report
     }
 
-    /// The report as indented JSON with a line end.
+    /// Returns the report as indented JSON with a final line break.
     ///
     /// # Errors
     /// None in practice: every key is a string and every value has a JSON form.
@@ -572,17 +575,17 @@ impl Report {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// Writes the report as JSON to `path`: whole, or not at all.
+    /// Writes the report as JSON to `path` atomically.
     ///
     /// # Errors
-    /// [`ArtefactError`] when the system refuses.
+    /// [`ArtefactError`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), ArtefactError> {
         let json = self.to_json().map_err(|error| ArtefactError::new(path, error.into()))?;
         write_atomically(path, json.as_bytes())
     }
 }
 
-/// None for a number that is not finite.
+/// Returns the number if it is finite.
 pub(super) fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|number| number.is_finite())
 }

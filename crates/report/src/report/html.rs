@@ -1,4 +1,4 @@
-//! `report.html`: a run's report for people.
+//! `report.html`: the page of a run.
 
 use maud::{Markup, html};
 
@@ -15,33 +15,33 @@ use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::vehicle::Airframe;
 
-/// Most violations, or hits of hulls, that are listed one by one.
+/// Largest number of violations, and of collisions of hulls, in a list.
 const LISTED: usize = 50;
 
-/// Most bytes of a scenario on a page.
+/// Largest size of the scenario on a page \[bytes\].
 const LONGEST_SCENARIO: usize = 100_000;
 
-/// What a run's page shows beside its report.
+/// Content of the page of a run beside its report.
 #[derive(Clone, Copy, Debug)]
 pub struct RunPage<'a> {
-    /// What was flown.
+    /// Scenario of the flight.
     pub scenario: &'a Scenario,
-    /// Findings before the first step.
+    /// Findings of the check before the first step.
     pub preflight: &'a Preflight,
-    /// The flight itself, or why it cannot be replayed.
+    /// Replay of the flight, or the reason why there is no replay.
     pub replay: &'a Result<Replay, NoReplay>,
-    /// The run as charts.
+    /// Charts of the run.
     pub figures: &'a [Figure],
-    /// The run as it looked.
+    /// Pictures of the run.
     pub pictures: &'a [Picture],
-    /// The command that repeats the run.
+    /// Command that repeats the run.
     pub command: &'a str,
 }
 
 impl Report {
-    /// The report as a self-contained HTML page.
+    /// Returns the report as a self-contained HTML page.
     ///
-    /// Two runs of one scenario give the same bytes but for the last section, on performance.
+    /// Two runs of one scenario give the same bytes except for the last section, the performance.
     #[must_use]
     pub fn to_html(&self, about: &RunPage<'_>) -> String {
         let badge = Badge::judged(self.verdict.pass);
@@ -68,12 +68,12 @@ impl Report {
             [violation.pair.to_string(), from, to, format!("{} m", at_least(violation.min_m, 6)), at]
         };
         let columns = &["Vehicles", "From", "To", "Smallest", "At"];
-        let caption = "times that a pair was closer than delta";
+        let caption = "intervals in which a pair was below delta";
         let violations = Section::table("Violations", caption, columns, self.audit.violations.iter().map(violation));
         let hit = |bounce: &Bounce| {
             [bounce.pair.to_string(), seconds(bounce.time_s), format!("{} m/s", metres(bounce.closing_m_s))]
         };
-        let caption = "after the first hit the motion is not governed by the law";
+        let caption = "after the first collision the motion is not governed by the law";
         let hits = self.hulls.bounces.iter().flatten().map(hit);
         let hits = Section::table("Hulls that hit", caption, &["Vehicles", "At", "Closing speed"], hits);
         let obstacles = self.obstacles.iter().flat_map(Obstacles::sections);
@@ -87,17 +87,18 @@ impl Report {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
         let moved = match scenario.law().map(|law| law.capabilities().controls.freedom()) {
-            Ok(Freedom::Fixed) => "where the reference has carried it",
-            Ok(Freedom::Translation) => "wherever it is",
-            _ => "wherever it is, turned and perhaps mirrored",
+            Ok(Freedom::Fixed) => "where the reference has moved it",
+            Ok(Freedom::Translation) => "at any place",
+            _ => "at any place, turned or mirrored",
         };
         let (time, judge) = (&scenario.time, &scenario.arrival);
         let (plant, command) = plant(scenario);
         let lengths = self.separation.ellipsoid.as_ref().map(|ellipsoid| {
             let [_, _, half_height_m] = ellipsoid.half_axes_m;
             format!(
-                "What must stay empty around a vehicle is an ellipsoid {half_height_m} m high above and below its centre. Distances of \
-                 the audit, certificate and violations are scaled lengths: level as in metres, and upwards divided by {}.",
+                "An ellipsoid around each vehicle must stay empty; it reaches {half_height_m} m above and below the \
+                 centre. Distances of the audit, certificate and violations are scaled lengths: horizontal parts are \
+                 in metres, vertical parts are divided by {}.",
                 short(half_height_m / ellipsoid.half_axes_m[0])
             )
         });
@@ -105,28 +106,29 @@ impl Report {
             certificate,
             plant,
             format!(
-                "Commands are computed {} and {command}. A step longer than {} over the law's fastest rate, or \
-                 that would take more than half of a pair's clearance, is flown in halves, at most {} times halved.",
+                "Commands are computed {} and {command}. A step is halved, at most {} times, if it is longer than {} \
+                 over the law's fastest rate, or if it would use up more than half of a pair's clearance.",
                 time.control_hz.map_or_else(
-                    || format!("once a step of {} ms", short(time.dt_s * 1e3)),
-                    |control_hz| format!("{control_hz} times a second"),
+                    || format!("once per step of {} ms", short(time.dt_s * 1e3)),
+                    |control_hz| format!("{control_hz} times per second"),
                 ),
-                short(time.max_rate_dt),
-                time.max_halvings
+                time.max_halvings,
+                short(time.max_rate_dt)
             ),
-            "The audit sweeps every pair over every whole step, along the straight line between its ends, so nothing passes between samples: the closed form of the \
-             smallest distance decides, in double precision and to 4 units of rounding of the pair's distance, and a shape \
-             cast by parry must agree. The engine's own contacts are evidence alone."
+            "The audit sweeps every pair over every whole step, along the straight line between its ends, so it \
+             covers the time between samples. The closed form of the smallest distance decides, in double precision \
+             and to 4 units of rounding of the pair's distance; a shape cast by parry must agree. The engine's own \
+             contacts are evidence only."
                 .to_owned(),
             format!(
-                "Reached means: no edge is wrong by more than {0} m, every vehicle is within {0} m of its slot in the \
-                 formation, {3}, and none differs from the mean velocity by more than {1} m/s, from \
-                 then on to the end, for at least {2} s.",
+                "Reached means that for at least the last {2} s every edge error is at most {0} m. Every vehicle is \
+                 within {0} m of its slot in the formation, {3}. Every speed relative to the mean velocity is at \
+                 most {1} m/s in that time.",
                 judge.edge_error_m, judge.disagreement_m_s, judge.hold_s, moved
             ),
             format!(
-                "Errors are those of the recorded samples, at most {} a second; the smallest distance, the largest energy and \
-                 the peak control are those of the whole run.",
+                "Errors are taken at the recorded samples, at most {} per second. The smallest separation, the \
+                 largest energy and the peak command cover every step of the run.",
                 short(time.record_hz)
             ),
         ];
@@ -138,15 +140,15 @@ impl Report {
         html! {
             (page::command(page.command))
             p {
-                "The same program gives the same motion to the last bit, on any number of threads: the hash of all recorded \
-                 states is " (self.run.state_hash) "."
+                "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
+                 recorded states is " (self.run.state_hash) "."
             }
             (folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256))
         }
     }
 }
 
-/// The resolved scenario, or so many of its lines as a page has room for.
+/// Returns the resolved scenario, cut to [`LONGEST_SCENARIO`].
 fn folded_scenario(toml: &str, sha256: &str) -> Markup {
     let end = toml.floor_char_boundary(LONGEST_SCENARIO);
     let part = match toml.len() {
@@ -161,55 +163,55 @@ fn folded_scenario(toml: &str, sha256: &str) -> Markup {
     }
 }
 
-/// The model of the vehicles, and the use of a command within a step.
+/// Returns the model of the vehicles, and the use of a command within a step.
 fn plant(scenario: &Scenario) -> (String, &'static str) {
     match (&scenario.airframe, scenario.plant) {
         (Airframe::Unicycle(_), _) => (
-            "The vehicles are unicycles: they go where they look, turn no faster than they can, and never stop. Their way within a \
-             step is an arc in closed form, which the audit takes for straight: they leave it by less than 1e-5 m. Mass and hull \
-             play no part."
+            "The vehicles are unicycles: they move in the direction of their heading, turn at a limited rate, and \
+             never stop. Their path within a step is an arc in closed form. The audit takes its chord, which it \
+             leaves by less than 1e-5 m. Mass and hull have no effect."
                 .to_owned(),
-            "held over it",
+            "held over the step",
         ),
         (Airframe::Quadrotor(quadrotor), PlantSpec::Rapier) => (
             format!(
-                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom that four rotors lift, under \
-                 gravity, with the lag of their motors, drag and an attitude loop at {} Hz; within a step each moves on a straight \
-                 line at constant speed, and hulls that touch push each other. Everything is computed \
-                 in double precision.",
+                "The vehicles are quadrotors ({}): rigid bodies in Rapier with six degrees of freedom and four \
+                 rotors. Gravity, drag, the lag of the motors and an attitude loop at {} Hz are simulated. Within a \
+                 step each moves on a straight line at constant speed, and hulls that touch repel each other. \
+                 Everything is computed in double precision.",
                 quadrotor.model.name,
                 quadrotor.attitude_hz
             ),
-            "held until the next one",
+            "held until the next command",
         ),
         (Airframe::Point, PlantSpec::Rapier) => (
-            "The vehicles are rigid bodies in Rapier without rotation; within a step each moves on a straight line \
-             at constant speed. Commands are accelerations, so mass changes nothing, and neither do hulls, until a pair is \
-             so close that they touch. Everything is computed in double precision."
+            "The vehicles are rigid bodies in Rapier without rotation. Within a step each moves on a straight line \
+             at constant speed. Commands are accelerations, so the mass has no effect. Hulls have none until a pair \
+             touches. Everything is computed in double precision."
                 .to_owned(),
-            "held over it",
+            "held over the step",
         ),
         (Airframe::Quadrotor(quadrotor), PlantSpec::Ideal) => (
             format!(
-                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an integrator of 8th \
-                 order in double precision (64 bits); hulls play no part, and there is no engine to see contacts. The audit takes \
-                 them to move on straight lines within a step.",
+                "The vehicles are quadrotors ({}) whose equations of motion are solved in continuous time by an \
+                 integrator of 8th order in double precision (64 bits). Hulls have no effect, and no engine reports \
+                 contacts. The audit assumes straight lines within a step.",
                 quadrotor.model.name
             ),
-            "held until the next one",
+            "held until the next command",
         ),
         (Airframe::Point, PlantSpec::Ideal) => (
             "The vehicles are points that follow the equation of motion, solved in continuous time by an integrator of \
-             8th order in double precision (64 bits); mass and hull play no part, and there is no engine to see \
-             contacts. The audit takes them to move on straight lines within a step."
+             8th order in double precision (64 bits). Mass and hull have no effect, and no engine reports \
+             contacts. The audit assumes straight lines within a step."
                 .to_owned(),
             "recorded; the motion between follows the law in continuous time",
         ),
     }
 }
 
-/// A number with six significant digits at most, without zeros at its end; very small and very large ones in powers of
-/// ten.
+/// Formats a number with at most six significant digits and no trailing zeros; very small and very large numbers as
+/// powers of ten.
 fn short(number: f64) -> String {
     if number == 0.0 {
         return "0".to_owned();

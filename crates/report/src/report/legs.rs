@@ -1,4 +1,4 @@
-//! The legs of a flight, one after the other.
+//! Legs of a flight with several formations.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,25 +6,25 @@ use super::flight::{FlightResult, finite};
 use tautline_core::text::{at_least, seconds};
 use tautline_sim::metrics::LegSummary;
 
-/// One formation of several that were flown to.
+/// Numbers of a leg, the flight to one of several formations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LegNumbers {
-    /// Its number, from 1.
+    /// Number of the leg, from 1.
     pub leg: usize,
-    /// When it began \[s\]; null where it never did.
+    /// Start \[s\]; null if the leg never began.
     pub from_s: Option<f64>,
-    /// When the next one began, or the flight ended \[s\].
+    /// Start of the next leg, or end of the flight \[s\].
     pub to_s: Option<f64>,
-    /// When its formation was reached and kept to the end of the leg \[s\].
+    /// Time at which its formation was reached and kept to the end of the leg \[s\].
     pub reached_at_s: Option<f64>,
-    /// No pair comes closer than this on it, as certified before the first step, and anew wherever slots were spread \[m\].
+    /// Separation certified for the leg, before the first step or after slots were spread \[m\].
     pub certified_m: Option<f64>,
-    /// Nor is the energy larger than this \[m^2/s^2\].
+    /// Bound on the energy of the leg \[m^2/s^2\].
     pub energy_bound: Option<f64>,
 }
 
 impl LegNumbers {
-    /// The legs of a flight of several; none for a flight of one.
+    /// Returns the legs of a flight; empty for a flight of one leg.
     pub(super) fn of(result: &FlightResult<'_>) -> Vec<Self> {
         let (ended, last, count) = (result.ended_legs, result.ended_legs.len(), result.scenario.legs.len());
         if count < 2 {
@@ -50,7 +50,7 @@ impl LegNumbers {
     }
 }
 
-/// Legs before the last that were not reached, or that never began.
+/// Returns the reason against a pass: a leg before the last that was not reached, or a leg that never began.
 pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
     let (last, before) = legs.split_last()?;
     let missed: Vec<_> = before.iter().filter(|leg| leg.from_s.is_some() && leg.reached_at_s.is_none()).collect();
@@ -74,13 +74,20 @@ pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
     (!said.is_empty()).then(|| said.join(" "))
 }
 
-/// How many of them were reached, in a few words; none for a flight of one leg.
+/// Returns the first leg that was not reached, as `not reached: detail`.
+pub(super) fn missed(legs: &[LegNumbers]) -> Option<String> {
+    let leg = legs.iter().find(|leg| leg.reached_at_s.is_none())?;
+    let until = leg.to_s.map(|to_s| format!(" until {}", seconds(to_s)));
+    Some(format!("not reached: leg {}{}", leg.leg, until.unwrap_or_default()))
+}
+
+/// Returns the number of reached legs in a few words; `None` for a flight of one leg.
 pub(super) fn brief(legs: &[LegNumbers]) -> Option<String> {
     let reached = legs.iter().filter(|leg| leg.reached_at_s.is_some()).count();
     (!legs.is_empty()).then(|| format!("{reached} of {} legs reached", legs.len()))
 }
 
-/// A line each: when it began and was reached, and what was certified.
+/// Returns a name and a line for each leg: start, arrival and certified separation.
 pub(super) fn lines(legs: &[LegNumbers]) -> Vec<(String, String)> {
     let line = |leg: &LegNumbers| {
         let said = match (leg.from_s, leg.reached_at_s) {

@@ -1,9 +1,8 @@
 //! `report.json`, `report.html` and the verdict in words.
 //!
-//! A [`Report`] is built from what the loop, the judge and the metrics found, and knows how to say it: as JSON with
-//! stable keys, as a page for people, as one line, and as a short table. The keys are those of the structures below, in
-//! their order; units are in the names, vehicles are numbered from 1. What does not apply, or is not a finite number, is
-//! null.
+//! A [`Report`] combines the findings of simulation, audit and metrics. It is written as JSON with stable keys, as a
+//! page, as a verdict line and as a short table. The JSON keys are the fields of the structures below, in their order.
+//! Units are in the names, and vehicles are numbered from 1. Numbers that do not apply or are not finite are null.
 
 mod artefact;
 mod flight;

@@ -4,17 +4,18 @@ use super::flight::{self, Report};
 use super::obstacles::{ObstacleApproach, ObstacleViolation};
 use crate::replay::{Judged, LONGEST_NAME, Moment, cut};
 use tautline_audit::{ObjectPair, Status, Violation};
+use tautline_core::swarm::Pair;
 use tautline_core::text::at_least;
 
 impl Report {
-    /// The closest approach, every violation and every time that a vehicle was too near to one of these obstacles, the weightiest
-    /// first, with the judge's distances and times.
+    /// Returns the closest approach, the violations of pairs and those of these obstacles, the gravest first. Distances
+    /// and times are those of the audit.
     #[must_use]
     pub fn moments(&self, obstacles: &[String]) -> Vec<Moment> {
         let (delta_m, unit) = (self.separation.delta_m, self.judgement().unit);
         let closest = self.separation.closest().map(|of| {
             let distance = format!("{} {unit}", at_least(of.separation_m, 6));
-            Moment::closest(ObjectPair::Vehicles(of.pair), &of.pair.to_string(), &distance, of.time_s)
+            Moment::closest(ObjectPair::Vehicles(of.pair), &names_of(of.pair), &distance, of.time_s)
         });
         let pair = |of: &ObstacleApproach| {
             let obstacle = obstacles.iter().position(|name| *name == of.obstacle).unwrap_or(obstacles.len());
@@ -30,7 +31,7 @@ impl Report {
         violations.sort_by(|a, b| a.min_m.total_cmp(&b.min_m));
         let violations = violations.into_iter().map(|found| {
             let &flight::Violation { pair, from_s, to_s, min_m, min_at_s } = found;
-            let (names, pair) = (pair.to_string(), ObjectPair::Vehicles(pair));
+            let (names, pair) = (names_of(pair), ObjectPair::Vehicles(pair));
             Moment::violation(&Violation { pair, from_s, to_s, min_m, min_at_s, limit_m: delta_m }, &names, unit)
         });
         let mut too_near: Vec<_> = self.obstacles.iter().flat_map(|of| &of.violations).collect();
@@ -48,7 +49,7 @@ impl Report {
         moments
     }
 
-    /// What is known of all, and what distances of two vehicles are held against.
+    /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
     pub fn judgement(&self) -> Judged {
         let unit = if self.separation.ellipsoid.is_some() { "m, scaled" } else { "m" };
@@ -58,4 +59,10 @@ impl Report {
         let is_else_known = is_judged && of_pairs && of_obstacles;
         Judged { is_else_known, limit: Some(self.separation.delta_m), unit }
     }
+}
+
+/// The numbers of a pair in words, such as `2 and 3`.
+fn names_of(pair: Pair) -> String {
+    let [first, second] = pair.numbers();
+    format!("{first} and {second}")
 }

@@ -1,4 +1,4 @@
-//! How vehicles kept clear of obstacles.
+//! Findings on the distances of vehicles from obstacles.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,47 +9,48 @@ use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
 use tautline_sim::sim::Ending;
 
-/// The judge's findings on a flight past obstacles.
+/// Findings of the audit on obstacles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Obstacles {
-    /// The verdict on them alone; that of `audit` holds it too. Undecided at best where the flight ended early.
+    /// Status of obstacles alone, which is also part of the status of the audit. At best undecided if the flight ended
+    /// early.
     pub status: Status,
-    /// Every vehicle keeps this much beyond the clearance of every obstacle, by the law's certificate \[m\].
+    /// Distance beyond the clearance of every obstacle that the law certifies for every vehicle \[m\].
     pub certified_room_m: Option<f64>,
-    /// The closest approaches of different vehicles and obstacles, at most ten, closest first.
+    /// Closest approaches of different vehicles and obstacles, at most ten, the closest first.
     pub closest: Vec<ObstacleApproach>,
-    /// Every time that a vehicle was nearer to an obstacle than its clearance.
+    /// Intervals in which a vehicle was closer to an obstacle than its clearance.
     pub violations: Vec<ObstacleViolation>,
-    /// Times at which it cannot be told.
+    /// Number of undecided times.
     pub undecided: u64,
-    /// Distances measured again by parry that contradict the closed form.
+    /// Number of distances at which the second detector (parry) contradicts the closed form.
     pub disagreements: u64,
 }
 
-/// The closest that a vehicle came to an obstacle.
+/// Closest approach of a vehicle to an obstacle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObstacleApproach {
-    /// The vehicle.
+    /// Number of the vehicle, from 1.
     pub vehicle: usize,
     /// Name of the obstacle.
     pub obstacle: String,
-    /// Distance that the vehicle's centre must keep from its surface \[m\].
+    /// Distance that the centre of the vehicle must keep from the surface \[m\].
     pub clearance_m: f64,
-    /// Smallest distance, below zero within \[m\].
+    /// Smallest distance from the surface, negative inside \[m\].
     pub min_m: f64,
-    /// When \[s\].
+    /// Time of `min_m` \[s\].
     pub min_at_s: f64,
 }
 
-/// A time during which a vehicle was nearer to an obstacle than its clearance.
+/// An interval in which a vehicle was closer to an obstacle than its clearance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObstacleViolation {
-    /// Who and where, at the closest.
+    /// Vehicle, obstacle and smallest distance.
     #[serde(flatten)]
     pub approach: ObstacleApproach,
-    /// When it began \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// When it ended, or the end of the run \[s\].
+    /// End, or the end of the run \[s\].
     pub to_s: f64,
 }
 
@@ -82,49 +83,60 @@ impl Obstacles {
         })
     }
 
-    /// The deepest violation.
+    /// Returns the deepest violation.
     fn deepest(&self) -> Option<&ObstacleApproach> {
         let room = |approach: &ObstacleApproach| approach.min_m - approach.clearance_m;
         let approaches = self.violations.iter().map(|violation| &violation.approach);
         approaches.min_by(|a, b| room(a).total_cmp(&room(b)))
     }
 
-    /// The least that anybody had beyond a clearance \[m\], and where.
+    /// Returns the approach with the smallest distance beyond its clearance, and that distance \[m\].
     fn tightest(&self) -> Option<(f64, &ObstacleApproach)> {
         let rooms = self.closest.iter().map(|approach| (approach.min_m - approach.clearance_m, approach));
         rooms.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// What happened, in a few words, for a headline.
+    /// Returns the deepest violation in a few words.
     pub(super) fn brief(&self) -> Option<String> {
         self.deepest().map(ObstacleApproach::brief)
     }
 
-    /// How much room there was, in a few words, for a headline.
+    /// Returns the smallest distance beyond a clearance in a few words.
     pub(super) fn room(&self) -> Option<String> {
         self.tightest().map(|(room_m, _)| format!("{} m beyond every obstacle's clearance", at_least(room_m, 3)))
     }
 
-    /// Every reason that they give against a pass, a sentence.
+    /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the
+    /// error of integration.
+    fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
+        let certified_m = self.certified_room_m?;
+        let (room_m, tightest) = self.tightest()?;
+        (room_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
+    }
+
+    /// The approach that breaks the certificate, in a few words.
+    pub(super) fn broken_certificate(&self) -> Option<String> {
+        let (certified_m, tightest) = self.certified_and_tightest()?;
+        Some(format!("{}, certified {} m beyond it", tightest.brief(), metres(certified_m)))
+    }
+
+    /// Returns the reasons against a pass as sentences.
     pub(super) fn reason(&self) -> Option<String> {
         let violation = self.deepest().filter(|_| self.status == Status::Violation).map(|deepest| {
             let others = match self.violations.len() - 1 {
                 0 => String::new(),
-                1 => " There is 1 more such time.".to_owned(),
-                n => format!(" There are {n} more such times."),
+                1 => " There is 1 other violation.".to_owned(),
+                n => format!(" There are {n} other violations."),
             };
             format!("A vehicle came too near to an obstacle: {}.{others}", deepest.brief())
         });
-        let broken = self.tightest().filter(|_| violation.is_none()).and_then(|(room_m, tightest)| {
-            let certified_m = self.certified_room_m?;
-            (room_m < certified_m * (1.0 - INTEGRATION)).then(|| {
-                format!(
-                    "The law certifies {} m beyond every clearance in continuous time, and {}: what was flown is not the \
-                     motion that the proof is about. Shorten time.dt_s.",
-                    metres(certified_m),
-                    tightest.brief()
-                )
-            })
+        let broken = self.certified_and_tightest().filter(|_| violation.is_none()).map(|(certified_m, tightest)| {
+            format!(
+                "The law certifies {} m beyond every clearance in continuous time, and {}: the flown motion is not \
+                 the one that the proof covers. Shorten time.dt_s.",
+                metres(certified_m),
+                tightest.brief()
+            )
         });
         let disagree = (self.disagreements > 0).then(|| {
             let times = counted(self.disagreements, "time", "times");
@@ -132,16 +144,16 @@ impl Obstacles {
         });
         let open = (self.status == Status::Undecided && self.disagreements == 0).then(|| match self.deepest() {
             Some(deepest) => format!(
-                "The step cannot resolve whether the clearance of obstacles is kept: as flown, {}, and after steps that are too \
-                 long for the law integration may err by more than that.",
+                "The step cannot resolve whether the clearance of obstacles is kept. In the flown motion {}, but the \
+                 integration error of steps that are too long for the law may be larger.",
                 deepest.brief()
             ),
-            None => "It cannot be told whether every vehicle kept clear of the obstacles.".to_owned(),
+            None => "The audit cannot decide whether every vehicle kept its clearance from the obstacles.".to_owned(),
         });
         violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
     }
 
-    /// Returns the closest approaches, with the certified distance, and the violations.
+    /// Returns the sections of the closest approaches and of the violations.
     pub(super) fn sections(&self) -> [Section; 2] {
         let cells = |approach: &ObstacleApproach| {
             let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = approach;
@@ -159,11 +171,16 @@ impl Obstacles {
         let longer = &["Vehicle", "Obstacle", "Clearance in m", "Smallest distance in m", "At", "From", "To"];
         [
             Section::table("Obstacles", certified, columns, self.closest.iter().map(cells)),
-            Section::table("Violations of clearance", "times that a vehicle was too near", longer, violations),
+            Section::table(
+                "Violations of clearance",
+                "intervals in which a vehicle was below its clearance",
+                longer,
+                violations,
+            ),
         ]
     }
 
-    /// One line of a table.
+    /// Returns the findings in one line.
     pub(super) fn line(&self) -> String {
         let closest = self.tightest().map_or("-".to_owned(), |(_, tightest)| {
             let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = tightest;
@@ -191,12 +208,12 @@ impl ObstacleApproach {
             let deep = metres(-min_m);
             return format!("vehicle {vehicle} was {deep} m inside `{obstacle}` at {at} (clearance {clearance} m)");
         }
-        let near = metres_below(*min_m, *clearance_m);
+        let near = if min_m < clearance_m { metres_below(*min_m, *clearance_m) } else { at_least(*min_m, 3) };
         format!("vehicle {vehicle} came to {near} m from `{obstacle}` at {at} (clearance {clearance} m)")
     }
 }
 
-/// A distance that is not larger than what was found.
+/// Formats a distance, rounded down if it is positive.
 fn shown(distance_m: f64) -> String {
     if distance_m < 0.0 { metres(distance_m) } else { at_least(distance_m, 6) }
 }

@@ -7,11 +7,11 @@ use tautline_core::text::aligned;
 #[derive(Clone, Debug)]
 pub(super) struct Section {
     pub(super) heading: &'static str,
-    /// Caption of the table, or what the lines are in a few words.
+    /// Caption of the table, or a short description of the lines.
     pub(super) caption: String,
     pub(super) columns: &'static [&'static str],
     pub(super) rows: Vec<Vec<String>>,
-    /// Number of rows that there are in all, listed or not.
+    /// Number of all rows, listed or not.
     pub(super) all: usize,
 }
 
@@ -33,7 +33,7 @@ impl Section {
         Self { heading, caption: caption.into(), columns: &[], all: rows.len(), rows }
     }
 
-    /// Returns the same section with `all` rows in all, of which only the first are listed.
+    /// Returns the same section with `all` rows in total; only the first are listed.
     pub(super) fn of_all(self, all: usize) -> Self {
         Self { all, ..self }
     }

@@ -1,8 +1,9 @@
-//! The judgement and its reasons.
+//! Verdict on a flight and its reasons.
 
 use serde::{Deserialize, Serialize};
 
 use super::flight::{FailedVehicle, FlightResult, Report};
+use super::hulls::vehicles;
 use super::legs;
 use super::obstacles::Obstacles;
 use tautline_audit::Status;
@@ -12,20 +13,21 @@ use tautline_sim::metrics::Summary;
 use tautline_sim::scenario::TimeSpec;
 use tautline_sim::sim::Ending;
 
-/// The judgement.
+/// Verdict on a flight.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Clear, reached, flown to its end, and not refused before the first step.
+    /// Whether the flight is clear, reached its formation, was flown to its end and was not refused by the check.
     pub pass: bool,
-    /// Stable names of what refused the flight before the first step, such as `start-on-line`.
+    /// Stable names of the warnings that refuse the flight, such as `start-on-line`.
     pub refused: Vec<String>,
-    /// Why it did not pass, a sentence each; empty where it did.
+    /// Reasons against a pass, a sentence each.
     pub reasons: Vec<String>,
 }
 
 impl Verdict {
-    /// Passes where nothing refused the flight, the audit is clear, both detectors agree, the formation is reached and the
-    /// run was flown to its end.
+    /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear and both detectors
+    /// agree. The certificate and the energy bound must hold, every leg must be reached, and the run must be flown to
+    /// its end.
     pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
         let reasons: Vec<_> = [
             refused(result),
@@ -51,22 +53,23 @@ impl Verdict {
     }
 }
 
-/// The number that keeps a formation from being reached, by its key.
+/// Criterion that keeps a formation from being reached, by its key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fails {
-    /// The formation was reached, and the flight ended early.
+    /// The formation was reached, but the flight ended early.
     EndedEarly,
-    /// Everything was within the limits at the end, for too short a time.
+    /// All errors were within their limits at the end, but for too short a time.
     HeldS,
-    /// No state at the end is known.
+    /// The state at the end is unknown.
     Unknown,
-    /// The largest error of a desired distance.
+    /// Largest error of a desired distance.
     MaxEdgeErrorM,
-    /// The distance of a vehicle from its slot: every edge has its length, and the shape is another one, or elsewhere.
+    /// Largest distance of a vehicle from its slot: all edges have their length, but the shape or its place is another
+    /// one.
     #[serde(alias = "rms_position_error_m")]
     MaxPositionErrorM,
-    /// The largest speed relative to the mean.
+    /// Largest speed relative to the mean velocity.
     #[serde(rename = "disagreement_m_s")]
     Disagreement,
 }
@@ -90,22 +93,21 @@ impl Fails {
     }
 }
 
-/// Vehicles are at rest if what they still lack is farther than they would get in this many times the flight's duration.
+/// Vehicles are at rest if this many durations of the flight would not suffice to cover the remaining error.
 const REST_DURATIONS: f64 = 10.0;
 /// Time over which a commanded acceleration adds to the speed \[s\].
 const COMMANDED_S: f64 = 1.0;
 
-/// Whether the vehicles of a formation that is not reached have come to rest elsewhere: at the speeds and commanded
-/// accelerations of the end, ten times the flight's duration would not cover the position error that is too much,
+/// Returns whether the vehicles of a formation that is not reached have come to rest elsewhere. At their final speeds v
+/// and commanded accelerations u, ten times the duration T would not cover the excess of the position error e:
 ///
 /// ```text
 /// (v + u 1 s) H < e - edge_error_m,    H = 10 T
 /// ```
 ///
-/// where laws damp relative velocities at about 1/s, so that a command is worth its acceleration over a second.
+/// Laws damp relative velocities at about 1/s, so a command counts as its acceleration over one second.
 ///
-/// Returns `None` if this is unknown: the flight ended early, or a disturbance may hold vehicles that stand while they are
-/// commanded.
+/// Returns `None` if the flight ended early, or if a disturbance may hold vehicles at rest that are commanded to move.
 pub(super) fn at_rest(result: &FlightResult<'_>) -> Option<bool> {
     let (summary, judge) = (result.summary, result.scenario.arrival);
     let (speed_m_s, command_m_s2) = (summary.disagreement_m_s, summary.final_control_m_s2);
@@ -122,7 +124,7 @@ pub(super) fn at_rest(result: &FlightResult<'_>) -> Option<bool> {
 
 fn refused(result: &FlightResult<'_>) -> Option<String> {
     let codes = result.preflight.refusing().join(", ");
-    (!codes.is_empty()).then(|| format!("The flight was refused before its first step: {codes}."))
+    (!codes.is_empty()).then(|| format!("The check refuses the flight: {codes}."))
 }
 
 fn violation(result: &FlightResult<'_>) -> Option<String> {
@@ -141,14 +143,15 @@ fn violation(result: &FlightResult<'_>) -> Option<String> {
         n => format!(" There are {n} other violations."),
     };
     Some(format!(
-        "Vehicles {first} and {second} came to {} m of each other at {}; the safety distance is {} m.{others}",
+        "Vehicles {first} and {second} came to {} m at {}; the safety distance is {} m.{others}",
         metres_below(deepest.min_m, delta_m),
         seconds(deepest.min_at_s),
         metres(delta_m),
     ))
 }
 
-/// Whether violations were found that integration may have made: a step was too long for the law before, or in, the first of them.
+/// Returns whether integration may have caused all violations: a step was too long for the law before or within the
+/// first one.
 pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violations: usize) -> bool {
     status == Status::Undecided && overlong_steps > 0 && violations > 0
 }
@@ -161,8 +164,8 @@ fn unresolved_by_step(result: &FlightResult<'_>) -> Option<String> {
     let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
     let [first, second] = deepest.pair.numbers();
     Some(format!(
-        "The step cannot resolve whether the safety distance of {} m is kept: vehicles {first} and {second} came to {} m of each \
-         other at {} as flown, and after steps that are too long for the law integration may err by more than that.",
+        "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion vehicles {first} and \
+         {second} came to {} m at {}, but the integration error of steps that are too long for the law may be larger.",
         metres(result.scenario.delta_m),
         metres_below(deepest.min_m, result.scenario.delta_m),
         seconds(deepest.min_at_s),
@@ -183,15 +186,13 @@ fn undecided(result: &FlightResult<'_>) -> Option<String> {
     }
     if result.flight.audit.status == Status::Undecided && result.flight.audit.unresolved > 0 {
         return Some(
-            "Two vehicles came so near to delta that the audit cannot tell whether they kept it: paths that bend within a \
-             step leave more room than there was."
+            "Two vehicles came so close to delta that the audit cannot decide: the bound on the bend of their paths \
+             within a step exceeds their distance from delta."
                 .to_owned(),
         );
     }
-    (result.flight.audit.status == Status::Undecided && result.flight.audit.parry.disagreements == 0).then(|| {
-        "The audit could not judge everything it was shown, so it cannot say that no two vehicles came too close."
-            .to_owned()
-    })
+    (result.flight.audit.status == Status::Undecided && result.flight.audit.parry.disagreements == 0)
+        .then(|| "The audit could not judge every pair and step, so it does not exclude a violation.".to_owned())
 }
 
 fn ended_early(report: &Report) -> Option<String> {
@@ -199,53 +200,56 @@ fn ended_early(report: &Report) -> Option<String> {
     Some(format!("The run ended early, at {}: {why}.", seconds(report.run.duration_s)))
 }
 
-/// Whether a separation is below what was certified, by more of the certified clearance above delta than integration may
-/// cost: near the barrier the energy of a pair is in inverse proportion to its clearance, so the part is that of the energy.
+/// Returns whether a separation is below the certified one by more than the integration error. The error is relative to
+/// the certified clearance above delta. Near the barrier the energy of a pair is inversely proportional to its
+/// clearance, so both have the same relative error.
 pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f64) -> bool {
     separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
 }
 
-/// The proof says that the energy never grows: one that did was not flown by the law, but by a step too long for it or by
-/// numbers that ran out of digits.
-pub(super) fn rises(result: &FlightResult<'_>) -> bool {
+/// Returns whether the energy rose although it is proved never to grow. A rise shows a step that is too long for the
+/// law, or loss of digits.
+pub(super) fn energy_rises(result: &FlightResult<'_>) -> bool {
     risen_energy(result).is_some()
 }
 
 fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
     let (summary, vehicles) = (result.summary, result.scenario.count());
     let EnergyRise { from: initial, to: most } = result.flight.energy_rise?;
-    let allowed = highest_honest(initial, summary, vehicles);
+    let allowed = largest_explained_energy(initial, summary, vehicles);
     (result.energy_falls() && most > allowed).then(|| {
         format!(
-            "The law's energy never grows in continuous time, and here it rose from {initial:.4e} to {most:.4e} m^2/s^2, \
-             where integration and rounding explain {allowed:.4e}: what was flown is not the motion of the law. Shorten \
+            "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow. \
+             Integration and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten \
              time.dt_s, or raise time.max_halvings.",
         )
     })
 }
 
-/// The proof is of continuous time: a separation below what it certifies shows a step too long for the law's barrier, or
-/// numbers that ran out of digits.
+/// Returns the reason of a broken certificate. The proof is of continuous time: a separation below the certified one
+/// shows a step that is too long for the law's barrier, or loss of digits.
 fn broken_certificate(report: &Report) -> Option<String> {
     let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
     report.breaks_certificate().then(|| {
         format!(
-            "The law certifies {} m in continuous time, and vehicles {} came to {} m: what was flown is not the motion that \
-             the proof is about. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
+            "The law certifies {} m in continuous time, but {} came to {} m: the flown motion is not the one that \
+             the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
             metres(certified_m),
-            closest.pair,
+            vehicles(closest.pair),
             metres_below(closest.separation_m, certified_m),
         )
     })
 }
 
-/// Where even the shortest part of a step is too long for the law, nothing that is flown from there on is its motion.
+/// Returns the reason of steps whose shortest part is too long for the law. From there on the motion is not that of the
+/// law.
 fn steps_too_long(result: &FlightResult<'_>) -> Option<String> {
     let overlong = result.flight.overlong_steps;
     (overlong > 0).then(|| {
         format!(
-            "{} longer than the law allows in the state that it was in, and halved no further: what was flown is not the motion of \
-             the law. Shorten time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law gentler.",
+            "{} longer than the law allows, even after all halvings: the flown motion is not that of the law. Shorten \
+             time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law \
+             gentler.",
             counted(overlong, "step was", "steps were"),
             TimeSpec::DEFAULT_MAX_RATE_DT
         )
@@ -255,28 +259,28 @@ fn steps_too_long(result: &FlightResult<'_>) -> Option<String> {
 fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
     let (summary, judge) = (result.summary, result.scenario.arrival);
     let why = match report.formation.fails? {
-        // The reason is that of the early end.
+        // The early end has a reason of its own.
         Fails::EndedEarly => return None,
         Fails::HeldS => format!(
-            "it was kept for the last {} only, and {} are asked for",
+            "it was kept for the last {} only; {} is required",
             seconds(summary.held_s.unwrap_or_default()),
             seconds(judge.hold_s)
         ),
         Fails::Unknown => "no state at the end is known".to_owned(),
         Fails::MaxEdgeErrorM => format!(
-            "at the end a distance is still wrong by {} m, and {} m are allowed",
+            "at the end the largest edge error is {} m (limit {} m)",
             metres(summary.max_edge_error_m),
             judge.edge_error_m
         ),
         Fails::MaxPositionErrorM => format!(
-            "at the end every edge has its length within what is allowed and the shape is another one all the same, or it is turned \
-             or elsewhere where it may not be: a vehicle is {} m from its slot, and {} m are allowed",
+            "at the end every edge error is within its limit, but the shape, its attitude or its place is another \
+             one: the largest position error is {} m (limit {} m)",
             metres(summary.max_position_error_m),
             judge.edge_error_m
         ),
         Fails::Disagreement => format!(
-            "at the end vehicles still differ by {} m/s from their mean velocity, or from that of the reference they follow, and \
-             {} m/s are allowed",
+            "at the end the largest speed relative to the mean velocity, or to that of the reference, is {} m/s \
+             (limit {} m/s)",
             metres(summary.disagreement_m_s),
             judge.disagreement_m_s
         ),
@@ -285,7 +289,7 @@ fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
     let then = match report.formation.at_rest {
         _ if failed.is_some() => "",
         Some(true) if summary.held_s.is_none() => {
-            " The vehicles have come to rest elsewhere: ten times the duration would not be enough."
+            " The vehicles have come to rest elsewhere: ten times the duration would not suffice."
         }
         Some(false) if summary.held_s.is_none() && !result.preflight.refuses() => {
             " The vehicles are still moving: more time may help."
@@ -296,7 +300,8 @@ fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
     Some(format!("The formation was not reached: {why}.{then}{}", failed.unwrap_or_default()))
 }
 
-/// A start flatter than the formation: forces along the lines between vehicles never leave it.
+/// Returns the reason of a start of fewer dimensions than the formation: forces along the lines between vehicles never
+/// leave it.
 fn too_flat(result: &FlightResult<'_>) -> Option<String> {
     if result.reached_at_s().is_some() {
         return None;
@@ -312,23 +317,23 @@ fn too_flat(result: &FlightResult<'_>) -> Option<String> {
         _ => "space",
     };
     Some(format!(
-        "The start lies {start} and the formation needs {formation}: a law that acts along the lines between vehicles \
+        "The start lies {start}, but the formation needs {formation}: a law that acts along the lines between vehicles \
          never leaves that {trap}."
     ))
 }
 
-/// Part of an energy, and of what it keeps apart, that the error of integration stays below.
+/// Largest error of integration, relative to an energy or to a clearance that the energy keeps.
 pub(super) const INTEGRATION: f64 = EnergyRise::INTEGRATION;
 
-/// The largest energy \[m^2/s^2\] that a motion without gain may show, from an energy `initial` on:
+/// Returns the largest energy \[m^2/s^2\] of a motion that gains no energy, from the energy `initial` on:
 ///
 /// ```text
 /// (1 + 1e-3) E(0) + N [ u r + (epsilon v)^2 ],    r = epsilon x,    epsilon = 2^-52
 /// ```
 ///
-/// with the largest command u, the fastest vehicle v and the largest distance x from where the swarm began. Rounding moves a
-/// vehicle by r against a force of u, and changes its velocity by epsilon v.
-pub(super) fn highest_honest(initial: f64, summary: &Summary, vehicles: usize) -> f64 {
+/// Here u is the largest command, v the speed of the fastest vehicle and x the largest distance from the start of the
+/// swarm. Rounding moves a vehicle by r against a force of u, and changes its velocity by epsilon v.
+pub(super) fn largest_explained_energy(initial: f64, summary: &Summary, vehicles: usize) -> f64 {
     let resolution_m = f64::EPSILON * summary.extent_m;
     let rounding = summary.peak_control_m_s2 * resolution_m + (f64::EPSILON * summary.fastest_m_s).powi(2);
     (1.0 + INTEGRATION) * initial + vehicles as f64 * rounding

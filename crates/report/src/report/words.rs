@@ -1,4 +1,4 @@
-//! A report in words: one line, and a table.
+//! Report of a flight in words: a verdict line and a table.
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::obstacles::Obstacles;
@@ -8,39 +8,84 @@ use tautline_core::text::{at_least, counted, metres, metres_below, seconds, tabl
 use tautline_sim::link::Traffic;
 
 impl Report {
-    /// The verdict in one line, with what refused the flight before its first step behind it.
+    /// Returns the verdict in one line. It begins with `CLEAR` only if the flight passes, otherwise with what failed:
     ///
-    /// `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.5 s`, or
-    /// `VIOLATION: vehicles 2-3 came to 1.532 m (delta 2.000 m) at 3.63 s`.
+    /// - `CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.42 s`
+    /// - `VIOLATION: vehicles 2 and 3 came to 1.532 m (delta 2.000 m) at 3.63 s`
+    /// - `NOT REACHED: largest edge error 0.838 m, at rest elsewhere (clear: never closer than 2.660 m, delta 2.000 m)`
+    /// - `UNDECIDED: the flight ended early at 3.20 s; until then never closer than 2.435 m (delta 2.000 m)`
     #[must_use]
     pub fn headline(&self) -> String {
-        let refused = match &self.verdict.refused[..] {
-            [] => String::new(),
-            codes => format!("; refused before the first step: {}", codes.join(", ")),
+        let (failures, is_clear) = (self.failures(), self.audit.status == Status::Clear);
+        let findings = match self.audit.status {
+            Status::Clear if self.verdict.pass => {
+                vec![format!("CLEAR: {}, {}", self.clearance([" (", ")"]), self.arrival())]
+            }
+            Status::Clear => match failures.split_first() {
+                Some((first, rest)) => [&[capital_label(first)], rest].concat(),
+                None => vec![format!("NOT PASSED: {}", self.verdict.reasons.join(" ").trim_end_matches('.'))],
+            },
+            Status::Violation => [&[format!("VIOLATION: {}", self.deepest_in_words())], &failures[..]].concat(),
+            Status::Undecided => [&[format!("UNDECIDED: {}", self.undecided_in_words())], &failures[..]].concat(),
         };
-        let ended = self.run.ended_early.as_ref().map(|_| format!("; ended early at {}", seconds(self.run.duration_s)));
-        let hulls = self.hulls.brief().map(|hulls| format!("; {hulls}"));
-        let legs = super::legs::brief(&self.legs).map(|legs| format!("; {legs}"));
-        let overlong = match self.run.overlong_steps {
-            0 => String::new(),
-            n => format!("; {} too long for the law", counted(n, "step", "steps")),
-        };
-        let changes = self.changes().map(|changes| format!("; {changes}"));
-        self.judged()
-            + &legs.unwrap_or_default()
-            + &changes.unwrap_or_default()
-            + &hulls.unwrap_or_default()
-            + &overlong
-            + &ended.unwrap_or_default()
-            + &refused
+        let clear = (is_clear && !self.verdict.pass).then(|| {
+            let reached = self.formation.reached.then(|| format!(", {}", self.arrival()));
+            format!(" (clear: {}{})", self.clearance([", ", ""]), reached.unwrap_or_default())
+        });
+        let notes = super::legs::brief(&self.legs).into_iter().chain(self.changes()).map(|note| format!("; {note}"));
+        findings.join("; ") + &clear.unwrap_or_default() + &notes.collect::<String>()
     }
 
-    /// What is said behind a distance that is no distance in metres.
+    /// Returns the failures beside the status of the audit, as `label: detail`, in the order of the reasons of the
+    /// verdict.
+    fn failures(&self) -> Vec<String> {
+        let has_no_violation = self.audit.status != Status::Violation;
+        let codes = &self.verdict.refused;
+        let refused = (!codes.is_empty()).then(|| format!("refused by check: {}", codes.join(", ")));
+        let broken =
+            self.separation.certified_m.filter(|_| has_no_violation && self.breaks_certificate()).map(|certified_m| {
+                let closest = self.separation.closest().map(|closest| {
+                    let [first, second] = closest.pair.numbers();
+                    let min_m = metres_below(closest.separation_m, certified_m);
+                    format!("vehicles {first} and {second} came to {min_m} m at {}, ", seconds(closest.time_s))
+                });
+                format!("certificate broken: {}certified {} m", closest.unwrap_or_default(), metres(certified_m))
+            });
+        let past_obstacles =
+            self.obstacles.as_ref().filter(|_| has_no_violation).and_then(Obstacles::broken_certificate);
+        let past_obstacles = past_obstacles.map(|broken| format!("certificate broken: {broken}"));
+        let overlong = self.run.overlong_steps;
+        let overlong = (overlong > 0)
+            .then(|| format!("step too long: {} longer than the law allows", counted(overlong, "step", "steps")));
+        let rose = self.energy.rose.then(|| match self.energy.max_over_leg_start {
+            Some(ratio) => format!("energy rose: to {ratio:.3} of its start"),
+            None => "energy rose: it is proved never to grow".to_owned(),
+        });
+        let is_in_lead = self.is_clear_until_its_early_end();
+        let ended = (self.run.ended_early.is_some() && !is_in_lead)
+            .then(|| format!("ended early: at {}", seconds(self.run.duration_s)));
+        [
+            refused,
+            past_obstacles,
+            self.hulls.brief(),
+            broken,
+            overlong,
+            rose.filter(|_| has_no_violation),
+            ended,
+            self.missing().filter(|_| has_no_violation),
+            super::legs::missed(&self.legs).filter(|_| has_no_violation && self.formation.reached),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Returns the words that mark a scaled length.
     fn scaled(&self) -> &'static str {
         if self.separation.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
     }
 
-    /// How often slots were spread, and vehicles given others; none where neither was.
+    /// Returns how often slots were spread and vehicles were assigned anew; `None` if never.
     pub(super) fn changes(&self) -> Option<String> {
         let counts = [
             (self.deadlock_recoveries.len(), "deadlock recovery", "deadlock recoveries"),
@@ -51,7 +96,7 @@ impl Report {
         (!said.is_empty()).then(|| said.join(" and "))
     }
 
-    /// Whether two vehicles came closer than the law's certificate promises, by more than integration may cost.
+    /// Returns whether a pair came closer than certified by more than the error of integration.
     #[must_use]
     pub fn breaks_certificate(&self) -> bool {
         let both = self.separation.min_m.zip(self.separation.certified_m);
@@ -59,35 +104,24 @@ impl Report {
         both.is_some_and(breaks) && self.separation.is_promised()
     }
 
-    /// What was judged of what was flown.
-    fn judged(&self) -> String {
-        let delta = metres(self.separation.delta_m);
-        match self.audit.status {
-            Status::Clear => format!("CLEAR: {}", self.clear_in_words()),
-            Status::Violation => {
-                let deepest = self.deepest_in_words();
-                format!("VIOLATION: {deepest}")
-            }
-            Status::Undecided if self.is_clear_until_its_early_end() => {
-                format!("UNDECIDED from {} on: {}", seconds(self.run.duration_s), self.clear_in_words())
-            }
-            Status::Undecided if self.audit.parry.disagreements > 0 => {
-                format!("UNDECIDED: the two detectors disagree (delta {delta} m), {}", self.formation_in_words())
-            }
-            Status::Undecided if self.is_unresolved_by_step() => {
-                format!(
-                    "UNDECIDED: the step cannot resolve this, as flown {}, {}",
-                    self.deepest_in_words(),
-                    self.formation_in_words()
-                )
-            }
-            Status::Undecided => {
-                format!("UNDECIDED: not everything could be judged (delta {delta} m), {}", self.formation_in_words())
-            }
+    /// Returns why the audit is undecided, and the arrival if the formation was reached.
+    fn undecided_in_words(&self) -> String {
+        if self.is_clear_until_its_early_end() {
+            let at = seconds(self.run.duration_s);
+            return format!("the flight ended early at {at}; until then {}", self.clearance([" (", ")"]));
         }
+        let delta = metres(self.separation.delta_m);
+        let why = if self.audit.parry.disagreements > 0 {
+            format!("the two detectors disagree (delta {delta} m)")
+        } else if self.is_unresolved_by_step() {
+            format!("the step cannot resolve this, as flown {}", self.deepest_in_words())
+        } else {
+            format!("not everything could be judged (delta {delta} m)")
+        };
+        if self.formation.reached { format!("{why}, {}", self.arrival()) } else { why }
     }
 
-    /// Returns whether the flight ended early and was clear up to there.
+    /// Returns whether the flight ended early and was clear up to its end.
     pub(super) fn is_clear_until_its_early_end(&self) -> bool {
         let audit = &self.audit;
         let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
@@ -100,59 +134,51 @@ impl Report {
             && !self.is_unresolved_by_step()
     }
 
-    fn clear_in_words(&self) -> String {
+    /// Returns the smallest separation, delta between two brackets, and the distance beyond obstacles.
+    fn clearance(&self, [open, close]: [&str; 2]) -> String {
         let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
         let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
-        let broken = match self.separation.certified_m.filter(|_| self.breaks_certificate()) {
-            Some(certified_m) => format!(", which breaks the certificate of {} m", at_least(certified_m, 6)),
-            None => String::new(),
-        };
-        let rose = match self.energy.max_over_leg_start.filter(|_| self.energy.rose) {
-            Some(ratio) => format!(", energy rose to {ratio:.3} of its start"),
-            None => String::new(),
-        };
         let room = self.obstacles.as_ref().and_then(Obstacles::room);
         let room = room.map(|room| format!(", {room}")).unwrap_or_default();
-        format!(
-            "{closest}{} (delta {} m){room}{broken}{rose}, {}",
-            self.scaled(),
-            metres(self.separation.delta_m),
-            self.formation_in_words()
-        )
+        format!("{closest}{}{open}delta {} m{close}{room}", self.scaled(), metres(self.separation.delta_m))
     }
 
-    /// Whether integration may have made all violations.
+    /// Returns whether integration may have caused all violations.
     fn is_unresolved_by_step(&self) -> bool {
         let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
         let violations = self.audit.violations.len() + past_obstacles;
         is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
     }
 
-    fn formation_in_words(&self) -> String {
+    /// Returns the arrival in words.
+    fn arrival(&self) -> String {
+        let at = self.formation.reached_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
+        format!("formation reached{}", at.unwrap_or_default())
+    }
+
+    /// Returns the criterion that keeps the formation from being reached, as `not reached: detail`. If the formation
+    /// had been reached before an early end, the failure is the early end alone.
+    fn missing(&self) -> Option<String> {
         let formation = &self.formation;
-        let (what, number, unit) = match formation.fails {
-            None => {
-                let at_s = formation.reached_at_s.unwrap_or_default();
-                return format!("formation reached at {at_s:.1} s");
-            }
-            Some(Fails::EndedEarly) => return "formation NOT reached (the flight ended early)".to_owned(),
-            Some(Fails::Unknown) => return "formation NOT reached".to_owned(),
-            Some(Fails::HeldS) => {
+        let (what, number, unit) = match formation.fails? {
+            Fails::EndedEarly => return None,
+            Fails::Unknown => return Some("not reached: no state at the end is known".to_owned()),
+            Fails::HeldS => {
                 let held_s = formation.held_s.unwrap_or_default();
-                return format!("formation NOT reached (kept for the last {} only)", seconds(held_s));
+                return Some(format!("not reached: kept for the last {} only", seconds(held_s)));
             }
-            Some(Fails::MaxEdgeErrorM) => ("largest edge error", formation.max_edge_error_m, "m"),
-            Some(Fails::MaxPositionErrorM) => {
+            Fails::MaxEdgeErrorM => ("largest edge error", formation.max_edge_error_m, "m"),
+            Fails::MaxPositionErrorM => {
                 ("another shape or place, largest position error", formation.max_position_error_m, "m")
             }
-            Some(Fails::Disagreement) => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
+            Fails::Disagreement => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
         };
         let then = match formation.at_rest {
             Some(true) => ", at rest elsewhere",
             Some(false) => ", still moving",
             None => "",
         };
-        format!("formation NOT reached ({what} {} {unit}{then})", number.map_or("-".to_owned(), short))
+        Some(format!("not reached: {what} {} {unit}{then}", or_dash(number)))
     }
 
     fn deepest_in_words(&self) -> String {
@@ -172,21 +198,21 @@ impl Report {
         };
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
         format!(
-            "vehicles {first}-{second} came to {} m{} (delta {} m){at}",
+            "vehicles {first} and {second} came to {} m{} (delta {} m){at}",
             metres_below(min_m, delta_m),
             self.scaled(),
             metres(delta_m)
         )
     }
 
-    /// The findings as a short table, a line each, with a line end.
+    /// Returns the findings as a short table, a line each, with a final line break.
     #[must_use]
     pub fn text(&self) -> String {
         let times = self.performance.map(|times| ("performance".to_owned(), times.line()));
         table(self.rows().into_iter().chain(times))
     }
 
-    /// Returns the name of each part of the flight, and the finding on it. Wall-clock times are not part of it.
+    /// Returns the name of each part of the flight and the finding on it, without wall-clock times.
     pub(super) fn rows(&self) -> Vec<(String, String)> {
         let (control, velocity) = (&self.control, &self.velocity);
         let [peak, last] = [control.peak_m_s2, control.final_m_s2].map(or_dash);
@@ -216,7 +242,7 @@ impl Report {
 
     fn separation_line(&self) -> String {
         let separation = &self.separation;
-        let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
+        let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first} and {second}"));
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         let certified = match separation.certified_m {
             Some(certified_m) => {
@@ -284,7 +310,7 @@ impl Report {
         format!(
             "{} vehicles, {} s in {} steps of {:.3} ms, state {}",
             run.vehicles,
-            // To a microsecond, without the zeros that a fixed number of decimals would show.
+            // To a microsecond, without trailing zeros.
             (run.duration_s * 1e6).round() / 1e6,
             run.steps,
             run.dt_s * 1e3,
@@ -309,7 +335,7 @@ impl Ellipsoid {
     fn line(&self) -> String {
         let axes = self.half_axes_m.map(metres).join(", ");
         let closest = self.min_distance_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
-        let pair = self.min_distance_pair.map(|[first, second]| format!(", vehicles {first}-{second}"));
+        let pair = self.min_distance_pair.map(|[first, second]| format!(", vehicles {first} and {second}"));
         let at = self.min_distance_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         format!(
             "half axes {axes} m; unscaled, centres never closer than {closest} m{}{}",
@@ -320,7 +346,7 @@ impl Ellipsoid {
 }
 
 impl FailedVehicle {
-    /// Those that failed within so many seconds, in one line.
+    /// Lists failed vehicles in one line.
     pub(super) fn line(failed: &[Self]) -> String {
         let one = |failed: &Self| format!("vehicle {} ({}) at {} s", failed.vehicle, failed.kind, failed.at_s);
         failed.iter().map(one).collect::<Vec<_>>().join(", ")
@@ -331,7 +357,7 @@ impl VehicleNumbers {
     fn line(&self) -> String {
         let Self { model, max_tilt_deg, thrust_share } = self;
         format!(
-            "{model}, tilted by {max_tilt_deg:.1} degrees at most, rotors at {:.0} % of their most",
+            "{model}, tilt at most {max_tilt_deg:.1} degrees, rotor thrust at most {:.0} % of the maximum",
             100.0 * thrust_share
         )
     }
@@ -339,25 +365,30 @@ impl VehicleNumbers {
 
 impl Verification {
     fn line(&self) -> String {
-        let firm = if self.firm { "firm" } else { "NOT FIRM, what happens depends on the step" };
-        let pass = if self.pass { "passes" } else { "does not pass" };
+        let found = match (self.firm, self.pass) {
+            (true, true) => "firm: at half the step it passes",
+            (true, false) => "DOES NOT PASS at half the step either (firm)",
+            (false, true) => "NOT FIRM, the outcome depends on the step: at half the step it passes",
+            (false, false) => "NOT FIRM, the outcome depends on the step: at half the step it does not pass",
+        };
         let min_m = self.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
         let reached =
             self.reached_at_s.map_or("not reached".to_owned(), |at_s| format!("reached at {}", seconds(at_s)));
-        format!("{firm}: at half the step it {pass}, never closer than {min_m} m, formation {reached}")
+        format!("{found}, never closer than {min_m} m, formation {reached}")
     }
 }
 
 fn network_line(&Traffic { sent, lost, age_p95_s }: &Traffic) -> String {
     let share = 100.0 * lost as f64 / sent.max(1) as f64;
-    let age =
-        age_p95_s.map_or_else(String::new, |age_s| format!("; 95 % of what was held was no older than {age_s:.3} s"));
+    let age = age_p95_s
+        .map_or_else(String::new, |age_s| format!("; 95 % of the states held were no older than {age_s:.3} s"));
     format!("{lost} of {sent} messages lost ({share:.1} %){age}")
 }
 
-/// A length with two decimals, or in powers of ten where that would show little.
-fn short(number: f64) -> String {
-    if number.abs() < 5e-2 { metres(number) } else { format!("{number:.2}") }
+/// Writes the label of `label: detail` in capitals.
+fn capital_label(failure: &str) -> String {
+    let (label, detail) = failure.split_at(failure.find(':').unwrap_or(failure.len()));
+    label.to_uppercase() + detail
 }
 
 fn or_dash(number: Option<f64>) -> String {

@@ -1,4 +1,4 @@
-//! `export`: writes a recording in another format.
+//! `export_file`: writes a recording in another format.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -16,21 +16,21 @@ use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Rec
 /// A recording and the file to write.
 #[derive(Clone, Debug)]
 pub struct ExportRequest {
-    /// Files or folders; several are one recording with a vehicle in each.
+    /// Files or folders. Several paths are one recording, each with a vehicle of its own.
     pub paths: Vec<PathBuf>,
-    /// How they are read.
+    /// Options of the readers.
     pub options: ReadOptions,
-    /// The file to write.
+    /// Path of the output.
     pub output: PathBuf,
-    /// The format to write; by default that of the extension of the file.
+    /// Format of the output; by default that of the file name extension.
     pub format: Option<Format>,
-    /// How often curves are sampled \[Hz\]; what is between the samples is lost.
+    /// Sampling rate of curves \[Hz\]. The motion between the samples is lost.
     pub sample_hz: Option<f64>,
-    /// Whether a file that exists is overwritten.
+    /// Whether an existing file is overwritten.
     pub force: bool,
 }
 
-/// A recording that ends with an error once the user has had enough, so that no unfinished file is left behind.
+/// A recording that ends with an error after an interruption, so that no unfinished file is left behind.
 struct Interruptible {
     tracks: Recording,
     path: PathBuf,
@@ -57,7 +57,7 @@ impl Tracks for Interruptible {
 }
 
 impl ExportRequest {
-    /// The format to write, of a file that may be written.
+    /// Returns the output format, after checking that the file may be written.
     fn checked(&self) -> Result<Format, Failure> {
         let path = &self.output;
         let by_extension = || {
@@ -65,7 +65,7 @@ impl ExportRequest {
             WRITTEN.iter().copied().find(|format| format.name.eq_ignore_ascii_case(extension))
         };
         let format = self.format.or_else(by_extension).ok_or_else(|| {
-            let message = format!("the name `{}` does not tell a format", path.display());
+            let message = format!("the file name `{}` has no extension of a known format", path.display());
             let help = "name the format with --format csv, parquet, npz or mcap";
             Failure::input("export/unknown-format", message, help)
         })?;
@@ -79,10 +79,10 @@ impl ExportRequest {
     }
 }
 
-/// Writes a recording in another format, the same to the last bit. A file is written whole or not at all.
+/// Writes a recording in another format without rounding. The file is written atomically.
 ///
 /// # Errors
-/// [`Failure`] where the recording cannot be read, or the file cannot be written.
+/// [`Failure`] if the recording cannot be read or the file cannot be written.
 pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(), Failure> {
     let request =
         &ExportRequest { paths: request.paths.iter().map(|path| recording_in(path)).collect(), ..request.clone() };
@@ -114,7 +114,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     Ok(())
 }
 
-/// Returns a note where the run's audit, which is not exported, holds more than the samples.
+/// Returns a note if the run's audit, which is not exported, holds more than the samples.
 fn lost(request: &ExportRequest, monitor: &dyn Monitor) -> Option<String> {
     let lost = format!("the run's audit of every step is not in {}", request.output.display());
     match own_recording(&request.paths, &request.options, monitor) {

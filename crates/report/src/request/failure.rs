@@ -1,4 +1,4 @@
-//! Why a request has no answer.
+//! Errors of requests.
 
 use std::fmt::{self, Display};
 use std::ops::RangeInclusive;
@@ -14,12 +14,13 @@ use tautline_sim::sim::SimError;
 
 use crate::report::ArtefactError;
 
-/// Longest line of a source that a frame around it can show \[bytes\].
+/// Longest line of a source text that is shown in a frame \[bytes\].
 const LONGEST_LINE: usize = 400;
 
-/// Why a request has no answer: the input is wrong, or the machine failed.
+/// Error of a request: the input is wrong, or the machine failed.
 ///
-/// [`fmt::Display`] is one line: place, problem and remedy. Control characters of the input are blanked.
+/// [`fmt::Display`] writes place, problem and remedy in one line. Control characters of the input are replaced by
+/// blanks.
 #[derive(Clone, Debug)]
 pub struct Failure {
     code: &'static str,
@@ -30,25 +31,25 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// A failure by wrong input. `code` is stable, such as `audit/no-limit`.
+    /// Returns a failure of the input. `code` is stable, such as `audit/no-limit`.
     #[must_use]
     pub fn input(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
         Self::new(code, false, message).with_help(help)
     }
 
-    /// A failure of the machine: no space, no permission, no adapter.
+    /// Returns a failure of the machine: no space, no permission, no adapter.
     #[must_use]
     pub fn machine(code: &'static str, message: impl AsRef<str>) -> Self {
         Self::new(code, true, message)
     }
 
-    /// The failure after an interruption.
+    /// Returns the failure after an interruption.
     #[must_use]
     pub fn interrupted() -> Self {
         Self::machine("interrupted", "interrupted")
     }
 
-    /// A failure of either kind, without a remedy.
+    /// Returns a failure of either kind, without a remedy.
     #[must_use]
     pub fn new(code: &'static str, is_machine: bool, message: impl AsRef<str>) -> Self {
         Self { code, is_machine, message: blanked(message.as_ref()), help: None, place: None }
@@ -61,7 +62,7 @@ impl Failure {
         self
     }
 
-    /// Puts the situation in front of the message.
+    /// Puts the context in front of the message.
     #[must_use]
     pub fn under(mut self, situation: &str) -> Self {
         self.message = blanked(&format!("{situation}: {}", self.message));
@@ -74,7 +75,7 @@ impl Failure {
         self.under(&file.display().to_string())
     }
 
-    /// Says where in a text the problem stands.
+    /// Adds the place of the problem in a text.
     #[must_use]
     pub fn at(mut self, place: &Place) -> Self {
         if place.text.lines().any(|line| line.len() > LONGEST_LINE) {
@@ -84,37 +85,37 @@ impl Failure {
         self
     }
 
-    /// The stable name of the problem, such as `audit/no-limit`.
+    /// Returns the stable error code, such as `audit/no-limit`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         self.code
     }
 
-    /// Whether the machine failed (exit code 3) and not the input (exit code 2).
+    /// Returns whether the machine failed (exit code 3), as opposed to the input (exit code 2).
     #[must_use]
     pub fn is_machine(&self) -> bool {
         self.is_machine
     }
 
-    /// The problem, without place and remedy.
+    /// Returns the problem, without place and remedy.
     #[must_use]
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// The remedy.
+    /// Returns the remedy.
     #[must_use]
     pub fn help(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// Where in a text the problem stands. Its lines are short enough to be shown.
+    /// Returns the place of the problem in a text, whose lines are short enough to be shown.
     #[must_use]
     pub fn place(&self) -> Option<&Place> {
         self.place.as_deref()
     }
 
-    /// The problem and its remedy in one line.
+    /// Returns the problem and its remedy in one line.
     #[must_use]
     pub fn in_words(&self) -> String {
         self.help.as_ref().map_or_else(|| self.message.clone(), |help| format!("{} ({help})", self.message))
@@ -132,7 +133,7 @@ impl Display for Failure {
 
 impl std::error::Error for Failure {}
 
-/// The text with control characters blanked, byte for byte: the content of a file must not steer a terminal.
+/// Replaces control characters by blanks of the same length, because the content of a file must not control a terminal.
 #[must_use]
 pub fn blanked(text: &str) -> String {
     let blank =
@@ -140,7 +141,7 @@ pub fn blanked(text: &str) -> String {
     text.chars().map(blank).collect()
 }
 
-/// Refuses a number that is out of its range; `option` names it, such as `--runs`.
+/// Checks that a number is in its range. `option` names it, such as `--runs`.
 ///
 /// # Errors
 /// [`Failure`] with the code `request/out-of-range`.
@@ -155,7 +156,7 @@ pub fn in_range<T: PartialOrd + Display>(option: &str, value: &T, range: &RangeI
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
-        // The error's own text shows a part of a line of any length.
+        // The message of the error shows a part of a line of any length.
         if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
             return Self::new(error.code(), false, error.to_string());
         }
@@ -172,9 +173,8 @@ impl From<ScenarioError> for Failure {
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         match error {
-            RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string()).with_help(
-                "what was recorded before stays readable; free some space or give another folder with --out",
-            ),
+            RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string())
+                .with_help("the recording up to here is readable; free some space or give another folder with --out"),
             RecordError::Open { .. } => Self::new("files/cannot-read", false, error.to_string()),
             RecordError::Read { .. } => Self::new("recording/malformed", false, error.to_string()),
         }
@@ -233,7 +233,7 @@ impl From<RecordedError> for Failure {
                 "give the largest acceleration with --max-accel A or --max-accel NAME=A",
             ),
             RecordedError::NoLimit { .. } => {
-                ("audit/no-limit", "give --delta, or --radius NAME=R; or ask --limit and --fence alone")
+                ("audit/no-limit", "give --delta, or --radius NAME=R; or give --limit and --fence alone")
             }
             RecordedError::NoAccelWindow => (
                 "audit/acceleration-window",
@@ -242,7 +242,7 @@ impl From<RecordedError> for Failure {
             RecordedError::LimitOfJumps { .. } => {
                 ("audit/limit-of-jumps", "give --motion linear, or bounded with --max-accel")
             }
-            RecordedError::UnknownVehicle { .. } => ("audit/unknown-vehicle", "name vehicles as the recording does"),
+            RecordedError::UnknownVehicle { .. } => ("audit/unknown-vehicle", "use the names of the recording"),
             RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
             RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
             RecordedError::RadiusChanges { .. } => {
@@ -251,10 +251,10 @@ impl From<RecordedError> for Failure {
             RecordedError::ObstaclesAndEllipsoid => {
                 ("audit/obstacles-and-ellipsoid", "judge obstacles by --delta or --radius, and ellipsoids without them")
             }
-            RecordedError::Obstacle(_) => ("audit/obstacle", "mend the file of obstacles"),
+            RecordedError::Obstacle(_) => ("audit/obstacle", "correct the obstacle file"),
             RecordedError::TwoClocks { .. } => (
                 "audit/two-clocks",
-                "set a clock right with --offset NAME=SECONDS, or judge vehicles of one clock with --ids, or a time with \
+                "correct a clock with --offset NAME=SECONDS, or judge vehicles of one clock with --ids, or a time with \
                  --from",
             ),
             RecordedError::Unnamed { .. }
@@ -262,7 +262,7 @@ impl From<RecordedError> for Failure {
             | RecordedError::OutOfOrder { .. }
             | RecordedError::Item { .. } => (
                 "audit/malformed",
-                "mend the recording there, leave the vehicle out with --ids, or look at --offset and --time-scale",
+                "correct the recording there, exclude the vehicle with --ids, or check --offset and --time-scale",
             ),
         };
         Self::input(code, error.to_string(), help)

@@ -1,8 +1,8 @@
-//! Requests: everything that `tautline run` and `tautline audit` do, for programs.
+//! Requests: the work of `tautline run`, `tautline audit` and `tautline export` as functions.
 //!
-//! A request is a struct with all options of a command. A function answers it with a typed result, writes the files that
-//! the request names, and hands notes and progress to a [`Monitor`]. The command line parses its arguments into requests,
-//! the Python package its keyword arguments.
+//! A request is a struct with all options of a command. Its function returns a typed result, writes the files that the
+//! request names, and passes notes and progress to a [`Monitor`]. The command line builds requests from its arguments,
+//! the Python package from keyword arguments.
 //!
 //! | request | function | answer |
 //! | --- | --- | --- |

@@ -1,4 +1,4 @@
-//! What a caller gives to a request: a monitor, which takes notes and ends the work, and a drawer of pictures.
+//! Interfaces to the caller of a request: a monitor for notes and interruption, and a drawer of pictures.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,48 +10,48 @@ use crate::report::page::Picture;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_sim::scenario::Scenario;
 
-/// Receives the output of a request while it is worked on. The command line prints it, other programs mostly drop it.
+/// Receiver of the output of a request. The command line prints it; most other programs drop it.
 ///
-/// All methods but [`Self::interruption`] do nothing by default.
+/// All methods except [`Self::interruption`] do nothing by default.
 pub trait Monitor: Sync {
-    /// The flag that ends the work once it is set.
+    /// Returns the flag that ends the work once it is set.
     fn interruption(&self) -> &Arc<AtomicBool>;
 
-    /// Takes a part of the answer in words, as soon as it is known and before files are written.
+    /// Receives a part of the answer in words, as soon as it is known and before files are written.
     fn say(&self, _text: &str) {}
 
-    /// Takes a note or a warning.
+    /// Receives a note or a warning.
     fn warn(&self, _text: &str) {}
 
-    /// Takes the content of an output file named `-`.
+    /// Receives the content of an output file named `-`.
     ///
     /// # Errors
-    /// [`Failure`] where the content cannot be written.
+    /// [`Failure`] if the content cannot be written.
     fn data(&self, _text: &str) -> Result<(), Failure> {
         Ok(())
     }
 
-    /// A task begins, of `total` units of work where their number is known.
+    /// Starts a task of `total` units of work, if the number is known.
     fn begin(&self, _task: &str, _total: Option<u64>) {}
 
-    /// `units` more units of the task are done.
+    /// Advances the task by `units`.
     fn advance(&self, _units: u64) {}
 
-    /// The task is at its end.
+    /// Ends the task.
     fn finish(&self) {}
 
-    /// Whether the caller has ended the work.
+    /// Returns whether the caller has ended the work.
     fn is_interrupted(&self) -> bool {
         self.interruption().load(Ordering::Relaxed)
     }
 }
 
-/// Drops the output of a part of a request, which the same caller can end.
+/// A monitor that drops the output of a part of a request and shares the interruption of another monitor.
 #[derive(Clone, Copy)]
 pub struct Quiet<'a>(&'a Arc<AtomicBool>);
 
 impl<'a> Quiet<'a> {
-    /// Ends with the work that this monitor watches.
+    /// Returns a monitor with the interruption of `of`.
     #[must_use]
     pub fn new(of: &'a dyn Monitor) -> Self {
         Self(of.interruption())
@@ -64,10 +64,10 @@ impl Monitor for Quiet<'_> {
     }
 }
 
-/// Drops all output.
+/// A monitor that drops all output.
 #[derive(Clone, Debug, Default)]
 pub struct Silent {
-    /// The flag that ends the work once it is set.
+    /// Flag that ends the work once it is set.
     pub interruption: Arc<AtomicBool>,
 }
 
@@ -77,19 +77,19 @@ impl Monitor for Silent {
     }
 }
 
-/// Room for the pictures of a page \[bytes\].
+/// Largest size of the pictures of a page \[bytes\].
 pub const PICTURES_BYTES: usize = 900 << 10;
 
-/// A picture and its name, such as `closest`.
+/// Picture with its name, such as `closest`.
 pub type NamedPicture = (String, Picture);
 
-/// Draws flights; another crate implements it. `()` draws nothing.
+/// Drawer of flights, implemented by another crate. `()` draws nothing.
 pub trait Pictures: Sync {
-    /// Writes pictures of a flight of the scenario into the folder of its run and returns them for its page. A machine that
-    /// cannot draw writes none and warns.
+    /// Writes pictures of a flight into the folder of its run and returns them for its page. A machine that cannot draw
+    /// writes none and warns.
     ///
     /// # Errors
-    /// [`Failure`] where a file cannot be written.
+    /// [`Failure`] if a file cannot be written.
     fn draw(
         &self,
         scenario: &Scenario,
@@ -98,13 +98,13 @@ pub trait Pictures: Sync {
         monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure>;
 
-    /// Flies the scenario and draws the instant `at_s` \[s\]: an image as a data URI of about `room_bytes`.
+    /// Flies the scenario and draws the instant `at_s` \[s\]. Returns an image as a data URI of about `room_bytes`.
     ///
     /// # Errors
-    /// [`Failure`] where the scenario cannot be flown or the machine cannot draw.
+    /// [`Failure`] if the scenario cannot be flown or the machine cannot draw.
     fn shot(&self, scenario: &Scenario, at_s: f64, room_bytes: usize) -> Result<String, Failure>;
 
-    /// A topic that is recorded beside positions, so that other viewers can show the flight.
+    /// Returns a topic that is recorded beside positions, so that other viewers can show the flight.
     fn topic(&self, _scenario: &Scenario) -> Option<Box<dyn ExtraTopic>> {
         None
     }
@@ -122,6 +122,6 @@ impl Pictures for () {
     }
 
     fn shot(&self, _scenario: &Scenario, _at_s: f64, _room_bytes: usize) -> Result<String, Failure> {
-        Err(Failure::machine("pictures/none", "this build draws nothing"))
+        Err(Failure::machine("pictures/none", "this build cannot draw"))
     }
 }

@@ -1,4 +1,4 @@
-//! Files that a command writes: none may be what it reads or another of them, and a finished folder is kept.
+//! Checks of output files: no output may overwrite an input, another output or a finished folder.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -10,17 +10,16 @@ use serde_json::Value;
 use super::{Failure, Monitor};
 use crate::report::{INTERRUPTED, write_atomically};
 
-/// The name that stands for standard output.
+/// Name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";
 
-/// A file and what it is called: `--events`, or `the recording`.
+/// File with its name in messages, such as `--events` or `the recording`.
 pub type Called<'a> = (&'static str, &'a Path);
 
-/// Refuses outputs that would replace an input, become a part of an input that is a folder of CSV files, or replace each
-/// other.
+/// Rejects outputs that would overwrite an input or each other, or become part of an input folder of CSV files.
 ///
 /// # Errors
-/// [`Failure`] that names both.
+/// [`Failure`] that names both files.
 pub fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failure> {
     let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|&(called, path)| Some((place(path)?, called))).collect();
     for &(option, path) in outputs {
@@ -40,8 +39,8 @@ pub fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failur
     Ok(())
 }
 
-/// Refuses outputs of a command about a scenario that would replace it, each other, or without `--force` a file that is
-/// there, and places that cannot be written to, before an hour of flights.
+/// Rejects outputs of a command about a scenario that would overwrite the scenario, each other or, without `--force`,
+/// an existing file, and places that are not writable. This check precedes hours of flights.
 ///
 /// # Errors
 /// [`Failure`] that names the file.
@@ -57,7 +56,7 @@ pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = Called<'a>>, 
     for (option, file) in files {
         let shown = file.display();
         if file.is_dir() {
-            let help = format!("give {option} a file within it");
+            let help = format!("give {option} a file in this directory");
             return Err(Failure::input("files/is-directory", format!("{shown} is a directory"), help));
         }
         if file.is_file() && !force {
@@ -78,16 +77,16 @@ pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = Called<'a>>, 
     Ok(())
 }
 
-/// Whether the name of an output stands for standard output.
+/// Returns whether the name of an output stands for standard output.
 #[must_use]
 pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new(STANDARD_OUTPUT)
 }
 
-/// Writes a file whole, or to standard output.
+/// Writes a file atomically, or to standard output.
 ///
 /// # Errors
-/// [`Failure`] where it cannot be written.
+/// [`Failure`] if the file cannot be written.
 pub fn write(file: &Path, bytes: &[u8], monitor: &dyn Monitor) -> Result<(), Failure> {
     if is_standard_output(file) {
         return monitor.data(&String::from_utf8_lossy(bytes));
@@ -95,23 +94,23 @@ pub fn write(file: &Path, bytes: &[u8], monitor: &dyn Monitor) -> Result<(), Fai
     Ok(write_atomically(file, bytes)?)
 }
 
-/// Where a file is or will be, through links and folders that are yet to be made. `None` for what is no file, such as a
-/// pipe or a device: nothing is replaced there.
+/// Returns the resolved path of a file, which may not exist yet. Returns `None` for a path that is not a regular file,
+/// such as a pipe or a device: nothing is overwritten there.
 fn place(path: &Path) -> Option<PathBuf> {
     match fs::metadata(path) {
         Ok(there) if there.is_file() || there.is_dir() => fs::canonicalize(path).ok(),
         Ok(_) => None,
-        // A link that leads to nothing yet: what it names is what will be made.
+        // The target of a dangling link is the file that will be made.
         Err(_) => yet_to_be(&fs::read_link(path).map_or_else(|_| path.to_owned(), |next| path.with_file_name(next))),
     }
 }
 
-/// Where something that is not there will be.
+/// Returns the resolved path of a file that does not exist.
 fn yet_to_be(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = match fs::canonicalize(folder) {
         Ok(folder) => folder,
-        // The folder that the program was started in is gone.
+        // The working folder was removed.
         Err(_) if folder == Path::new(".") => return None,
         Err(_) => yet_to_be(folder)?,
     };
@@ -122,7 +121,7 @@ fn yet_to_be(path: &Path) -> Option<PathBuf> {
     }
 }
 
-/// A folder that is finished once it holds its report.
+/// An output folder. It is finished once it holds its report.
 pub struct OutFolder {
     path: PathBuf,
     what: &'static str,
@@ -130,35 +129,35 @@ pub struct OutFolder {
 }
 
 impl OutFolder {
-    /// The folder at `path` of a `what`, such as `run`, whose report has that name.
+    /// Returns the folder at `path` of a `what`, such as `run`, whose report is named `report`.
     #[must_use]
     pub fn at(path: impl Into<PathBuf>, what: &'static str, report: &'static str) -> Self {
         Self { path: path.into(), what, report }
     }
 
-    /// The path of the folder.
+    /// Returns the path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A file in the folder.
+    /// Returns the path of a file in the folder.
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// The report.
+    /// Returns the path of the report.
     #[must_use]
     pub fn report(&self) -> PathBuf {
         self.file(self.report)
     }
 
-    /// Makes the folder ready. A finished one is kept unless `force` says otherwise; a run that its user stopped is not.
-    /// The lock keeps another writer out until it is dropped, where the system can lock a folder.
+    /// Makes the folder ready. A finished folder is kept without `force`, except one of an interrupted run. The lock
+    /// excludes other writers until it is dropped, if the system supports locks of folders.
     ///
     /// # Errors
-    /// [`Failure`] where the folder holds a finished result, another process writes to it, or the system refuses.
+    /// [`Failure`] if the folder holds a finished result, another process writes to it, or it is not writable.
     pub fn open(&self, force: bool) -> Result<Option<File>, Failure> {
         let report = self.report();
         if report.exists() && !force && !was_interrupted(&report) {
@@ -170,7 +169,7 @@ impl OutFolder {
         }
         let machine = |path: &Path, error: &io::Error| {
             Failure::machine("files/cannot-write", format!("cannot write {}: {error}", path.display()))
-                .with_help("give a folder that can be written to with --out")
+                .with_help("give a writable folder with --out")
         };
         fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
         let lock = File::open(&self.path).ok();
@@ -181,9 +180,9 @@ impl OutFolder {
                 "wait for it, or give another folder with --out",
             ));
         }
-        // Known before the work begins, and before anything old is taken away.
+        // Checked before the work begins and before old files are removed.
         try_to_write_in(&self.path).map_err(|error| machine(&self.path, &error))?;
-        // From here on the old report and its page would describe something else.
+        // The old report and its page would describe another result from here on.
         for old in [&report, &report.with_extension("html")] {
             match fs::remove_file(old) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(machine(old, &error)),
@@ -194,16 +193,16 @@ impl OutFolder {
     }
 }
 
-/// Whether a report is of a run that its user stopped.
+/// Returns whether a report is that of an interrupted run.
 fn was_interrupted(report: &Path) -> bool {
     let text = fs::read_to_string(report).unwrap_or_default();
     serde_json::from_str::<Value>(&text).is_ok_and(|report| report["run"]["ended_early"] == INTERRUPTED)
 }
 
-/// Makes a folder and a file in it, and takes the file away again.
+/// Makes a folder, and makes and removes a file in it.
 ///
 /// # Errors
-/// What the system says.
+/// The error of the system.
 pub fn try_to_write_in(folder: &Path) -> io::Result<()> {
     let probe = folder.join(format!(".tautline-{}", std::process::id()));
     fs::create_dir_all(folder).and_then(|()| File::create(&probe)).and_then(|_| fs::remove_file(&probe))
@@ -218,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn one_place_by_two_names_is_one_place_whether_it_is_there_or_not() {
+    fn two_names_of_one_place_clash_even_if_it_does_not_exist() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::write(at("flight.csv"), "").expect("written");
@@ -236,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_csv_file_in_a_folder_that_is_read_becomes_a_part_of_it_and_a_picture_does_not() {
+    fn csv_files_in_an_input_folder_clash_and_pictures_do_not() {
         let folder = tempfile::tempdir().expect("a folder");
         let [csv, png] = ["flights/new.csv", "flights/new.png"].map(|name| folder.path().join(name));
         let read = [("the recording", folder.path())];
@@ -246,7 +245,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_to_what_is_yet_to_be_made_is_followed() {
+    fn follows_dangling_links() {
         let folder = tempfile::tempdir().expect("a folder");
         let [link, end, round] = ["link.png", "end.png", "round.png"].map(|name| folder.path().join(name));
         std::os::unix::fs::symlink("end.png", &link).expect("a link");

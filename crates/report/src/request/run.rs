@@ -1,4 +1,4 @@
-//! `run_into`: flies a scenario and leaves a recording, figures, pictures and a report.
+//! `run_into`: flies a scenario and writes its recording, report, figures and pictures.
 
 use std::fs;
 use std::io;
@@ -20,65 +20,66 @@ use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim;
 
-/// The name of the recording in the folder of a run.
+/// Name of the recording in the folder of a run.
 pub const RECORDING: &str = "run.mcap";
-/// Steps between two looks at the progress bar.
+/// Number of steps between two updates of the progress bar.
 const PROGRESS_EVERY: u64 = 64;
-/// Threads that a flight has work for: one for the law and one for the audit.
+/// Number of threads that a flight can use: one for the law and one for the audit.
 const THREADS_OF_USE: usize = 2;
 
-/// A scenario, and what its flight leaves in a folder.
+/// A scenario, with the options of its flight and its folder.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an option of its own")]
 pub struct RunRequest<'a> {
     /// The scenario.
     pub scenario: &'a Scenario,
-    /// The command that flies the same again, for the page.
+    /// Command that repeats the flight, for the page.
     pub command: String,
-    /// The folder; by default `out/NAME`, where NAME is the scenario's.
+    /// Output folder; by default `out/NAME` with the name of the scenario.
     pub out: Option<PathBuf>,
-    /// Whether a folder that holds a finished run is overwritten.
+    /// Whether a finished run is overwritten.
     pub force: bool,
     /// Whether figures are drawn.
     pub figures: bool,
-    /// Whether the scenario is flown again at half the step, to see what that changes.
+    /// Whether the scenario is flown again at half the step.
     pub verify: bool,
-    /// Threads to use, of which two are of use; by default one a core. The recording has the same bits for any number.
+    /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
+    /// bits for any number.
     pub threads: Option<usize>,
-    /// Whether wall-clock times are a part of the report. Without them the same flight leaves the same bytes.
+    /// Whether the report contains wall-clock times. Without them equal flights give equal bytes.
     pub is_timed: bool,
 }
 
 impl<'a> RunRequest<'a> {
-    /// A request with figures and times, into `out/NAME`.
+    /// Returns a request with figures and times, into `out/NAME`.
     #[must_use]
     pub fn new(scenario: &'a Scenario, command: String) -> Self {
         Self { scenario, command, out: None, force: false, figures: true, verify: false, threads: None, is_timed: true }
     }
 
-    /// A request that overwrites a folder and leaves the same bytes each time.
+    /// Returns a request that overwrites its folder and writes the same bytes each time.
     #[must_use]
     pub fn reproducible(scenario: &'a Scenario, command: String, out: PathBuf) -> Self {
         Self { out: Some(out), force: true, is_timed: false, ..Self::new(scenario, command) }
     }
 }
 
-/// The answer of a run, beside its files.
+/// Result of a run beside its files.
 pub struct RunFiles {
-    /// The report, as in `report.json`.
+    /// Report, as in `report.json`.
     pub report: Report,
-    /// The history of the flight.
+    /// History of the flight.
     pub log: Arc<FlightLog>,
-    /// Pictures by their names, such as `closest`.
+    /// Pictures with their names, such as `closest`.
     pub pictures: Vec<NamedPicture>,
 }
 
-/// Flies a scenario and leaves everything that is asked for in a folder: `run.mcap`, `report.json`, `report.html`,
-/// `figures/*.svg` and `snapshots/*.png`. The report comes last: a folder with a report is whole.
+/// Flies a scenario and writes its folder: `run.mcap`, `report.html`, `figures/*.svg`, `snapshots/*.png` and
+/// `report.json`. The report is written last, so a folder with a report is complete.
 ///
 /// # Errors
-/// [`Failure`] where the scenario cannot be flown, the folder holds a finished run, or the system refuses. What was recorded
-/// up to then stays readable.
+/// [`Failure`] if the scenario cannot be flown, the folder holds a finished run, or a file cannot be written. The
+/// recording up to then stays readable.
 pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn Monitor) -> Result<RunFiles, Failure> {
     let scenario = request.scenario;
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
@@ -90,7 +91,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     for warning in &preflight.warnings {
         monitor.warn(&warning.to_string());
     }
-    // Nothing is written before everything that can be wrong with the input has been looked at.
+    // All checks of the input precede the first write.
     let path = request.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;
@@ -131,7 +132,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     Ok(RunFiles { report, log, pictures })
 }
 
-/// Flies the scenario; the recording is complete when this returns, whether the flight went well or not.
+/// Flies the scenario. The recording is closed when this function returns, with or without an error.
 fn fly(
     scenario: &Scenario,
     preflight: &Preflight,
@@ -163,19 +164,19 @@ fn fly(
     Ok(report)
 }
 
-/// Starts a pool of `number` threads, or of one per core for 0.
+/// Starts a pool of `number` threads, or of one thread per core for 0.
 ///
 /// # Errors
-/// [`Failure`] where the system refuses.
+/// [`Failure`] if the threads cannot be started.
 pub fn threads(number: usize) -> Result<ThreadPool, Failure> {
     let built = rayon::ThreadPoolBuilder::new().num_threads(number).build();
     built.map_err(|error| Failure::machine("machine/threads", format!("cannot start threads: {error}")))
 }
 
-/// The replay of a flight, with what was found on it, in at most `room_bytes`.
+/// Returns the replay of a flight with its findings, of at most `room_bytes`.
 ///
 /// # Errors
-/// [`NoReplay`] where it does not fit, or nothing was flown.
+/// [`NoReplay`] if it does not fit, or the flight has no samples.
 pub fn replay_of_run(
     scenario: &Scenario,
     log: &FlightLog,
@@ -187,7 +188,7 @@ pub fn replay_of_run(
     Replay::new(&stage, log, &report.moments(&names), report.judgement(), room_bytes)
 }
 
-/// A run as charts.
+/// Returns the charts of a run.
 fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure> {
     let criteria = Criteria {
         delta_m: scenario.delta_m,
@@ -200,7 +201,7 @@ fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure>
     figures::of_run(log, &criteria)
 }
 
-/// The page on a flight that the caller has flown itself, which `command` flies again; without pictures.
+/// Returns the page of a flight that the caller has flown. `command` repeats the flight. The page has no pictures.
 #[must_use]
 pub fn flight_page(
     scenario: &Scenario,
@@ -218,8 +219,8 @@ pub fn flight_page(
     report.to_html(&page)
 }
 
-/// Writes `figures/*.svg` and `report.html` into the folder of a run and returns the path of the page. Figures of an
-/// earlier run are removed.
+/// Writes `figures/*.svg` and `report.html` into the folder of a run, and removes figures of an earlier run. Returns
+/// the path of the page.
 fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>) -> Result<PathBuf, Failure> {
     let names = figures::NAMES_OF_RUN.map(|name| format!("{name}.svg"));
     write_files(&folder.join("figures"), &names, &svg_files(page.figures))?;
@@ -228,16 +229,16 @@ fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>) -> Result<Path
     Ok(path)
 }
 
-/// Names and contents of the files of figures.
+/// Returns names and contents of the files of figures.
 #[must_use]
 pub fn svg_files(figures: &[Figure]) -> Vec<(String, Vec<u8>)> {
     figures.iter().map(|figure| (format!("{}.svg", figure.name), figure.svg.clone().into_bytes())).collect()
 }
 
-/// Writes files into a folder, and removes those of `names` that are not among them.
+/// Writes files into a folder, and removes the files of `names` that are not among them.
 ///
 /// # Errors
-/// [`Failure`] where the system refuses.
+/// [`Failure`] if a file cannot be written or removed.
 pub fn write_files(folder: &Path, names: &[String], files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
     let failure = |path: &Path, error: &io::Error| {
         Failure::machine("files/cannot-write", format!("cannot write {}: {error}", path.display()))

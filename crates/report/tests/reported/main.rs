@@ -1,4 +1,4 @@
-//! Flights and what their reports say.
+//! Flights and their reports.
 
 #[path = "../../../sim/tests/flights/flight.rs"]
 mod flight;

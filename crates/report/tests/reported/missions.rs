@@ -1,7 +1,7 @@
 //! References, leaders, legs and deadlock recoveries under the displacement law.
 //!
-//! 20 random missions of three legs in continuous time; `TAUTLINE_RANDOM_MISSIONS=1000 cargo test --release --test reported
-//! missions -- --nocapture` flies 1,000 and prints what docs/validation.md says of them.
+//! 20 random missions of three legs in continuous time; `TAUTLINE_RANDOM_MISSIONS=1000 cargo test --release --test
+//! reported missions -- --nocapture` flies 1,000 and prints the numbers of docs/validation.md.
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
@@ -19,7 +19,7 @@ use crate::flight::{builtin, fly, read};
 use crate::numbers::Numbers;
 use crate::random_scenarios::places;
 
-/// Three legs on some graph, behind some reference or none, from places at least 1.1 delta apart.
+/// Returns a random mission of three legs, with a random graph and reference, from positions at least 1.1 delta apart.
 fn mission(seed: u64) -> Scenario {
     let mut numbers = Numbers(seed.wrapping_mul(0xa076_1d64_78bd_642f));
     let sixth = 6.0 * numbers.unit();
@@ -58,7 +58,7 @@ fn mission(seed: u64) -> Scenario {
     scenario
 }
 
-/// Half of the missions have no reference; the others follow one that is known by all, by one, or flown by a leader.
+/// Adds a reference to half of the missions: known to all vehicles, known to one, or flown by a leader.
 fn guide(scenario: &mut Scenario, numbers: &mut Numbers, extent_m: f64) {
     let known_by = match 6.0 * numbers.unit() {
         ..1.0 => Pinning::All,
@@ -91,7 +91,7 @@ fn guide(scenario: &mut Scenario, numbers: &mut Numbers, extent_m: f64) {
 }
 
 #[test]
-fn no_random_mission_breaks_what_was_certified_before_its_first_step() {
+fn random_missions_keep_their_certificates() {
     let missions = std::env::var("TAUTLINE_RANDOM_MISSIONS").map_or(20, |n| n.parse().expect("a number"));
     let (mut tightest, mut worst_rise) = (f64::INFINITY, 0.0_f64);
     for seed in 0..missions {
@@ -124,10 +124,10 @@ fn no_random_mission_breaks_what_was_certified_before_its_first_step() {
     assert!(worst_rise < 1e-6, "{worst_rise}");
 }
 
-/// Three legs with places behind way points, the last from a time on, in Rapier: each is reached, and what is
-/// certified holds.
+/// Three legs with assigned slots behind way points in Rapier, the last from a given time on. Each leg is reached, and
+/// the certificates hold.
 #[test]
-fn a_mission_is_flown_leg_by_leg_and_reported_so() {
+fn mission_reaches_every_leg_and_reports_each() {
     let scenario = read(MISSION);
     let report = run(&scenario, &mut ()).expect("a report");
     assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
@@ -139,7 +139,7 @@ fn a_mission_is_flown_leg_by_leg_and_reported_so() {
     assert!(report.separation.min_m > report.separation.certified_m);
     assert!(report.headline().contains("3 of 3 legs reached"), "{}", report.headline());
 
-    // Negative twin: no time for the second leg.
+    // Counter-example: no time for the second leg.
     let hurried = read(&MISSION.replace("start_s = 40.0", "start_s = 20.5"));
     let report = run(&hurried, &mut ()).expect("a report");
     assert!(!report.verdict.pass);
@@ -165,10 +165,12 @@ yaw_deg = 45.0
 move_m = [3, 0]
 "#;
 
-/// A leader that turns in a circle, without its acceleration fed forward to those who follow, is followed late: each lags
-/// by `(k sigma M)^-1 1 (a0 - a22 r')`, here exactly by `|r''|/k` on a star with a22 = 0.
+/// A leader turns in a circle. Without feed-forward of its acceleration each follower lags by `(k sigma M)^-1 1 (a0 -
+/// a22 r')`, here exactly by `
+/// r''
+/// /k` on a star with a22 = 0.
 #[test]
-fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_where_it_is_not() {
+fn followers_lag_without_feed_forward_of_the_leaders_acceleration() {
     let flown = |fed: bool| {
         let sets = [
             "law.kind=displacement",
@@ -180,7 +182,7 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
             "deadlock.mode=off",
         ];
         let mut scenario = builtin("pentagon", &sets);
-        // A constant acceleration: a circle so large that its start is a parabola.
+        // Nearly constant acceleration: the start of a very large circle.
         let Some(guidance) = &mut scenario.reference else { panic!("a reference") };
         guidance.motion =
             ReferenceMotion::Circle { centre_m: Vector3::zeros(), radius_m: 1e4, period_s: RADIUS_PERIOD_S };
@@ -212,7 +214,7 @@ fn a_leader_is_followed_exactly_where_its_acceleration_is_fed_forward_and_late_w
 const RADIUS_PERIOD_S: f64 = 1_986.917_653;
 
 #[test]
-fn a_reference_cures_the_drift_that_feeding_causes() {
+fn reference_removes_the_drift_of_feed_forward() {
     let sets = [
         "law.kind=displacement",
         "swarm.a22_per_s=0.2",
@@ -226,7 +228,7 @@ fn a_reference_cures_the_drift_that_feeding_causes() {
     assert!(held.verdict.pass && held.velocity.common_m_s < Some(1e-3), "{:?}", held.verdict);
 }
 
-/// 16 random vehicles on their way to given slots in a grid stand in each other's way.
+/// 16 random vehicles block each other on their way to assigned slots in a grid.
 #[test]
 fn a_stalled_swarm_arrives_only_with_deadlock_recovery() {
     let stuck = |mode: &str| read(&CROWD.replace("MODE", mode));
@@ -263,7 +265,7 @@ fn the_certificate_includes_slots_spread_from_the_start() {
     assert!(promised_m > closest_m, "{promised_m} {closest_m}");
 }
 
-/// A leader stays where it is while slots are spread about it, and the energy does what the proof says.
+/// A leader stays at rest while slots are spread about it, and the energy keeps its bound.
 #[test]
 fn slots_spread_about_a_leader_leave_it_at_rest() {
     let led = WEAK_STAR.replace("MODE", "start") + "reference = { kind = \"rest\", leader = 1 }\n";
@@ -287,9 +289,9 @@ deadlock = { mode = "MODE", scale = 4.0 }
 time = { duration_s = 60.0 }
 "#;
 
-/// What a stalled swarm is promised anew holds for the leg that is under way and those after it.
+/// The renewed certificate of a stalled swarm holds for the current leg and the following ones.
 #[test]
-fn legs_are_promised_anew_where_slots_are_spread() {
+fn spreading_slots_renews_the_certificates_of_legs() {
     let text = CROWD.replace("MODE", "auto") + "[[leg]]\nscale = 1.2\n";
     let report = run(&read(&text), &mut ()).expect("a report");
     let recovery = report.deadlock_recoveries.first().expect("a deadlock recovery");
@@ -322,10 +324,10 @@ fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
     let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m;
     assert!(assignment.certified_m <= promised_m, "{assignment:?} {promised_m:?}");
 
-    // The scenario as it was flown is the same scenario.
+    // The resolved scenario reads back as the same scenario.
     assert_eq!(read(&scenario.resolved_toml()), scenario);
 
-    // A simulation that is saved before goes on to the same bits.
+    // A simulation that was saved earlier continues to the same bits.
     let mut simulation = Simulation::new(&scenario).expect("a flight");
     while simulation.time_s() < assignment.time_s - 0.5 {
         simulation.step();
@@ -345,7 +347,7 @@ fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
 }
 
 #[test]
-fn a_reference_or_a_leg_that_cannot_be_flown_is_refused_by_what_is_wrong() {
+fn rejects_invalid_references_and_legs() {
     let code_of = |text: String| {
         let source = tautline_sim::scenario::Source::Text { name: "test".to_owned(), text };
         tautline_sim::scenario::Scenario::read(&source, &[]).map_or_else(|error| error.code(), |_| "")

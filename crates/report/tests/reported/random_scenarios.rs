@@ -1,8 +1,8 @@
-//! Random scenarios, flown in Rapier at default settings and as the equation of motion: both are the same flight up to the
-//! first hard bounce, and neither gains energy nor breaks a certificate.
+//! Random scenarios, flown in Rapier at default settings and in continuous time. Both flights agree up to the first
+//! hard bounce, keep their energy bound and keep their certificates.
 //!
-//! 40 of them; `TAUTLINE_RANDOM_FLIGHTS=2000 cargo test --release --test reported random_scenarios -- --nocapture` flies
-//! 2,000 and prints what docs/validation.md says of them.
+//! The test flies 40 scenarios. `TAUTLINE_RANDOM_FLIGHTS=2000 cargo test --release --test reported random_scenarios --
+//! --nocapture` flies 2,000 and prints the numbers of docs/validation.md.
 
 use tautline_audit::Status;
 use tautline_core::record::OwnedSample;
@@ -17,11 +17,12 @@ use tautline_sim::scenario::{CONTACT_PREDICTION_M, PlantSpec, Scenario};
 use crate::flight::Log;
 use crate::numbers::Numbers;
 
-/// A bounce is hard where the scaled clearance (l - delta)/K of some pair falls below this: V'' is 0.7 / s^3 times that of
-/// the rest length or more there, and what two flights differ by before it is many times larger after it.
+/// Scaled clearance (l - delta)/K of a pair below which a bounce is hard. There V'' is at least 0.7 / s^3 times that at
+/// the rest length, and a bounce multiplies the difference of two flights.
 const HARD: f64 = 0.1;
 
-/// Places \[m\], `count` x 3, within `extent_m` of the origin along the first axes, each more than `apart_m` from the others.
+/// Returns random positions \[m\], `count` x 3, within `extent_m` of the origin along the first axes, each more than
+/// `apart_m` from the others.
 pub(crate) fn places(numbers: &mut Numbers, count: usize, axes: usize, extent_m: f64, apart_m: f64) -> Rows {
     let mut places_m = Rows::zeros(count);
     for i in 0..count {
@@ -37,8 +38,8 @@ pub(crate) fn places(numbers: &mut Numbers, count: usize, axes: usize, extent_m:
     places_m
 }
 
-/// 3 to 8 vehicles in the plane or in space, delta and alpha over three decades, a22 from -2 to 0.1, from random places
-/// at least 1.1 delta apart to a circle or a sphere.
+/// Returns a random scenario. Between 3 and 8 vehicles in the plane or in space start at random positions at least 1.1
+/// delta apart, and form a circle or a sphere. Delta and alpha span three decades, a22 spans -2 to 0.1.
 fn scenario(seed: u64) -> Scenario {
     let mut numbers = Numbers(seed.wrapping_mul(0xd134_2543_de82_ef95));
     let sixth = 6.0 * numbers.unit();
@@ -63,7 +64,7 @@ fn scenario(seed: u64) -> Scenario {
     scenario
 }
 
-/// Smallest separation up to a time \[m\], and when the first pair came to a scaled clearance of [`HARD`].
+/// Smallest separation up to a time \[m\], and the time at which the first pair reached a scaled clearance of [`HARD`].
 struct Approach {
     by_time: Vec<(f64, f64)>,
     first_hard_s: f64,
@@ -100,7 +101,7 @@ fn fly(scenario: &Scenario) -> Flown {
     Flown { report, approach: Approach::of(scenario, &log) }
 }
 
-/// What is wrong with a flight by itself.
+/// Returns the faults of a single flight.
 fn faults(report: &Report) -> impl Iterator<Item = &String> {
     let wrong = ["never grows", "certifies", "detectors", "ended early", "came to"];
     report.verdict.reasons.iter().filter(move |reason| wrong.iter().any(|word| reason.contains(word)))
@@ -126,7 +127,7 @@ fn judge(seed: u64, tally: &mut Tally) {
     for (plant, flown) in [("rapier", &engine), ("ideal", &ideal)] {
         tally.failures.extend(faults(&flown.report).map(|fault| format!("seed {seed}, {plant}: {fault}")));
     }
-    // The sample before the first hard bounce in either.
+    // The last sample before the first hard bounce of either flight.
     let hard_s = engine.approach.first_hard_s.min(ideal.approach.first_hard_s);
     tally.hard += u32::from(hard_s.is_finite());
     let until_s = if hard_s.is_finite() { hard_s - 1.0 / scenario.time.record_hz } else { f64::INFINITY };
@@ -147,7 +148,7 @@ fn judge(seed: u64, tally: &mut Tally) {
 }
 
 #[test]
-fn random_scenarios_are_the_same_flight_in_the_engine_and_in_continuous_time() {
+fn engine_and_continuous_time_agree_up_to_hard_bounces() {
     let flights = if std::env::var_os("TAUTLINE_LONG").is_some() { 400 } else { 40 };
     let flights = std::env::var("TAUTLINE_RANDOM_FLIGHTS").map_or(flights, |count| count.parse().expect("a number"));
     let mut tally = Tally::default();
@@ -156,12 +157,12 @@ fn random_scenarios_are_the_same_flight_in_the_engine_and_in_continuous_time() {
     println!("{flights} flights: {firm} firm, {hard} with a hard bounce, {compared} compared up to it");
     println!("closest approaches differ by at most {worst:.2e} delta up to it; {} failures", failures.len());
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert!(firm > 0 && hard > 0 && compared > 0, "what is compared has been seen");
+    assert!(firm > 0 && hard > 0 && compared > 0, "all three kinds occur");
 }
 
-/// The flight that this is all about: its energy rose to 1.77 of its start, and it was called a pass.
+/// A flight whose energy rose to 1.77 of its start although it passed, before steps were refined.
 #[test]
-fn a_pass_that_the_law_does_not_fly_is_none() {
+fn flight_with_an_energy_rise_does_not_pass() {
     let mut scenario = crate::flight::builtin(
         "circle",
         &[
@@ -177,7 +178,7 @@ fn a_pass_that_the_law_does_not_fly_is_none() {
     let honest = run(&scenario, &mut ()).expect("a report");
     assert!(!honest.verdict.pass && honest.audit.status == Status::Clear, "{:?}", honest.verdict);
     assert_eq!(faults(&honest).count(), 0, "{:?}", honest.verdict);
-    // Taken as they are, the same steps gain energy, and the report says so.
+    // Without halving, the same steps gain energy, and the flight fails.
     (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);
     let careless = run(&scenario, &mut ()).expect("a report");
     assert!(!careless.verdict.pass && faults(&careless).count() > 0, "{:?}", careless.verdict);

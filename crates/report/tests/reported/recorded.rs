@@ -1,4 +1,4 @@
-//! A run hands its samples to the sink that it was given, and hashes the states that a simulation steps through.
+//! A run passes all samples to its sink, and its hash is that of a simulation that is stepped.
 
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash};
 use tautline_report::run::run;
@@ -7,7 +7,7 @@ use tautline_sim::sim::{SimError, Simulation};
 
 use crate::flight::{Log, builtin};
 
-/// The hash of all samples, stepped one by one.
+/// Returns the hash of all samples of a simulation that is stepped.
 fn stepped(scenario: &Scenario) -> String {
     let (mut simulation, mut hash) = (Simulation::new(scenario).expect("a simulation"), StateHash::new());
     loop {
@@ -21,13 +21,13 @@ fn stepped(scenario: &Scenario) -> String {
     }
 }
 
-/// So many vehicles that samples are recorded in a thread of their own.
+/// Returns a scenario whose samples are recorded in a thread of their own.
 fn crowd() -> Scenario {
     builtin("thousand", &["time.duration_s=0.1", "arrival.hold_s=0.05"])
 }
 
 #[test]
-fn a_run_has_the_bits_of_a_simulation_that_is_stepped_and_hands_over_all_samples() {
+fn run_matches_a_stepped_simulation_and_passes_all_samples() {
     for scenario in [builtin("pentagon", &["time.duration_s=3"]), crowd()] {
         let mut log = Log::default();
         let report = run(&scenario, &mut log).expect("a report");
@@ -38,7 +38,7 @@ fn a_run_has_the_bits_of_a_simulation_that_is_stepped_and_hands_over_all_samples
     }
 }
 
-/// A sink that refuses.
+/// A sink that rejects every sample.
 struct Full;
 
 impl Sink for Full {
@@ -52,7 +52,7 @@ impl Sink for Full {
 }
 
 #[test]
-fn a_sink_that_cannot_keep_a_sample_ends_the_run_with_its_error() {
+fn error_of_the_sink_ends_the_run() {
     for scenario in [builtin("pentagon", &["time.duration_s=1"]), crowd()] {
         assert!(matches!(run(&scenario, &mut Full), Err(SimError::Record(_))));
     }

@@ -15,7 +15,7 @@ use tautline_report::request::{
     export_file, run_into,
 };
 
-/// Two that pass each other in a second, 1 m apart in between.
+/// Two vehicles that pass each other in one second, with a smallest separation of 1 m.
 struct Passing {
     names: [String; 2],
     metadata: Metadata,
@@ -70,22 +70,23 @@ fn file(folder: &Path) -> Subject<'static> {
     Subject::Files { paths: vec![path], options: Box::default() }
 }
 
-fn asked(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
+fn audit_request(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
     AuditRequest { settings, ..AuditRequest::new(subject) }
 }
 
 #[test]
-fn motion_that_a_program_holds_is_judged_as_a_recording_of_it() {
+fn motion_in_memory_is_judged_like_its_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("page.html");
     let subject = Subject::Held { name: "arrays", own: None, open: held() };
     let request = AuditRequest {
         command: "audit(...)".to_owned(),
         html: Some(page.clone()),
-        ..asked(subject, Settings::delta(2.0))
+        ..audit_request(subject, Settings::delta(2.0))
     };
     let ours = audit_files(&request, &Silent::default()).expect("judged");
-    let theirs = audit_files(&asked(file(folder.path()), Settings::delta(2.0)), &Silent::default()).expect("judged");
+    let theirs =
+        audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &Silent::default()).expect("judged");
     assert!(!ours.is_good());
     let (ours, theirs) = (ours.report, theirs.report);
     assert_eq!(ours.verdict(), "VIOLATION");
@@ -95,10 +96,10 @@ fn motion_that_a_program_holds_is_judged_as_a_recording_of_it() {
 }
 
 #[test]
-fn a_wrong_question_has_a_code() {
+fn wrong_requests_have_error_codes() {
     let folder = tempfile::tempdir().expect("a folder");
     let code = |settings: Settings, change: &dyn Fn(&mut AuditRequest<'static>)| {
-        let mut request = AuditRequest { config: ConfigFile::None, ..asked(file(folder.path()), settings) };
+        let mut request = AuditRequest { config: ConfigFile::None, ..audit_request(file(folder.path()), settings) };
         change(&mut request);
         let failure = audit_files(&request, &Silent::default()).expect_err("refused");
         assert!(!failure.is_machine() && failure.help().is_some(), "{failure}");
@@ -131,19 +132,19 @@ fn a_wrong_question_has_a_code() {
 }
 
 #[test]
-fn a_radius_beside_an_ellipsoid_is_refused() {
+fn rejects_a_radius_beside_an_ellipsoid() {
     let folder = tempfile::tempdir().expect("a folder");
     let both = Settings { radius_m: Some(0.1), ellipsoid_m: Some(Vector3::new(1.0, 1.0, 2.0)), ..Settings::default() };
-    let failure = audit_files(&asked(file(folder.path()), both), &Silent::default()).expect_err("refused");
+    let failure = audit_files(&audit_request(file(folder.path()), both), &Silent::default()).expect_err("refused");
     assert_eq!(failure.code(), "audit/radius-and-ellipsoid");
 }
 
 #[test]
-fn the_monitor_ends_the_work() {
+fn monitor_ends_the_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let monitor = Silent::default();
     monitor.interruption.store(true, Ordering::Relaxed);
-    let failure = audit_files(&asked(file(folder.path()), Settings::delta(2.0)), &monitor).expect_err("ended");
+    let failure = audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &monitor).expect_err("ended");
     assert_eq!((failure.code(), failure.is_machine()), ("interrupted", true));
     let request = ExportRequest {
         paths: vec![folder.path().join("passing.csv")],
@@ -158,7 +159,7 @@ fn the_monitor_ends_the_work() {
 }
 
 #[test]
-fn a_run_leaves_its_files_and_is_not_overwritten() {
+fn run_writes_its_files_and_is_not_overwritten() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ScenarioRequest::named("pentagon", &["time.duration_s=1".to_owned()]).expect("a scenario");
     let scenario = short.read().expect("a scenario");

@@ -1,4 +1,4 @@
-//! Laws of others do what their sources say of them: where they hold, and where they fail.
+//! Laws from the literature behave as in their sources, including their failures.
 
 use tautline_audit::{Status, swept_separation_m};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, separation};
@@ -13,8 +13,9 @@ use tautline_sim::sim::{Ending, Flight};
 
 use crate::flight::{fly, read};
 
-/// RVO2's Circle demo: radius 1.5 m, at most 10 neighbours within 15 m, horizon 10 s, highest speed 2 m/s, preferred 1 m/s and
-/// less within 1 m of the goal, a step of 0.25 s, vehicles that are too near part within a step.
+/// Parameters of RVO2's Circle demo: radius 1.5 m, at most 10 neighbours within 15 m, horizon 10 s, highest speed 2
+/// m/s. The preferred speed is 1 m/s, and less within 1 m of the goal. The step is 0.25 s, in which vehicles that are
+/// too close separate.
 const CIRCLE_DELTA_M: f64 = 3.0;
 const CIRCLE_REACH_M: f64 = 15.0;
 const CIRCLE_STEP_S: f64 = 0.25;
@@ -33,29 +34,29 @@ fn circle_keys() -> OrcaKeys {
     }
 }
 
-/// Places evenly on a circle.
+/// Returns evenly spaced positions on a circle.
 fn circle(count: usize, radius_m: f64) -> Rows {
     let at = |i: usize| libm::sincos(std::f64::consts::TAU * i as f64 / count as f64);
     Rows::from_fn(count, |i, axis| [radius_m * at(i).1, radius_m * at(i).0, 0.0][axis])
 }
 
-/// Rounds to single precision, in which RVO2 computes: what is exactly symmetric otherwise stays so for ever.
+/// Rounds to single precision, as RVO2 does; otherwise the exact symmetry would never break.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is what it is for")]
 fn round_to_single(rows: &mut Rows) {
     rows.iter_mut().for_each(|number| *number = f64::from(*number as f32));
 }
 
-/// What a crossing of the circle came to.
+/// Result of a crossing of the circle.
 #[derive(Debug)]
 struct Crossing {
-    /// Smallest separation of any two, between steps too \[m\].
+    /// Smallest separation of any pair, between steps too \[m\].
     swept_m: f64,
-    /// When all were within a radius of their goals, or when it was given up \[s\].
+    /// Time at which all vehicles were within a radius of their goals, or at which the crossing was given up \[s\].
     time_s: f64,
     arrived: bool,
 }
 
-/// Flies vehicles across a circle, each taking on the velocity that it chooses at once and keeping it for a step.
+/// Flies vehicles across a circle. Each vehicle adopts its chosen velocity at once and keeps it for a step.
 fn cross(count: usize, radius_m: f64, longest_s: f64) -> Crossing {
     let mut swarm = Swarm::at_rest(circle(count, radius_m));
     let (links, formation) = (Graph::complete(count), Formation::points(-&swarm.positions_m));
@@ -77,7 +78,7 @@ fn cross(count: usize, radius_m: f64, longest_s: f64) -> Crossing {
             let swept_m = swept_separation_m(apart(&swarm.positions_m), apart(&next_m));
             crossing.swept_m = crossing.swept_m.min(swept_m);
         }
-        assert!(next_m.column(2).iter().all(|&z| z == 0.0), "nobody leaves the plane");
+        assert!(next_m.column(2).iter().all(|&z| z == 0.0), "all vehicles stay in the plane");
         swarm.positions_m.copy_from(&next_m);
         swarm.velocities_m_s.copy_from(&velocities);
         crossing.time_s += CIRCLE_STEP_S;
@@ -87,7 +88,7 @@ fn cross(count: usize, radius_m: f64, longest_s: f64) -> Crossing {
 }
 
 #[test]
-fn a_hundred_across_a_circle_come_nearer_than_orca_means_to_and_two_and_ten_do_not() {
+fn orca_keeps_its_distance_for_ten_vehicles_but_not_for_a_hundred() {
     for count in [2, 10] {
         let few = cross(count, 20.0, 300.0);
         assert!(few.swept_m > CIRCLE_DELTA_M - 1e-5, "{few:?}");
@@ -111,13 +112,14 @@ fn closest_m(flight: &Flight) -> f64 {
     flight.audit.closest.expect("pairs").separation_m
 }
 
-/// How far the farthest is from its slot at the end \[m\].
+/// Returns the largest distance of a vehicle from its slot at the end \[m\].
 fn missing_m(scenario: &Scenario, flight: &Flight) -> f64 {
     let slots_m = &scenario.formation().slots_m;
     (0..scenario.count()).map(|i| (row(&flight.last.positions_m, i) - row(slots_m, i)).norm()).fold(0.0, f64::max)
 }
 
-/// Two, 10 m apart on the x axis, that change places; the first starts aside by so much.
+/// Returns a scenario of two vehicles, 10 m apart on the x axis, that swap positions. The first starts `aside_m` off
+/// the axis.
 fn swap(law: LawSpec, aside_m: f64) -> Scenario {
     let places_m = Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
     let mut start = Swarm::at_rest(places_m.clone());
@@ -125,7 +127,7 @@ fn swap(law: LawSpec, aside_m: f64) -> Scenario {
     scenario("swap", start, -places_m, 60.0, law)
 }
 
-/// So many across a circle of 8 m, one of which starts a little off.
+/// Returns a crossing of `count` vehicles on a circle of 8 m, with a small offset of one start.
 fn crossing(law: LawSpec, count: usize, duration_s: f64) -> Scenario {
     let places_m = circle(count, 8.0);
     let mut start = Swarm::at_rest(places_m.clone());
@@ -134,7 +136,7 @@ fn crossing(law: LawSpec, count: usize, duration_s: f64) -> Scenario {
 }
 
 #[test]
-fn on_a_symmetric_swap_barrier_functions_and_orca_come_to_rest_and_a_little_aside_they_arrive() {
+fn barrier_functions_and_orca_deadlock_on_a_symmetric_swap_only() {
     for law in [LawSpec::CbfQp(CbfQpKeys::default()), LawSpec::Orca(OrcaKeys::default())] {
         let stuck = swap(law.clone(), 0.0);
         let (flight, _) = fly(&stuck);
@@ -152,9 +154,9 @@ fn on_a_symmetric_swap_barrier_functions_and_orca_come_to_rest_and_a_little_asid
     }
 }
 
-/// Each of the others asks for half of what two of them need, which may be more than a vehicle has, whatever the step.
+/// Each neighbour demands half of the avoidance of its pair, and the sum may exceed the limit of a vehicle at any step.
 #[test]
-fn twelve_across_a_circle_under_barrier_functions_come_nearer_than_delta() {
+fn barrier_functions_violate_delta_for_twelve_vehicles() {
     for dt_s in [1.0 / 240.0, 1.0 / 960.0] {
         let mut twelve = crossing(LawSpec::CbfQp(CbfQpKeys::default()), 12, 9.0);
         twelve.time.dt_s = dt_s;
@@ -165,7 +167,7 @@ fn twelve_across_a_circle_under_barrier_functions_come_nearer_than_delta() {
 }
 
 #[test]
-fn velocities_that_cannot_be_taken_on_at_once_void_what_orca_promises() {
+fn orca_has_no_guarantee_if_velocities_change_slowly() {
     let with_limit = |max_accel_m_s2| {
         let limited = swap(LawSpec::Orca(OrcaKeys { max_accel_m_s2, ..OrcaKeys::default() }), 0.1);
         fly(&limited).0
@@ -175,7 +177,7 @@ fn velocities_that_cannot_be_taken_on_at_once_void_what_orca_promises() {
     assert!(strong.audit.status == Status::Clear && closest_m(&strong) < 1.01);
 }
 
-/// Two, 8 m apart, that fly at each other at so much speed each and whose slots are between them.
+/// Flies two vehicles, 8 m apart, towards each other at `speed_m_s` each, with their slots between them.
 fn meeting(law: LawSpec, speed_m_s: f64) -> Flight {
     let places_m = Rows::from_row_slice(&[-4.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
     let mut start = Swarm::at_rest(places_m.clone());
@@ -184,7 +186,7 @@ fn meeting(law: LawSpec, speed_m_s: f64) -> Flight {
 }
 
 #[test]
-fn forces_that_are_bounded_stop_only_so_much_speed() {
+fn bounded_forces_stop_limited_speeds_only() {
     let flocking = || LawSpec::Flocking(FlockingKeys::default());
     let potential = |max_accel_m_s2| LawSpec::Potential(PotentialKeys { max_accel_m_s2, ..PotentialKeys::default() });
     for (law, speed_m_s, expected) in [
@@ -202,8 +204,8 @@ fn forces_that_are_bounded_stop_only_so_much_speed() {
     assert!(unbounded.certificate.certified_m.is_some_and(|certified_m| closest_m(&unbounded) >= certified_m));
 }
 
-/// Links of an alpha-lattice, and its source's measure of how far it is from one: the sum of squared deviations from the spacing over
-/// links + 1, in units of the spacing.
+/// Returns the number of links of an alpha-lattice and the deviation energy of its source. It is the sum of squared
+/// deviations from the spacing over links + 1, in units of the spacing.
 fn lattice(positions_m: &Rows, spacing_m: f64) -> (u32, f64) {
     let count = positions_m.nrows();
     let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
@@ -213,7 +215,7 @@ fn lattice(positions_m: &Rows, spacing_m: f64) -> (u32, f64) {
 }
 
 #[test]
-fn a_flock_becomes_a_lattice_of_its_spacing_that_moves_as_one() {
+fn flock_converges_to_a_lattice_of_its_spacing() {
     const SPACING_M: f64 = 3.0;
     let hexagon_m = circle(6, 3.5);
     let stir = |i: usize, axis: usize| if axis < 2 { 0.5 * libm::sin((3 * i + 5 * axis) as f64) } else { 0.0 };
@@ -229,11 +231,11 @@ fn a_flock_becomes_a_lattice_of_its_spacing_that_moves_as_one() {
     let (links, deviation) = lattice(&flight.last.positions_m, SPACING_M);
     assert!(links == 12 && deviation < 1e-3, "a hexagon and its centre: {links} links, deviation {deviation}");
     assert!(flight.last.disagreement_m_s() < 1e-3, "{}", flight.last.disagreement_m_s());
-    assert!(missing_m(&flock, &flight) > SPACING_M, "given slots are not what it goes for");
+    assert!(missing_m(&flock, &flight) > SPACING_M, "a flock ignores slots");
 }
 
 #[test]
-fn no_rival_leaves_the_plane_or_exceeds_its_limit() {
+fn laws_stay_in_the_plane_and_within_their_limits() {
     for law in [
         LawSpec::CbfQp(CbfQpKeys::default()),
         LawSpec::Orca(OrcaKeys::default()),
@@ -246,7 +248,7 @@ fn no_rival_leaves_the_plane_or_exceeds_its_limit() {
     }
 }
 
-/// Four behind a reference that runs around a circle.
+/// Returns a scenario of four vehicles that follow a reference on a circle.
 fn carried(law: &str, fed: bool) -> Scenario {
     read(&format!(
         "swarm = {{ count = 4, a22_per_s = 0.05 }}\n\
@@ -259,10 +261,10 @@ fn carried(law: &str, fed: bool) -> Scenario {
     ))
 }
 
-/// Those that go to slots reach them where the reference has carried them, leg after leg. Without its acceleration they come
-/// late by r''/k, which is more than counts as reached.
+/// Laws with slots reach the slots that the reference has moved, on each leg. Without feed-forward of its acceleration
+/// they lag by r''/k, which exceeds the limit of arrival.
 #[test]
-fn laws_that_go_to_slots_reach_them_behind_a_reference_and_late_where_its_acceleration_is_not_told() {
+fn slot_laws_follow_a_reference_and_lag_without_feed_forward() {
     for law in ["orca", "cbf-qp"] {
         let report = run(&carried(law, true), &mut ()).expect("a report");
         assert!(report.verdict.pass, "{law}: {:?}", report.verdict.reasons);
@@ -272,10 +274,10 @@ fn laws_that_go_to_slots_reach_them_behind_a_reference_and_late_where_its_accele
     }
 }
 
-/// A flock has no slots: its centre follows the reference, slowly where its vehicles are far from it and pulls are bounded,
-/// and never where its acceleration is not told, as in its source.
+/// A flock has no slots, and its centre follows the reference. Far vehicles with bounded pulls follow slowly. Without
+/// feed-forward of the acceleration the flock never arrives, as in its source.
 #[test]
-fn a_flock_follows_a_reference_whose_acceleration_is_told() {
+fn flock_follows_a_reference_with_feed_forward() {
     let off = |fed: bool| {
         let mut scenario = carried("flocking", fed);
         scenario.time.duration_s = 200.0;

@@ -1,4 +1,4 @@
-//! A step is honest or it is refined, and one that cannot be refined is not called the law's motion.
+//! Refinement of steps that are too long for the law, and the verdict if refinement does not suffice.
 
 use crate::flight::{Log, builtin, duel, fly, read};
 use tautline_audit::Status;
@@ -17,25 +17,25 @@ fn refinements(log: &Log) -> Vec<(f64, f64)> {
     log.events.iter().filter_map(refined).collect()
 }
 
-/// By how much the energy was above E(0) over any step, relative to it.
+/// Returns the largest excess of the energy over E(0), relative to E(0).
 fn energy_excess(log: &Log) -> f64 {
     let initial = log.samples[0].energy.expect("the law has an energy");
     log.samples.iter().filter_map(|sample| sample.peaks.energy).fold(0.0, f64::max) / initial - 1.0
 }
 
-/// Closing at 20 m/s with 0.4 m to go before the barrier.
+/// Returns a pair that closes at 20 m/s, 0.4 m from the barrier.
 fn barrier_ahead(dt_s: f64) -> Scenario {
     duel([-1.2, 1.2], [10.0, -10.0], 2.0, dt_s, 5.0)
 }
 
 #[test]
-fn a_step_that_would_jump_the_barrier_is_flown_in_parts() {
+fn step_across_the_barrier_is_flown_in_parts() {
     for dt_s in [1.0 / 240.0, 1.0 / 60.0, 0.125, 0.25, 0.5] {
         let scenario = barrier_ahead(dt_s);
         let (flight, log) = fly(&scenario);
         assert_eq!((flight.ending, flight.audit.status), (Ending::Completed, Status::Clear), "dt = {dt_s} s");
         assert_eq!(flight.steps, scenario.time.steps());
-        assert!(flight.audit.steps > flight.steps, "the judge sees the parts");
+        assert!(flight.audit.steps > flight.steps, "the audit sweeps the parts");
         let refined = refinements(&log);
         assert!(!refined.is_empty());
         for (time_s, part_s) in refined {
@@ -47,14 +47,14 @@ fn a_step_that_would_jump_the_barrier_is_flown_in_parts() {
 }
 
 #[test]
-fn without_halvings_that_step_jumps_the_barrier_which_no_motion_of_the_law_does() {
+fn step_across_the_barrier_is_undecided_without_halvings() {
     let mut scenario = barrier_ahead(0.5);
     scenario.time.max_halvings = 0;
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.audit.status, flight.audit.violations.len()), (Status::Undecided, 1));
     assert_eq!(refinements(&log), []);
     let report = run::run(&scenario, &mut ()).expect("a report");
-    let said = "UNDECIDED: the step cannot resolve this, as flown vehicles 1-2 came to ";
+    let said = "UNDECIDED: the step cannot resolve this, as flown vehicles 1 and 2 came to ";
     assert!(report.headline().starts_with(said), "{}", report.headline());
     let reasons = &report.verdict.reasons;
     let has = |said: &str| reasons.iter().any(|reason| reason.contains(said));
@@ -62,7 +62,7 @@ fn without_halvings_that_step_jumps_the_barrier_which_no_motion_of_the_law_does(
 }
 
 #[test]
-fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_collision() {
+fn step_into_the_barrier_ends_the_run_without_halvings() {
     let mut scenario = barrier_ahead(0.125);
     scenario.time.max_halvings = 0;
     let (flight, log) = fly(&scenario);
@@ -76,13 +76,13 @@ fn without_halvings_a_step_that_lands_within_the_barrier_ends_the_run_as_a_colli
     let last = log.samples.last().expect("samples");
     assert_eq!((last.time_s, last.step, last.energy), (0.125, 1, None));
     assert_eq!(&last.swarm, &flight.last);
-    assert_eq!(last.control.nrows(), 0, "no command follows from a state without one");
+    assert_eq!(last.control.nrows(), 0, "the law has no command in this state");
     let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
     assert!(*time_s == 0.125 && reason.contains("vehicles 1-2"), "{reason}");
 }
 
 #[test]
-fn a_law_without_a_barrier_is_never_refused_a_step() {
+fn law_without_a_barrier_needs_no_refinement() {
     let mut scenario = barrier_ahead(1.0);
     scenario.law = LawSpec::Laplacian(LaplacianKeys { f1_per_s2: 1.0, f2_per_s: Some(1.0) });
     scenario.time.max_rate_dt = 1.0;
@@ -91,10 +91,10 @@ fn a_law_without_a_barrier_is_never_refused_a_step() {
 }
 
 #[test]
-fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_below_its_start() {
+fn refinement_for_the_fastest_rate_bounds_the_energy() {
     let mut scenario = builtin("pentagon", &["law.alpha=100", "time.dt_s=0.1", "time.record_hz=10"]);
     let (honest, log) = fly(&scenario);
-    assert!(!refinements(&log).is_empty(), "it is told");
+    assert!(!refinements(&log).is_empty(), "refinements are recorded");
     assert!(honest.audit.steps > honest.steps);
     assert!(energy_excess(&log) < 1e-3, "{}", energy_excess(&log));
     (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);
@@ -104,20 +104,20 @@ fn a_step_too_long_for_the_fastest_rate_is_flown_in_parts_and_keeps_the_energy_b
 }
 
 #[test]
-fn steps_that_no_halving_makes_short_enough_void_the_certificate_and_never_pass() {
+fn overlong_steps_void_the_certificate_and_do_not_pass() {
     let stiff = builtin("pentagon", &["law.alpha=997335080"]);
     let (flight, _) = fly(&stiff);
-    assert!(flight.overlong_steps > 0, "the law asks for shorter steps than there are");
+    assert!(flight.overlong_steps > 0, "the law needs shorter steps than the halvings give");
     assert_eq!((flight.certificate.certified_m, &flight.certificate.void[..]), (None, &[Void::StepsTooLong][..]));
     let report = run::run(&stiff, &mut ()).expect("a report");
     assert_eq!(report.run.overlong_steps, flight.overlong_steps);
     assert!(!report.verdict.pass && !report.breaks_certificate());
-    assert!(report.headline().contains("too long for the law"), "{}", report.headline());
+    assert!(report.headline().contains("longer than the law allows"), "{}", report.headline());
     assert!(report.verdict.reasons.iter().any(|reason| reason.contains("longer than the law allows")));
 }
 
 #[test]
-fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law() {
+fn clear_and_reached_flight_with_overlong_steps_does_not_pass() {
     let report = |max_halvings: &str| {
         let keys = ["law.alpha=100", "time.dt_s=0.01", max_halvings];
         let scenario = builtin("pentagon", &keys);
@@ -126,12 +126,13 @@ fn a_flight_that_is_clear_and_home_does_not_pass_on_steps_too_long_for_the_law()
     let [refined, whole] = ["time.max_halvings=10", "time.max_halvings=0"].map(report);
     assert_eq!((refined.run.overlong_steps, refined.verdict.pass), (0, true));
     assert!(whole.run.overlong_steps > 0 && !whole.verdict.pass, "{:?}", whole.verdict);
+    assert!(whole.headline().starts_with("STEP TOO LONG: "), "{}", whole.headline());
     assert_eq!(whole.separation.certified_m, None);
 }
 
 #[test]
-fn a_step_is_short_enough_where_it_leads_to_and_not_only_where_it_began() {
-    // Fast contacts that one step lands deep in: the law looks slow before, and the barrier is far.
+fn step_length_is_checked_at_its_end_too() {
+    // Fast contacts within one step: before it, the law's rate is low and the barrier is far.
     for (name, keys) in [
         ("swap", &["law.alpha=5000", "time.dt_s=0.1", "time.record_hz=4", "time.duration_s=5"][..]),
         ("pentagon", &["law.kind=displacement", "law.alpha=1e6", "time.record_hz=4", "time.duration_s=10"]),
@@ -152,43 +153,44 @@ fn a_step_is_short_enough_where_it_leads_to_and_not_only_where_it_began() {
 }
 
 #[test]
-fn vehicles_that_hold_a_command_for_a_period_of_its_own_ask_for_no_shorter_steps() {
+fn held_commands_need_no_refinement() {
     let keys = ["law.alpha=100", "time.dt_s=0.01", "time.max_halvings=0", "time.control_hz=100"];
     let (flight, _) = fly(&builtin("pentagon", &keys));
     assert_eq!(flight.overlong_steps, 0);
 }
 
-/// A hub that two vehicles without a link between them are linked to, at their slots.
+/// Returns a hub with links to two vehicles that have no link between them, all at their slots.
 fn star(half_m: f64, speed_m_s: f64, kind: &str, more: &str) -> Scenario {
     read(&format!(
-        "start = {{ positions_m = [[0, 0], [3, {half_m}], [3, -{half_m}]], velocities_m_s = [[0, 0], [0, -{speed_m_s}], [0, {speed_m_s}]] }}\n\
+        "start.positions_m = [[0, 0], [3, {half_m}], [3, -{half_m}]]\n\
+         start.velocities_m_s = [[0, 0], [0, -{speed_m_s}], [0, {speed_m_s}]]\n\
          formation = {{ shape = \"points\", points_m = [[0, 0], [3, 0.501], [3, -0.501]] }}\n\
          graph.kind = \"{kind}\"\nlaw.delta_m = 1.0\ntime.duration_s = 2.0\n{more}"
     ))
 }
 
 #[test]
-fn a_pair_that_the_law_has_no_barrier_between_asks_for_no_shorter_steps() {
+fn pair_without_a_link_needs_no_refinement() {
     let (flight, log) = fly(&star(0.501, 0.0, "star", ""));
     assert_eq!((refinements(&log), flight.audit.steps), (vec![], flight.steps));
     assert_eq!(flight.audit.status, Status::Clear);
-    // The same pair with a link, whose tension is steep there.
+    // With a link the pair has a steep tension at this distance.
     let (flight, log) = fly(&star(0.501, 0.0, "complete", ""));
     assert!(!refinements(&log).is_empty() && flight.audit.steps > flight.steps);
 }
 
 #[test]
-fn a_violation_of_a_pair_without_a_link_is_judged_as_ever_and_is_no_matter_of_the_step() {
+fn violation_of_a_pair_without_a_link_does_not_depend_on_the_step() {
     let (flight, log) = fly(&star(0.501, 0.02, "star", ""));
     assert_eq!((refinements(&log), flight.overlong_steps), (vec![], 0));
     assert_eq!((flight.audit.status, flight.audit.steps), (Status::Violation, flight.steps));
     assert_eq!(flight.audit.violations[0].pair, Pair::new(1, 2));
     let report = run::run(&star(0.501, 0.02, "star", ""), &mut ()).expect("a report");
-    assert!(report.headline().starts_with("VIOLATION: vehicles 2-3 came to 0.9"), "{}", report.headline());
+    assert!(report.headline().starts_with("VIOLATION: vehicles 2 and 3 came to 0.9"), "{}", report.headline());
 }
 
 #[test]
-fn a_linked_pair_is_refined_for_while_others_are_nearer_to_each_other() {
+fn linked_pair_is_refined_although_another_pair_is_closer() {
     let mut scenario = star(0.501, 0.0, "star", "");
     scenario.start.velocities_m_s[(0, 0)] = 20.0;
     let (flight, log) = fly(&scenario);
@@ -197,15 +199,15 @@ fn a_linked_pair_is_refined_for_while_others_are_nearer_to_each_other() {
     assert!(apart_m(1) > 1.0 && apart_m(2) > 1.0);
 }
 
-/// Two without a link that pass each other within the first step, which is too long for the law of their links.
+/// Two vehicles without a link pass each other within the first step, which is too long for the law.
 #[test]
-fn a_violation_that_is_deeper_than_integration_may_err_is_one_whatever_the_step() {
+fn violation_beyond_the_integration_error_stands() {
     let more = "law.alpha = 80.0\ntime.dt_s = 0.05\ntime.max_halvings = 0\ntime.record_hz = 20";
     let scenario = star(0.6, 20.0, "star", more);
     let (flight, _) = fly(&scenario);
     assert!(flight.overlong_steps > 0);
     assert_eq!(flight.audit.status, Status::Violation);
-    // A violation by a tenth of a millimetre, after one step that may err by more.
+    // A violation by 0.1 mm after a step with a larger possible error.
     let mut scenario = star(0.501, 0.021, "star", more);
     scenario.time.duration_s = 0.05;
     let (shallow, _) = fly(&scenario);
@@ -214,16 +216,16 @@ fn a_violation_that_is_deeper_than_integration_may_err_is_one_whatever_the_step(
 }
 
 #[test]
-fn a_barrier_that_the_shortest_part_leaps_is_no_violation_of_the_law() {
+fn jump_across_the_barrier_in_the_shortest_part_is_undecided() {
     let keys = ["law.kind=potential", "law.k_per_s2=1e6", "time.duration_s=2", "time.max_halvings=10"];
     let stiff = builtin("pentagon", &keys);
     let (flight, _) = fly(&stiff);
     assert!(flight.overlong_steps > 0 && !flight.audit.violations.is_empty());
-    assert_eq!(flight.audit.status, Status::Undecided, "the law certifies that no two come so near");
+    assert_eq!(flight.audit.status, Status::Undecided, "the certificate excludes this distance");
 }
 
 #[test]
-fn a_stiff_potential_halves_its_steps_as_far_as_its_certified_distance_asks() {
+fn halvings_follow_the_certified_distance_of_a_stiff_potential() {
     let keys = |more: &[&'static str]| {
         let keys = ["law.kind=potential", "law.k_per_s2=1e4", "time.duration_s=1", "arrival.hold_s=0.1"];
         builtin("pentagon", &[&keys[..], more].concat())
@@ -236,6 +238,6 @@ fn a_stiff_potential_halves_its_steps_as_far_as_its_certified_distance_asks() {
     let given = keys(&["time.max_halvings=10"]);
     assert_eq!(given.time.max_halvings, 10);
     assert!(fly(&given).0.overlong_steps > 0);
-    // A field of small gain needs no more halvings than the default.
+    // A field of small gain needs the default halvings only.
     assert_eq!(builtin("pentagon", &["law.kind=potential"]).time.max_halvings, TimeSpec::DEFAULT_MAX_HALVINGS);
 }

@@ -1,4 +1,4 @@
-//! Flights whose verdict depends on what a step, a sample or a sensor does not show.
+//! Verdicts that depend on motion between steps and samples, or on biased sensors.
 
 use tautline_audit::Status;
 use tautline_report::report::Report;
@@ -11,8 +11,7 @@ fn report(toml: &str) -> Report {
     run(&read(toml), &mut ()).expect("a report")
 }
 
-/// Three vehicles on a star, far from the origin, two of which approach at the end; the smallest separation in continuous time is
-/// 0.995142 m.
+/// Three vehicles on a star, far from the origin. Two of them approach at the end, to 0.995142 m in continuous time.
 const SLOW_APPROACH: &str = r#"
 start.positions_m = [[100, 100], [103, 100.75], [103, 99.25]]
 start.velocities_m_s = [[0, 0], [0, -0.0838], [0, 0.0838]]
@@ -23,7 +22,7 @@ time.duration_s = 20
 "#;
 
 #[test]
-fn a_slow_approach_far_from_the_origin_is_a_violation_in_both_plants() {
+fn slow_approach_far_from_the_origin_is_a_violation_in_both_plants() {
     for plant in [PlantSpec::Rapier, PlantSpec::Ideal] {
         let (flight, _) = fly(&Scenario { plant, ..read(SLOW_APPROACH) });
         let closest = flight.audit.closest.expect("pairs");
@@ -32,9 +31,9 @@ fn a_slow_approach_far_from_the_origin_is_a_violation_in_both_plants() {
     }
 }
 
-/// Two vehicles change places within a swarm that reaches to 200 m; they meet after 1,350 s.
+/// Two vehicles swap positions in a swarm of 200 m extent and meet after 1,350 s.
 #[test]
-fn vehicles_that_creep_beside_a_far_one_meet() {
+fn slow_meeting_beside_a_far_vehicle_is_a_violation() {
     if std::env::var_os("TAUTLINE_LONG").is_none() {
         return;
     }
@@ -49,7 +48,7 @@ fn vehicles_that_creep_beside_a_far_one_meet() {
     assert_eq!(report.audit.status, Status::Violation, "{}", report.headline());
 }
 
-/// Three vehicles that go to slots 2 m apart under a gain of `k`.
+/// Returns a scenario of three vehicles with slots 2 m apart and the gain `k_per_s2`.
 fn three(k_per_s2: f64, duration_s: f64) -> String {
     format!(
         "start.positions_m = [[0, 0], [3, 0.2], [6, 0]]\nformation = {{ shape = \"line\", spacing_m = 2.0 }}\n\
@@ -58,7 +57,7 @@ fn three(k_per_s2: f64, duration_s: f64) -> String {
 }
 
 #[test]
-fn vehicles_that_creep_towards_their_slots_are_still_moving() {
+fn slow_vehicles_are_still_moving() {
     let short = report(&three(0.002, 100.0));
     assert!(!short.formation.reached && short.formation.at_rest == Some(false), "{}", short.headline());
     assert!(report(&three(0.002, 4000.0)).formation.reached, "more time helps");
@@ -67,7 +66,7 @@ fn vehicles_that_creep_towards_their_slots_are_still_moving() {
 }
 
 #[test]
-fn a_slow_approach_is_no_stall_and_spreads_no_slots() {
+fn slow_approach_is_not_a_stall() {
     let slow = report(&three(0.01, 900.0));
     assert!(
         slow.formation.reached && slow.deadlock_recoveries.is_empty(),
@@ -80,7 +79,7 @@ fn a_slow_approach_is_no_stall_and_spreads_no_slots() {
 }
 
 #[test]
-fn a_formation_that_is_left_between_two_samples_is_not_reached_before() {
+fn formation_left_between_two_samples_is_not_reached_before() {
     let reached_at_s = |record_hz: f64, gust: &str| {
         let toml = three(1.0, 60.0);
         let wind = format!("vehicle.drag_per_s = 0.5\n{gust}\ntime.record_hz = {record_hz}\n");
@@ -90,12 +89,12 @@ fn a_formation_that_is_left_between_two_samples_is_not_reached_before() {
     let calm_s = reached_at_s(0.2, "wind.mean_m_s = [0.0, 0.0, 0.0]").expect("reached");
     assert!(calm_s < 50.0);
     let [rare_s, often_s] = [0.2, 60.0].map(|record_hz| reached_at_s(record_hz, gust));
-    assert_eq!(rare_s, often_s, "what is recorded changes no arrival");
+    assert_eq!(rare_s, often_s, "the recording rate does not change the arrival");
     assert!(rare_s.is_none_or(|at_s| at_s > 50.0), "{rare_s:?}");
 }
 
 #[test]
-fn a_leg_that_only_biased_sensors_have_reached_is_not_reached() {
+fn leg_reached_by_biased_sensors_only_is_not_reached() {
     let legs = |bias_m: f64| {
         let toml = three(1.0, 60.0);
         let beside = format!("arrival.edge_error_m = 0.05\nsensing.position_bias_m = {bias_m}\n[[leg]]\nscale = 1.5\n");

@@ -406,8 +406,10 @@ impl Study for Attack {
     }
 
     fn headline(&self) -> String {
-        let broken = if self.certificates_broken > 0 { "CERTIFICATE BROKEN, " } else { "" };
-        format!("{broken}{}. {CAVEAT}", self.result())
+        let is_broken = self.certificates_broken > 0 || self.own.breaks_certificate;
+        let broken = if is_broken { "CERTIFICATE BROKEN, " } else { "" };
+        let interrupted = if self.interrupted { "INTERRUPTED, " } else { "" };
+        format!("{broken}{interrupted}{}. {CAVEAT}", self.result())
     }
 
     fn notes(&self) -> Vec<String> {

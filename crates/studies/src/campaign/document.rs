@@ -61,7 +61,12 @@ impl LawSummary {
         });
         let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
         let flights = if of == 1 { "flight" } else { "flights" };
-        format!("{} of {} {flights} violated{unknown}{}", separated(count), separated(of), bound.unwrap_or_default())
+        let broken = match self.certificates_broken {
+            0 => String::new(),
+            count => format!("CERTIFICATE BROKEN in {}: ", counted(count, "flight", "flights")),
+        };
+        let (count, of) = (separated(count), separated(of));
+        format!("{broken}{count} of {of} {flights} violated{unknown}{}", bound.unwrap_or_default())
     }
 }
 
@@ -208,9 +213,11 @@ impl Study for Summary {
 
     fn badge(&self) -> Badge {
         let violated = self.laws.iter().any(|law| law.violated.count > 0 || !law.bad.is_empty());
+        let is_broken = self.laws.iter().any(|law| law.certificates_broken > 0);
         let (tone, word) = match (self.is_good(), violated) {
             (true, _) => (Tone::Good, "no violation"),
             (false, true) => (Tone::Bad, "violations"),
+            (false, false) if is_broken => (Tone::Bad, "certificate broken"),
             (false, false) if self.is_of_estimates() => (Tone::Bad, "nothing known"),
             (false, false) => (Tone::Bad, "not all known"),
         };

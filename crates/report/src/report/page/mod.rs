@@ -1,8 +1,8 @@
 //! Self-contained HTML pages.
 //!
-//! A [`Page`] is a verdict and sections. Every text is escaped. A page refers to nothing outside itself and forbids the
-//! browser to load anything; where flights are replayed, one script of ours may run, and no other. It follows the reader's choice of light or dark and fits a phone. The same parts give the
-//! same bytes.
+//! A [`Page`] has a verdict and sections. Every text is escaped. A page refers to no other file, and its policy forbids
+//! the browser to load anything. If it holds replays, a single script of this crate may run. The page follows the
+//! browser's light or dark theme and fits a phone. Equal parts give equal bytes.
 
 mod replay;
 
@@ -14,60 +14,60 @@ use crate::figures::Figure;
 use tautline_core::text::in_order;
 
 const STYLE: &str = include_str!("style.css");
-/// Nothing may be loaded; what may run is named by its hash, where anything may.
+/// Content security policy: no loading. A script is admitted by its hash, on pages with a replay only.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
 
 /// A page.
 #[derive(Clone, Debug)]
 pub struct Page {
-    /// What the page is about, such as the scenario's name.
+    /// Subject of the page, such as the name of the scenario.
     pub title: String,
-    /// What kind of page it is, such as `Flight report`.
+    /// Kind of the page, such as `Flight report`.
     pub kind: &'static str,
-    /// Good or bad, in a word.
+    /// Badge beside the verdict.
     pub badge: Badge,
-    /// The verdict in a sentence.
+    /// Verdict in a sentence.
     pub verdict: String,
-    /// Why it is not better, a sentence each.
+    /// Reasons against a better verdict, a sentence each.
     pub reasons: Vec<String>,
-    /// What to know before one relies on the result: a stable name, such as `start-on-line`, and a sentence or two.
+    /// Warnings, each with its stable name, such as `start-on-line`, and a sentence or two.
     pub warnings: Vec<(String, String)>,
-    /// Everything else, see [`section`].
+    /// Sections, see [`section`].
     pub sections: Vec<Markup>,
 }
 
-/// A word that is good, bad or neither.
+/// A word with the colour of its meaning.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Badge {
-    /// Its colour.
+    /// Colour.
     pub tone: Tone,
-    /// The word; it says what the colour says.
+    /// Word, with the same meaning as the colour.
     pub word: String,
 }
 
-/// How a word is meant.
+/// Meaning of a badge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// As it should be.
+    /// Good result.
     Good,
-    /// Not as it should be.
+    /// Bad result.
     Bad,
-    /// Neither.
+    /// Neither good nor bad.
     Neutral,
 }
 
-/// A picture that is part of the page.
+/// A picture embedded in the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// What it shows, in a sentence.
+    /// Description of the picture in a sentence.
     pub description: String,
-    /// The picture itself as a `data:` address.
+    /// Picture as a `data:` address.
     pub data_uri: String,
 }
 
 impl Badge {
-    /// `pass` or `fail`.
+    /// Returns the badge `pass` or `fail`.
     #[must_use]
     pub fn judged(pass: bool) -> Self {
         let (tone, word) = if pass { (Tone::Good, "pass") } else { (Tone::Bad, "fail") };
@@ -101,7 +101,7 @@ impl Page {
         }
     }
 
-    /// Returns the page as HTML. Only if a section holds a [`replay`], the page has a script, which draws it.
+    /// Returns the page as HTML. It has a script only if a section holds a [`replay`].
     #[must_use]
     pub fn render(&self) -> String {
         let replays = self.sections.iter().any(|section| section.0.contains(replay::ELEMENT));
@@ -115,7 +115,7 @@ impl Page {
                     meta name="color-scheme" content="light dark";
                     meta http-equiv="Content-Security-Policy" content=(policy);
                     title { (self.title) " - " (self.badge.word) }
-                    // An empty icon, or browsers ask for one.
+                    // An empty icon, because browsers request one otherwise.
                     link rel="icon" href="data:,";
                     style { (PreEscaped(STYLE)) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
@@ -146,7 +146,7 @@ impl Page {
     }
 }
 
-/// A part of a page under a heading.
+/// Returns a part of a page under a heading.
 #[must_use]
 pub fn section(heading: &str, content: &[Markup]) -> Markup {
     html! {
@@ -157,20 +157,20 @@ pub fn section(heading: &str, content: &[Markup]) -> Markup {
     }
 }
 
-/// A list of sentences; nothing if there are none.
+/// Returns a list of sentences; empty without items.
 #[must_use]
 pub fn list(items: &[impl Render]) -> Markup {
     html! { @if !items.is_empty() { ul { @for item in items { li { (item) } } } } }
 }
 
-/// Figures side by side, as many as fit; nothing if there are none.
+/// Returns figures side by side in rows; empty without figures.
 #[must_use]
 pub fn figures(figures: &[Figure]) -> Markup {
     let figure = |figure: &Figure| (PreEscaped(&figure.svg).render(), figure.description.clone());
     side_by_side(figures.iter().map(figure))
 }
 
-/// Pictures side by side, as many as fit; nothing if there are none.
+/// Returns pictures side by side in rows; empty without pictures.
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
     side_by_side(pictures.iter().map(|Picture { description, data_uri }| {
@@ -187,14 +187,14 @@ fn side_by_side(drawn: impl Iterator<Item = (Markup, String)>) -> Markup {
     }
 }
 
-/// A command to be typed.
+/// Returns a command line to copy.
 #[must_use]
 pub fn command(command: &str) -> Markup {
     html! { pre.command tabindex="0" { code { (command) } } }
 }
 
-/// A table whose first column names the rows and whose other columns hold numbers, which are aligned to the right and
-/// never broken. Rows have as many cells as there are columns.
+/// Returns a table whose first column names the rows. The other columns hold numbers, aligned to the right and never
+/// broken. Rows have as many cells as there are columns.
 pub fn numbers<R: IntoIterator<Item: Render>>(
     caption: &str,
     columns: &[&str],
@@ -203,7 +203,7 @@ pub fn numbers<R: IntoIterator<Item: Render>>(
     table(caption, columns, false, rows)
 }
 
-/// A table of words, whose first column names the rows.
+/// Returns a table of words whose first column names the rows.
 pub fn words<R: IntoIterator<Item: Render>>(
     caption: &str,
     columns: &[&str],
@@ -236,7 +236,7 @@ fn table<R: IntoIterator<Item: Render>>(
     }
 }
 
-/// A cell with a remark in small print below.
+/// Returns a cell with a remark in small print below.
 #[must_use]
 pub fn noted(text: &str, note: &str) -> Markup {
     html! { (text) small { (note) } }

@@ -1,4 +1,4 @@
-//! A flight that is replayed within a page.
+//! Replays within a page.
 
 use std::sync::LazyLock;
 
@@ -10,20 +10,20 @@ use sha2::{Digest as _, Sha256};
 use crate::replay::{Chart, NoReplay, Replay};
 use tautline_core::text::{counted, metres};
 
-/// How they look.
+/// Style sheet of replays.
 pub(super) const STYLE: &str = include_str!("replay.css");
 
-/// The script that draws replays, and the shaders that it draws with, without comments and indentation.
+/// Script and shaders of replays, without comments and indentation.
 static SCRIPT: LazyLock<String> = LazyLock::new(|| without_comments(include_str!("../../../../../assets/replay.js")));
 static SHADERS: LazyLock<String> =
     LazyLock::new(|| without_comments(include_str!("../../../../../shaders/replay.glsl")));
 
-/// What lets that script run, and no other.
+/// Returns the source expression of the content security policy that admits the script alone.
 pub(super) fn script_source() -> String {
     format!("script-src 'sha256-{}'", BASE64.encode(Sha256::digest(&*SCRIPT)))
 }
 
-/// The script and its shaders, which are data, at the end of a page.
+/// Returns the script and its shaders, which are embedded as data, for the end of a page.
 pub(super) fn script() -> Markup {
     html! {
         script type="x-shader" { (PreEscaped(&*SHADERS)) }
@@ -31,7 +31,7 @@ pub(super) fn script() -> Markup {
     }
 }
 
-/// A source without comments and indentation: lines that begin with `//`, and everything from `/**` to `*/`.
+/// Removes comments and indentation: lines that begin with `//`, and everything from `/**` to `*/`.
 fn without_comments(source: &str) -> String {
     let mut code = String::new();
     for (k, part) in source.split("/**").enumerate() {
@@ -43,37 +43,37 @@ fn without_comments(source: &str) -> String {
     lines.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// When a replay begins to draw.
+/// Time at which a replay starts to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
     /// With the page.
     AtOnce,
-    /// When it is asked for; another of the page that draws ends then.
+    /// On a click. Another replay of the page then stops drawing.
     OnDemand,
 }
 
-/// The beginning of the element of a replay. Escaped text cannot contain it.
+/// Start of the element of a replay. Escaped text cannot contain it.
 pub(super) const ELEMENT: &str = "<div class=\"replay\"";
 
-/// A replay with a name for readers who cannot see it, or the reason why there is no replay.
+/// Returns a replay with a label for screen readers, or the reason why there is no replay.
 #[must_use]
 pub fn replay(label: &str, replay: &Result<Replay, NoReplay>, start: Start) -> Markup {
     let replay = match replay {
         Ok(replay) => replay,
-        Err(why) => return html! { p { "There is no replay: " (why) "." } },
+        Err(why) => return html! { p { "No replay: " (why) "." } },
     };
     let on_demand = start == Start::OnDemand;
     html! {
         div.replay data-label=(label) data-start=[on_demand.then_some("later")] {
             script type="application/json" { (PreEscaped(&replay.json)) }
-            noscript { p { "The replay needs JavaScript, which is switched off. Pictures and figures are below." } }
+            noscript { p { "The replay needs JavaScript, which is disabled. Pictures and figures are below." } }
             (chart(&replay.chart))
             p.replay-note { (note(replay)) }
         }
     }
 }
 
-/// The smallest distance over time, which the script puts along its slider.
+/// Returns the smallest separation over time as a chart, which the script places along its slider.
 fn chart(chart: &Chart) -> Markup {
     let band = |&(from, to, violation): &(f64, f64, bool)| {
         html! {
@@ -96,21 +96,22 @@ fn chart(chart: &Chart) -> Markup {
     }
 }
 
-/// What of it is true and what is for the eye.
+/// Returns the limits of accuracy of a replay.
 fn note(replay: &Replay) -> String {
     let [kept, samples] = replay.instants;
     let of_all = if kept < samples { format!(" of {samples}") } else { String::new() };
     let motion = match (replay.holds, samples) {
-        (_, 0 | 1) => "of one instant".to_owned(),
-        (true, _) => format!("at rest between {kept} instants{of_all}"),
-        (false, _) => format!("drawn straight between {kept} instants{of_all}"),
+        (_, 0 | 1) => "of one sample".to_owned(),
+        (true, _) => format!("held between {kept} samples{of_all}"),
+        (false, _) => format!("interpolated linearly between {kept} samples{of_all}"),
     };
     let some = |[shown, all]: [usize; 2], what: &str| {
-        if shown < all { format!("{shown} of {all} {what} are here. ") } else { String::new() }
+        if shown < all { format!("{shown} of {all} {what} are included. ") } else { String::new() }
     };
     let said = [
         format!(
-            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are the judge's. ",
+            "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are those of the \
+             audit. ",
             metres(replay.rounding_m)
         ),
         some(replay.vehicles, "vehicles"),
@@ -118,20 +119,24 @@ fn note(replay: &Replay) -> String {
         match replay.inexact {
             0 => String::new(),
             count => format!(
-                "The very instant of {} is not drawn, or not all of whom it is on. ",
+                "The sample of {}, or a vehicle of it, is not drawn. ",
                 counted(count as u64, "finding", "findings")
             ),
         },
         replay.unknown_radius.map_or(String::new(), |(count, radius_m)| {
-            format!("The size of {} is made up, {} m. ", counted(count as u64, "vehicle", "vehicles"), metres(radius_m))
+            format!(
+                "The size of {} is assumed to be {} m. ",
+                counted(count as u64, "vehicle", "vehicles"),
+                metres(radius_m)
+            )
         }),
         if replay.obstacles_off_m > 0.0 {
-            format!("Moving obstacles are drawn at most {} m off their ways. ", metres(replay.obstacles_off_m))
+            format!("Moving obstacles are drawn at most {} m off their paths. ", metres(replay.obstacles_off_m))
         } else {
             String::new()
         },
     ];
-    said.concat() + "Everything is in this page: nothing is loaded."
+    said.concat() + "The page loads nothing else."
 }
 
 #[cfg(test)]
@@ -139,8 +144,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comments_and_indentation_go_and_code_stays() {
-        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n/** two\n lines */ c();\n";
+    fn removes_comments_and_indentation_only() {
+        let source = "// @ts-check\n  /** @type {A} */\n  const a = (/** @type {B} */ (b)) => \"a // b\";\n\n\
+                      /** two\n lines */ c();\n";
         assert_eq!(without_comments(source), "const a = ((b)) => \"a // b\";\nc();\n");
     }
 

@@ -1,4 +1,4 @@
-//! What is said of single vehicles.
+//! Findings on limits of single vehicles, such as speed.
 
 use serde::Serialize;
 
@@ -8,31 +8,30 @@ use tautline_audit::recorded::Outcome;
 use tautline_audit::{Status, Tally};
 use tautline_core::text::{at_least, at_most, counted, exact, fixed, seconds};
 
-/// What was found of one limit on each vehicle by itself.
+/// Findings on one limit of each vehicle by itself.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfLimit {
-    /// What is limited, with its unit, such as `speed_m_s`.
+    /// Limited quantity with its unit, such as `speed_m_s`.
     pub quantity: &'static str,
-    /// What it must not exceed; of `floor_m` and `fence_room_m` what it must not fall below.
+    /// Limit: an upper bound, but a lower bound for `floor_m` and `fence_room_m`.
     pub allowed: f64,
-    /// The verdict.
+    /// Status of the limit.
     pub status: Status,
-    /// The value that came nearest to the limit or went farthest beyond it; null where nothing tells any.
+    /// Value closest to the limit or farthest beyond it; null if no value is known.
     pub extreme: Option<OfVehicle<Exceeding>>,
-    /// What was taken for granted to tell it, beyond what happens between samples; null where nothing was.
+    /// Assumptions beyond the motion between samples; null without any.
     pub assumes: Option<String>,
-    /// Corners of curves, at which the velocity jumps and nothing is held against the limit: how many, and the largest; null where
-    /// there are none.
+    /// Corners of curves, where the velocity jumps and the limit is not applied; null without corners.
     pub corners: Option<OfCorners>,
-    /// How many times a vehicle was beyond it, and how many are listed.
+    /// Number of violations, and how many are listed.
     pub violations_tally: Tally,
-    /// How many times it cannot be told, likewise.
+    /// Number of undecided times, and how many are listed.
     pub undecided_tally: Tally,
-    /// Times that a vehicle was beyond it; of many the worst, and the first of each vehicle.
+    /// Violations; of a long list the worst, and the first of each vehicle.
     pub violations: Vec<OfVehicle<Exceeding>>,
-    /// Times of which it cannot be told, likewise.
+    /// Undecided times, cut in the same way.
     pub undecided: Vec<OfVehicle<Exceeding>>,
-    /// Vehicles of which nothing tells it at all.
+    /// Vehicles for which the quantity is unknown.
     pub unknown: Vec<String>,
     #[serde(skip)]
     limit: Limit,
@@ -41,18 +40,18 @@ pub struct OfLimit {
 /// Corners of curves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfCorners {
-    /// How many there are, of all vehicles.
+    /// Number of corners of all vehicles.
     pub count: u64,
-    /// The one at which the velocity jumps most.
+    /// Corner with the largest jump of the velocity.
     pub largest: OfVehicle<Corner>,
 }
 
 impl OfCorners {
-    /// What a clear verdict takes for granted of them.
+    /// Returns the assumption of a clear verdict about corners.
     fn assumed(&self) -> String {
         let OfVehicle { vehicle, finding } = &self.largest;
         format!(
-            "vehicles round {} (velocity jumps by at most {} m/s, {vehicle} at {}; --accel-window judges them)",
+            "vehicles round off {} (velocity jumps by at most {} m/s, {vehicle} at {}; --accel-window judges them)",
             counted(self.count, "corner", "corners"),
             at_most(finding.by_m_s, 3),
             seconds(finding.at_s)
@@ -82,8 +81,8 @@ impl OfLimit {
         }
     }
 
-    /// What is limited, in words.
-    fn called(&self) -> &'static str {
+    /// Returns the limited quantity in words.
+    fn quantity_name(&self) -> &'static str {
         use tautline_audit::envelope::Quantity;
         match self.limit.quantity {
             Quantity::Speed => "speed",
@@ -101,112 +100,113 @@ impl OfLimit {
         self.limit.quantity.unit()
     }
 
-    /// The value of an extreme or of a violation, rounded so that what is said holds.
+    /// Formats the value of an extreme or of a violation, rounded so that the statement holds.
     fn value(&self, of: &Exceeding) -> String {
         let (lower, upper) = (of.lower, of.upper);
         let number = match (lower.is_finite(), upper.is_finite()) {
             (false, false) => return "not known".to_owned(),
             (true, false) => format!("at least {}", at_least(lower, 3)),
             (false, true) => format!("at most {}", at_most(upper, 3)),
-            (true, true) if upper - lower <= 1e-6 * upper.abs().max(1.0) => self.told_apart(upper),
+            (true, true) if upper - lower <= 1e-6 * upper.abs().max(1.0) => self.distinct_from_limit(upper),
             (true, true) => format!("{} to {}", at_least(lower, 3), at_most(upper, 3)),
         };
         format!("{number} {}", self.unit())
     }
 
-    /// A value with at least three decimals, and as many as tell it from the limit.
-    fn told_apart(&self, value: f64) -> String {
+    /// Formats a value with at least three decimals, and with enough to differ from the limit.
+    fn distinct_from_limit(&self, value: f64) -> String {
         let size = |number: f64, decimals: usize| fixed(number, decimals).trim_start_matches('-').to_owned();
-        let is_told = |&decimals: &usize| size(value, decimals) != size(self.allowed, decimals);
-        let decimals = if value == self.allowed { 3 } else { (3..=17).find(is_told).unwrap_or(3) };
+        let is_distinct = |&decimals: &usize| size(value, decimals) != size(self.allowed, decimals);
+        let decimals = if value == self.allowed { 3 } else { (3..=17).find(is_distinct).unwrap_or(3) };
         fixed(value, decimals)
     }
 
-    fn asked(&self) -> String {
+    fn limit_in_words(&self) -> String {
         let least = if self.limit.quantity.is_least() { "at least " } else { "" };
         format!("{least}{} {}", exact(self.allowed), self.unit())
     }
 
-    /// The finding in a few words, such as `speed at most 3.200 m/s (limit 5.000 m/s)`.
+    /// Returns the finding in a few words, such as `speed at most 3.200 m/s (limit 5.000 m/s)`.
     #[must_use]
     pub fn brief(&self) -> String {
-        let called = self.called();
+        let quantity = self.quantity_name();
         match self.status {
             Status::Clear => {
                 let least = self.limit.quantity.is_least();
                 let most = self.extreme.as_ref().map_or(String::new(), |of| {
                     let bound = if least { at_least(of.finding.lower, 3) } else { at_most(of.finding.upper, 3) };
-                    // What rounding, or three decimals, leave beyond the limit is none.
+                    // A clear value that rounding moves beyond the limit is shown as the limit.
                     let is_beyond = bound
                         .parse()
                         .is_ok_and(|shown: f64| if least { shown < self.allowed } else { shown > self.allowed });
                     let bound = if is_beyond { exact(self.allowed) } else { bound };
                     format!(" {} {bound} {}", if least { "at least" } else { "at most" }, self.unit())
                 });
-                format!("{called}{most} (limit {})", self.asked())
+                format!("{quantity}{most} (limit {})", self.limit_in_words())
             }
             Status::Violation => {
                 let worst = self.extreme.iter().map(|of| {
                     let at = seconds(of.finding.at_s);
                     format!(" of {} was {} at {at}", of.vehicle, self.value(&of.finding))
                 });
-                format!("{called}{} (limit {})", worst.collect::<String>(), self.asked())
+                format!("{quantity}{} (limit {})", worst.collect::<String>(), self.limit_in_words())
             }
             Status::Undecided => {
                 let why = match (&self.undecided[..], &self.unknown[..]) {
                     ([of, ..], _) => {
                         format!("{} of {} by {}", self.value(&of.finding), of.vehicle, seconds(of.finding.to_s))
                     }
-                    ([], [vehicle, ..]) => format!("not known of {vehicle}"),
-                    ([], []) => "not known throughout".to_owned(),
+                    ([], [vehicle, ..]) => format!("unknown for {vehicle}"),
+                    ([], []) => "unknown at times".to_owned(),
                 };
-                format!("{called} {why} (limit {})", self.asked())
+                format!("{quantity} {why} (limit {})", self.limit_in_words())
             }
         }
     }
 
-    /// Every violation, a sentence each.
+    /// Returns the violations, a sentence each.
     pub(super) fn violations_in_words(&self) -> impl Iterator<Item = String> + '_ {
         self.violations.iter().map(|of| self.words(of, "beyond"))
     }
 
-    /// Every time that is undecided, a sentence each.
+    /// Returns the undecided times, a sentence each.
     pub(super) fn undecided_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        let unknown = self.unknown.iter().map(|vehicle| format!("{vehicle}: its {} is not known", self.called()));
+        let unknown =
+            self.unknown.iter().map(|vehicle| format!("{vehicle}: its {} is not known", self.quantity_name()));
         self.undecided.iter().map(|of| self.words(of, "against")).chain(unknown)
     }
 
-    /// A violation or a time that is undecided, in a sentence.
+    /// Returns a violation or an undecided time in a sentence.
     pub(super) fn in_words(&self, of: &OfVehicle<Exceeding>, is_violation: bool) -> String {
         self.words(of, if is_violation { "beyond" } else { "against" })
     }
 
-    /// The same in a few words.
+    /// Returns a violation or an undecided time in a few words.
     pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>) -> String {
-        format!("{vehicle}: {} {} (limit {})", self.called(), self.value(finding), self.asked())
+        format!("{vehicle}: {} {} (limit {})", self.quantity_name(), self.value(finding), self.limit_in_words())
     }
 
     fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>, how: &str) -> String {
         format!(
             "{vehicle}: {} {} by {} s, {how} the limit of {} from {} s to {} s",
-            self.called(),
+            self.quantity_name(),
             self.value(finding),
             fixed(finding.at_s, 3),
-            self.asked(),
+            self.limit_in_words(),
             fixed(finding.from_s, 3),
             fixed(finding.to_s, 3)
         )
     }
 
-    /// A row of a table: what, its extreme, who, when, what is allowed, the verdict.
+    /// Returns the row of a table: quantity, extreme, vehicle, time, limit, status.
     pub(super) fn row(&self) -> [String; 6] {
         let of = self.extreme.as_ref();
         [
-            self.called().to_owned(),
+            self.quantity_name().to_owned(),
             of.map_or("not known".to_owned(), |of| self.value(&of.finding)),
             of.map_or(String::new(), |of| of.vehicle.clone()),
             of.map_or(String::new(), |of| fixed(of.finding.at_s, 3)),
-            self.asked(),
+            self.limit_in_words(),
             match self.status {
                 Status::Clear => "kept",
                 Status::Violation => "exceeded",

@@ -1,6 +1,6 @@
 //! The report on a recording: as JSON, in words, and as a page.
 //!
-//! `separation` and `audit` have the keys of a flight's `report.json`; what a recording adds stands beside them.
+//! The keys of `separation` and `audit` are those of a flight's `report.json`.
 
 mod envelope;
 mod moments;

@@ -1,4 +1,4 @@
-//! What a replay of a recording jumps to, and what it says over time.
+//! Findings on a recording that its replay jumps to.
 
 use super::report::RecordedReport;
 use super::report::{OfPair, OfVehicle};
@@ -9,8 +9,8 @@ use tautline_audit::recorded::{Approach, Gap, ObjectPair};
 use tautline_audit::{Undecided, Violation};
 
 impl RecordedReport {
-    /// The closest approach, every violation, every time that cannot be decided and every gap, the weightiest first, with the
-    /// judge's distances and times.
+    /// Returns the closest approach, the violations, the undecided times and the gaps, the gravest first. Distances and
+    /// times are those of the audit.
     #[must_use]
     pub fn moments(&self) -> Vec<Moment> {
         let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
@@ -30,7 +30,7 @@ impl RecordedReport {
         closest.into_iter().chain(violations).chain(beyond).chain(undecided).chain(open).chain(gaps).collect()
     }
 
-    /// What is known of all, and what distances of two vehicles are held against.
+    /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
     pub fn judgement(&self) -> Judged {
         let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
@@ -63,7 +63,7 @@ impl RecordedReport {
 fn undecided(of: &OfPair<Undecided<ObjectPair>>) -> Moment {
     let Undecided { pair, from_s, to_s, .. } = of.finding;
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
-    let brief = format!("{} may come too near", of.names());
+    let brief = format!("{} may come too close", of.names());
     Moment::new(Kind::Undecided, pair, span, brief, format!("Undecided: {}", of.words()))
 }
 
@@ -75,7 +75,7 @@ fn unseen(of: &OfVehicle<Gap>) -> Moment {
 }
 
 impl<T> OfPair<T> {
-    /// The names of both.
+    /// Returns the names of both vehicles, or of vehicle and obstacle.
     pub(super) fn names(&self) -> String {
         let [first, second] = &self.who;
         format!("{first} and {second}")
@@ -83,7 +83,7 @@ impl<T> OfPair<T> {
 }
 
 impl<T: Clone> OfPair<T> {
-    /// With names that are no longer than a replay shows.
+    /// Returns the finding with names cut to the length that a replay shows.
     fn short(&self) -> Self {
         Self { who: self.who.each_ref().map(|name| cut(name, LONGEST_NAME)), finding: self.finding.clone() }
     }
@@ -102,7 +102,7 @@ mod tests {
     use tautline_core::text::in_order;
 
     #[test]
-    fn a_long_name_costs_no_distance_and_no_time_and_none_turns_what_follows() {
+    fn long_names_are_cut_and_direction_controls_are_replaced() {
         let pair = ObjectPair::Vehicles(Pair::new(0, 1));
         let finding = Violation { pair, from_s: 1.0, to_s: 2.0, min_m: 0.25, min_at_s: 1.5, limit_m: 1.0 };
         let of = OfPair { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };

@@ -1,4 +1,4 @@
-//! What `tautline audit --json` holds.
+//! Content of `tautline audit --json`.
 
 use serde::Serialize;
 
@@ -10,164 +10,164 @@ use tautline_audit::recorded::{
 use tautline_audit::{Status, Undecided, Violation};
 use tautline_core::swarm::Pair;
 
-/// What was read.
+/// The recording and how it was read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Source {
-    /// The recording.
+    /// Path of the recording.
     pub recording: String,
-    /// How it counts time.
+    /// Clock of the recording.
     pub clock: Clock,
-    /// Whether the height of some vehicle is not known: then distances and speeds are those in the plane of x and y.
+    /// Whether the height of a vehicle is unknown. Distances and speeds are then those in the plane of x and y.
     pub planar: bool,
-    /// How it was read, a sentence each.
+    /// Notes on the reading, a sentence each.
     pub notes: Vec<String>,
 }
 
-/// How a recording counts time.
+/// Clock of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Clock {
     /// The unit: `s`, `ms`, `us` or `ns`.
     pub unit: String,
     /// Whether it was inferred from the numbers.
     pub inferred: bool,
-    /// The instant that is 0 s in this report, on the recording's clock \[ns\].
+    /// Instant on the recording's clock that is 0 s in this report \[ns\].
     pub epoch_ns: i64,
 }
 
-/// What is taken to happen between two samples, and what that is worth.
+/// Motion between two samples, and its basis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Between {
-    /// In words, such as `straight between samples`.
+    /// Motion in words, such as `straight between samples`.
     pub motion: String,
-    /// How these words are known.
+    /// Basis of the motion.
     pub basis: Basis,
 }
 
-/// Where a recorded flight ended before its time.
+/// Early end of a recorded flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EarlyEnd {
-    /// Time of the last recorded instant \[s\].
+    /// Time of the last sample \[s\].
     pub at_s: f64,
-    /// Duration of the flight that the scenario asks for \[s\].
+    /// Duration that the scenario asks for \[s\].
     pub duration_s: f64,
-    /// Why the flight ended; none where the recording does not say.
+    /// Reason of the end; `None` if the recording does not state it.
     pub reason: Option<String>,
 }
 
-/// How it is known what happens between two samples.
+/// Basis of the motion between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
-    /// The recording says it: curves, or every step of an engine that moves vehicles straight.
+    /// The recording defines the motion: curves, or every step of an engine that moves vehicles on straight lines.
     Recorded,
     /// The run's audit of every step answers the question.
     Run,
-    /// A bound on every motion there can be.
+    /// A bound on every possible motion.
     Bounded,
-    /// It is taken for granted.
+    /// An assumption.
     Assumed,
 }
 
-/// What a judgement of a recording rests on: the keys of a flight's `audit`, and how far it is a proof.
+/// Findings of the audit of a recording: the keys of a flight's `audit`, and whether the verdict is proved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordedAudit {
-    /// The keys of a flight.
+    /// Keys of a flight.
     #[serde(flatten)]
     pub flight: Audit,
-    /// Clear, and nothing was taken for granted of the time between samples.
+    /// Whether the verdict is clear without an assumption about the time between samples.
     pub proved: bool,
-    /// Clear by the run's audit of every step, which the recording holds.
+    /// Whether the verdict is clear by the run's audit of every step, which the recording holds.
     pub judged_by_run: bool,
-    /// What was assumed of the motion between samples; none where the recording says it itself.
+    /// Assumption about the motion between samples; null without one.
     pub assumes: Option<String>,
 }
 
-/// The content of `tautline audit --json`.
+/// Content of `tautline audit --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordedReport {
     /// Version of the keys.
     pub schema_version: u32,
-    /// The verdict.
+    /// Status of the whole audit.
     pub status: Status,
-    /// What was read.
+    /// The recording.
     #[serde(flatten)]
     pub source: Source,
-    /// `metres`, or `ellipsoids` where lengths are divided by the axes of the ellipsoid.
+    /// `metres`, or `ellipsoids` if lengths are divided by the half axes of an ellipsoid.
     pub measure: &'static str,
-    /// What was taken to happen between samples.
+    /// Motion between samples in words.
     pub motion: String,
-    /// Names of the vehicles; numbers of pairs count them from 1.
+    /// Names of the vehicles. The numbers of pairs count them from 1.
     pub vehicles: Vec<String>,
-    /// How many of them were judged: asked for, and there.
+    /// Number of judged vehicles: selected and present.
     pub judged: usize,
-    /// First and last instant judged \[s\].
+    /// First and last judged instant \[s\].
     pub span_s: Option<(f64, f64)>,
-    /// Which vehicles are seen throughout, and when the others are.
+    /// Presence of the vehicles in the window.
     pub presence: SeenWhen,
-    /// How close vehicles came.
+    /// Smallest separation.
     pub separation: Separation<Option<f64>>,
-    /// What the judgement rests on.
+    /// Findings of the audit.
     pub audit: RecordedAudit,
-    /// How many findings there are, and how many of them are listed.
+    /// Number of findings, and how many are listed.
     pub findings: Tallies,
-    /// Violations, of pairs and of obstacles, in order of time; of many the worst, and the first of each pair.
+    /// Violations of pairs and obstacles in order of time; of a long list the worst, and the first of each pair.
     pub violations: Vec<OfPair<Violation<ObjectPair>>>,
     /// The ten closest pairs.
     pub closest: Vec<OfPair<Approach>>,
-    /// What obstacles were in the way of.
+    /// Findings on obstacles.
     pub obstacles: Obstacles,
-    /// What each vehicle may do by itself, limit by limit.
+    /// Findings on the limits of single vehicles.
     pub limits: Vec<OfLimit>,
-    /// When vehicles were not seen.
+    /// Intervals in which a vehicle was not seen.
     pub gaps: Vec<OfVehicle<Gap>>,
-    /// Vehicles that are never there together with another, and when they are, where they are to keep apart from nothing else.
+    /// Vehicles that are never present together with another one, with their intervals, unless an obstacle is judged.
     pub alone: Vec<OfVehicle<Presence>>,
-    /// When it cannot be told whether two came too close.
+    /// Intervals in which the separation of a pair is undecided.
     pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
-    /// Where the recording contradicts the assumed bound on acceleration.
+    /// Time at which the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<OfVehicle<Contradiction>>,
-    /// Where the flight ended before its time, and what was judged did not: nothing is known of the rest.
+    /// Early end of the flight inside the judged window. The rest of the window is unknown.
     pub ended_early: Option<EarlyEnd>,
-    /// Verdict and finding up to there, where nothing was wrong.
+    /// Verdict and finding up to the early end, if clear up to there.
     #[serde(skip)]
     pub(super) until_then: Option<String>,
-    /// Why the run's own audit leaves the question undecided.
+    /// Reason why the run's own audit does not decide the question.
     #[serde(skip)]
     pub run_objection: Option<String>,
-    /// Whether it was asked how close two came, and not single vehicles alone.
+    /// Whether separations are judged, not limits of single vehicles alone.
     #[serde(skip)]
     pub(super) separation_asked: bool,
-    /// Whether everything is known but for what is listed.
+    /// Whether everything beyond the listed findings is decided.
     #[serde(skip)]
     pub(super) is_else_known: bool,
-    /// The sampling rate that would decide all that is undecided of pairs \[Hz\].
+    /// Sampling rate that would decide all undecided pairs \[Hz\].
     #[serde(skip)]
     pub(super) deciding_rate_hz: Option<f64>,
 }
 
-/// Vehicles that are listed for not being seen throughout, at most.
+/// Largest number of listed vehicles that are not seen throughout.
 const ABSENT_LISTED: usize = 1000;
 
-/// Which vehicles are seen over the whole window.
+/// Presence of the vehicles in the window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeenWhen {
-    /// The window that the verdict is about \[s\]: what was asked for, or the time of the recording; null where nothing was judged.
+    /// Window of the verdict \[s\]: the requested one, or that of the recording; null if nothing was judged.
     pub window_s: Option<(f64, f64)>,
-    /// Whether the verdict depends on it.
+    /// Whether the verdict depends on the presence.
     pub required: bool,
-    /// How many of those that were asked for are seen throughout.
+    /// Number of selected vehicles that are seen throughout.
     pub throughout: usize,
-    /// How many of them are not.
+    /// Number of selected vehicles that are not.
     pub partly: usize,
-    /// When these are seen, the first of them by their numbers.
+    /// Times of the latter, at most [`ABSENT_LISTED`], by their numbers.
     pub listed: Vec<OfVehicle<Seen>>,
 }
 
-/// When a vehicle is seen, from the first time to the last; null where it is not seen in the window.
+/// First and last time at which a vehicle is seen; null if it is not seen in the window.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
-    /// From \[s\].
+    /// First time \[s\].
     pub from_s: Option<f64>,
-    /// To \[s\].
+    /// Last time \[s\].
     pub to_s: Option<f64>,
 }
 
@@ -190,17 +190,17 @@ impl SeenWhen {
     }
 }
 
-/// Obstacles and who came close to them.
+/// Findings on obstacles.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Obstacles {
     /// The ten closest approaches.
     pub closest: Vec<OfPair<Approach>>,
-    /// Every time that a vehicle was too close to one.
+    /// Intervals in which a vehicle was below its clearance.
     pub violations: Vec<OfPair<Violation<ObjectPair>>>,
 }
 
 impl RecordedReport {
-    /// The report on an outcome.
+    /// Returns the report on the outcome of an audit.
     #[must_use]
     pub fn new(outcome: &Outcome, settings: &Settings, source: Source, between: Between) -> Self {
         let first = outcome.closest.first();
@@ -282,7 +282,7 @@ impl RecordedReport {
         }
     }
 
-    /// Returns the report on a flight that ended before its time: undecided at best.
+    /// Returns the report with an early end: undecided at best.
     #[must_use]
     pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
         self.until_then = (self.status == Status::Clear).then(|| self.headline());
@@ -296,13 +296,13 @@ impl RecordedReport {
         self
     }
 
-    /// The verdict on how close any two came alone; none where only single vehicles were asked about.
+    /// Returns the status of separations alone; `None` if only limits of single vehicles were judged.
     #[must_use]
     pub fn separation(&self) -> Option<Status> {
         self.separation_asked.then_some(self.audit.flight.status)
     }
 
-    /// The report as indented JSON with a line end.
+    /// Returns the report as indented JSON with a final line break.
     ///
     /// # Errors
     /// None in practice: every key is a string and every value has a JSON form.
@@ -311,12 +311,12 @@ impl RecordedReport {
     }
 }
 
-/// A finding on a pair, with their names.
+/// A finding on a pair of vehicles, or a vehicle and an obstacle, with their names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfPair<T> {
-    /// Their names.
+    /// The two names.
     pub who: [String; 2],
-    /// What was found.
+    /// The finding.
     #[serde(flatten)]
     pub finding: T,
 }
@@ -324,9 +324,9 @@ pub struct OfPair<T> {
 /// A finding on a vehicle, with its name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfVehicle<T> {
-    /// Its name.
+    /// Name of the vehicle.
     pub vehicle: String,
-    /// What was found.
+    /// The finding.
     #[serde(flatten)]
     pub finding: T,
 }

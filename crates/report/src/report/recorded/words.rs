@@ -11,10 +11,10 @@ use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
 use tautline_core::text::{at_least, at_most, counted, exact, fixed, in_order, metres_below, seconds};
 
-/// Violations that are listed in words, and on the page.
+/// Largest numbers of violations in the text, and on the page.
 const LISTED_IN_WORDS: usize = 10;
 const LISTED_ON_PAGE: usize = 100;
-/// Vehicles that are not seen throughout and are named in the headline.
+/// Largest number of vehicles in the headline that are not seen throughout.
 const NAMED_IN_HEADLINE: usize = 3;
 
 impl RecordedReport {
@@ -22,13 +22,13 @@ impl RecordedReport {
         if self.measure == "metres" { " m" } else { " ellipsoids" }
     }
 
-    /// The verdict in one line, with the window that it is about, and which vehicles are not seen throughout.
+    /// Returns the verdict in one line, with its window and the vehicles that are not seen throughout.
     #[must_use]
     pub fn headline(&self) -> String {
         one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
-    /// The window that the verdict is about, and the first vehicles that are not seen throughout.
+    /// Returns the window of the verdict, and the first vehicles that are not seen throughout.
     fn window(&self) -> String {
         let presence = &self.presence;
         let window = presence.window_s.map_or(String::new(), |(from_s, to_s)| format!("; from {}", span(from_s, to_s)));
@@ -48,7 +48,7 @@ impl RecordedReport {
         )
     }
 
-    /// The verdict alone, such as `PROVED CLEAR`.
+    /// Returns the verdict alone, such as `PROVED CLEAR`.
     #[must_use]
     pub fn verdict(&self) -> String {
         match self.status {
@@ -60,7 +60,7 @@ impl RecordedReport {
         }
     }
 
-    /// The headline behind the verdict.
+    /// Returns the headline without the verdict.
     fn finding(&self) -> String {
         match (&self.ended_early, &self.until_then) {
             (None, _) => self.finding_of_motion(),
@@ -69,7 +69,7 @@ impl RecordedReport {
         }
     }
 
-    /// The finding on what was recorded: of pairs, and of the limits that decide it.
+    /// Returns the findings with the status of the verdict, on pairs and on limits.
     fn finding_of_motion(&self) -> String {
         let decides = |limit: &&OfLimit| limit.status == self.status;
         let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
@@ -77,7 +77,7 @@ impl RecordedReport {
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
         let found = pairs.into_iter().chain(limits).collect::<Vec<_>>();
-        // All that was asked for is kept while vehicles are seen, which is not throughout.
+        // All limits are kept, but a vehicle that must be present is not seen throughout.
         let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
         found.into_iter().chain(nothing).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
     }
@@ -95,7 +95,7 @@ impl RecordedReport {
                 });
                 let is_in_verdict = self.audit.judged_by_run || !self.audit.proved;
                 let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion) };
-                format!("{closest}({delta}{motion}){}", self.of_those_alone())
+                format!("{closest}({delta}{motion}){}", self.never_with_another())
             }
             Status::Violation => {
                 let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
@@ -118,12 +118,12 @@ impl RecordedReport {
         }
     }
 
-    /// Who was there when nobody else was, of whom nothing is said.
-    fn of_those_alone(&self) -> String {
+    /// Returns the vehicles that are never present together with another one, and are therefore not judged.
+    fn never_with_another(&self) -> String {
         let others = |count: usize| if count > 0 { format!(" and {count} more") } else { String::new() };
         self.alone.split_first().map_or(String::new(), |(first, rest)| {
             let (is, others) = (if rest.is_empty() { "is" } else { "are" }, others(rest.len()));
-            format!("; {}{others} {is} never there with another", first.vehicle)
+            format!("; {}{others} {is} never present with another", first.vehicle)
         })
     }
 
@@ -152,15 +152,15 @@ impl RecordedReport {
             return if finding.upper_m.is_finite() {
                 format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
             } else {
-                format!("how near {first} and {second} came to each other by {at} is not known")
+                format!("the distance of {first} and {second} at {at} is unknown")
             };
         }
         let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
-        // Rounded up: as it is said it is long enough.
+        // Rounded up, so that the printed gap is long enough.
         let joined = format!("--max-gap {} would judge across", (longest_s * 1e6).ceil() / 1e6);
         match &self.gaps[..] {
-            [] if self.span_s.is_none() => "there was nothing to judge".to_owned(),
-            [] => "at no time were there two to keep apart".to_owned(),
+            [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
+            [] => "no two vehicles are present at the same time".to_owned(),
             [OfVehicle { vehicle, finding }] => {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
@@ -183,7 +183,7 @@ impl RecordedReport {
             Section::table(heading, &caption, columns, closest.iter().map(row))
         };
         let columns = &["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
-        let limits = "limits, and the vehicles nearest to them";
+        let limits = "limits, and the vehicles closest to them";
         let presence = &self.presence;
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
         let all = |of: Tally, tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).fold(of, sum);
@@ -210,7 +210,7 @@ impl RecordedReport {
         sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
     }
 
-    /// What is left out of lists that are too long, a sentence each.
+    /// Returns the lists that are cut, a sentence each.
     #[must_use]
     pub fn shortened(&self) -> Vec<String> {
         let of_pairs = [
@@ -227,12 +227,15 @@ impl RecordedReport {
         shortened
             .map(|(what, tally)| {
                 let (count, listed) = (counted_in_words(tally), tally.listed);
-                format!("{count} {what} were found and {listed} are listed: the worst, and the first of each pair or vehicle, {LISTED} of either at most")
+                format!(
+                    "{count} {what} were found and {listed} are listed: the worst, and the first of each pair or \
+                     vehicle, {LISTED} of either at most"
+                )
             })
             .collect()
     }
 
-    /// The closest pairs and what was found, a line each, with a line end.
+    /// Returns the closest pairs and the findings, a line each, with a final line break.
     #[must_use]
     pub fn text(&self) -> String {
         let span = self.span_s.map_or("nothing".to_owned(), |(from_s, to_s)| span(from_s, to_s));
@@ -246,7 +249,8 @@ impl RecordedReport {
         std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
     }
 
-    /// The report as a self-contained HTML page, with the replay of the recording or why there is none.
+    /// Returns the report as a self-contained HTML page, with the replay of the recording or the reason for its
+    /// absence.
     #[must_use]
     pub fn to_html(&self, replay: &Result<Replay, NoReplay>, figures: &[Figure], command: &str) -> String {
         let tone = match self.status {
@@ -272,30 +276,30 @@ impl RecordedReport {
     }
 }
 
-/// Words with foreign names in them, on one line and in the order of reading whatever the names hold.
+/// Puts text with foreign names on one line, without control characters that change the direction of reading.
 fn one_line(words: &str) -> String {
     in_order(words).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
-/// How many of some findings are listed, and how many more there are.
+/// Adds the numbers of found and of listed findings.
 fn sum(a: Tally, b: Tally) -> Tally {
     Tally { count: a.count + b.count, listed: a.listed + b.listed, is_exact: a.is_exact && b.is_exact }
 }
 
-/// How many there are, such as `at least 12`.
+/// Returns the number of findings in words, such as `at least 12`.
 fn counted_in_words(tally: Tally) -> String {
     let least = if tally.is_exact { "" } else { "at least " };
     format!("{least}{}", tally.count)
 }
 
-/// The same, and how many of them are listed where that is not all.
+/// Returns the number of findings, and the number of the listed ones if the list is cut.
 fn shortened_in_words(tally: Tally) -> String {
     let count = counted_in_words(tally);
-    if tally.is_shortened() { format!("{count}, of which {} are listed", tally.listed) } else { count }
+    if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
 }
 
 impl EarlyEnd {
-    /// Returns where the flight ended and why, in a clause.
+    /// Returns the time and reason of the end in a clause.
     #[must_use]
     pub fn words(&self) -> String {
         let (at, duration) = (seconds(self.at_s), seconds(self.duration_s));
@@ -351,12 +355,12 @@ impl OfVehicle<Seen> {
     }
 }
 
-/// Two times in words.
+/// Formats an interval of time.
 fn span(from_s: f64, to_s: f64) -> String {
     format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
 }
 
-/// A distance with six decimals, rounded down, or an interval where its bounds differ, which holds them.
+/// Formats a distance with six decimals, rounded down. If the bounds differ, returns an interval that contains both.
 #[must_use]
 pub fn interval(lower: f64, upper: f64) -> String {
     let (low, high) = (at_least(lower, 6), at_most(upper, 6));

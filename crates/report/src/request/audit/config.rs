@@ -1,4 +1,4 @@
-//! `tautline.toml`: defaults of audits of the recordings beside it. A request goes before it.
+//! `tautline.toml`: defaults for audits of the recordings beside it. Options of the request take precedence.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,10 +13,10 @@ use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Interpolation;
 use tautline_recordings::read::{ArrayAxis, Axes, Scale};
 
-/// What the file is called.
+/// Name of the file.
 const NAME: &str = "tautline.toml";
 const FILE: TomlFile = TomlFile { code: "audit/settings-file", help: HELP, most_bytes: 1 << 20 };
-const HELP: &str = "docs/ci.md lists the keys of [audit]; --no-config asks what the command line says alone";
+const HELP: &str = "docs/ci.md lists the keys of [audit]; --no-config ignores the file";
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -46,7 +46,7 @@ struct AuditTable {
     limits: BTreeMap<String, f64>,
 }
 
-/// Metres per unit of length, of all axes or of each.
+/// Metres per unit of length, for all axes or for each.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged)]
 enum ScaleEntry {
@@ -58,19 +58,19 @@ impl ScaleEntry {
     fn scale(self) -> Result<Scale, String> {
         match self {
             Self::All(metres) => Ok(metres.into()),
-            // The words of `--scale` have the same checks.
+            // Parsed like the words of `--scale`, with the same checks.
             Self::Each([x, y, z]) => format!("{x:?},{y:?},{z:?}").parse(),
         }
     }
 }
 
-/// The request with what its `tautline.toml` asks where it is silent.
+/// Returns the request, with options that it leaves open taken from its `tautline.toml`.
 pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudit<'_>, Failure> {
     let found = file_of(&request);
     if request.config == ConfigFile::Nearest
         && let Some(path) = found.as_ref().filter(|path| !path.is_file())
     {
-        return Err(Failure::input("audit/settings-file", format!("{} is no file", path.display()), HELP));
+        return Err(Failure::input("audit/settings-file", format!("{} is not a file", path.display()), HELP));
     }
     request.config = found.map_or(ConfigFile::None, ConfigFile::File);
     match request.config.clone() {
@@ -79,7 +79,7 @@ pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudi
     }
 }
 
-/// The file of settings that fills a request, whatever it holds.
+/// Returns the `tautline.toml` of a request.
 pub(super) fn file_of(request: &AuditRequest<'_>) -> Option<PathBuf> {
     match &request.config {
         ConfigFile::File(path) => Some(path.clone()),
@@ -88,8 +88,9 @@ pub(super) fn file_of(request: &AuditRequest<'_>) -> Option<PathBuf> {
     }
 }
 
-/// The nearest file of that name in the recording's folder and in those above it, up to the working folder; of a recording
-/// that is elsewhere, in its own folder alone. Links are followed, so that every name of a recording finds the same one.
+/// Returns the nearest `tautline.toml` in the recording's folder and its parents, up to the working folder. For a
+/// recording outside the working folder, only its own folder counts. Links are resolved, so that every path of a
+/// recording finds the same file.
 fn nearest(recording: &Path) -> Option<PathBuf> {
     let beside = if recording.is_dir() { recording } else { recording.parent()? };
     let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
@@ -107,7 +108,7 @@ fn parse(text: &str, path: &Path) -> Result<AuditTable, Failure> {
 }
 
 impl AuditTable {
-    /// Fills what the request leaves open. Files are named from the folder of `tautline.toml`.
+    /// Fills options that the request leaves open. Relative paths start at the folder of `tautline.toml`.
     fn fill<'a>(self, mut request: AuditRequest<'a>, path: &Path) -> Result<ConfiguredAudit<'a>, Failure> {
         let wrong =
             |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), HELP);
@@ -130,12 +131,13 @@ impl AuditTable {
         }
         if self.max_accel_m_s2.is_some() && request.settings.motion.is_none() && !is_bounded {
             return Err(wrong(
-                "max_accel_m_s2 says nothing of a motion that is known exactly: add motion = \"bounded\"".to_owned(),
+                "max_accel_m_s2 has no effect on a motion that is known exactly: add motion = \"bounded\"".to_owned(),
             ));
         }
         let has_max_accel = request.has_max_accel();
         let settings = &mut request.settings;
-        // Limits of distance are one question: a part of it from the request and a part from here would be a third.
+        // Limits of distance come either all from the request or all from the file. A mixture would be a third
+        // question.
         if is_silent {
             settings.delta_m = self.delta_m;
             settings.radius_m = self.radius_m;
@@ -166,7 +168,7 @@ impl AuditTable {
             let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);
             let quantity = quantity.ok_or_else(|| {
                 let keys = Quantity::NUMBERS.map(Quantity::key).join(", ");
-                wrong(format!("`{key}` is no limit: the limits are {keys}"))
+                wrong(format!("`{key}` is not a limit: the limits are {keys}"))
             })?;
             let limits = &mut request.settings.envelope.limits;
             if limits.iter().all(|given| given.quantity != quantity) {
@@ -193,8 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn the_request_goes_before_the_file() {
-        let text = "[audit]\ndelta_m = 1.5\nabove_m = 0.5\nobstacles = \"venue.toml\"\n[audit.limits]\nspeed_m_s = 5.0\nclimb_m_s = 2";
+    fn request_takes_precedence_over_the_file() {
+        let text = "[audit]\ndelta_m = 1.5\nabove_m = 0.5\nobstacles = \"venue.toml\"\n\
+                    [audit.limits]\nspeed_m_s = 5.0\nclimb_m_s = 2";
         let asked = filled(request(), text).expect("a question");
         assert!(asked.asked_by().is_some_and(|note| note.contains("show/tautline.toml")));
         let AuditRequest { settings, obstacles, .. } = asked.request;
@@ -210,12 +213,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_name_their_line() {
         for (text, expected) in [
             ("", "line 1: missing field `audit`"),
             ("[audit]\ndelta = 1.5", "show/tautline.toml, line 2: unknown field `delta`"),
             ("[audit]\nmotion = \"spline\"", "line 2: unknown variant `spline`"),
-            ("[audit.limits]\nspeed = 5.0", "`speed` is no limit: the limits are speed_m_s,"),
+            ("[audit.limits]\nspeed = 5.0", "`speed` is not a limit: the limits are speed_m_s,"),
             ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
             ("[audit]\nscale = [1, 0, 1]", "a scale of 0"),

@@ -26,38 +26,38 @@ use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
 
-/// Items that are read before the first is judged: usual intervals are learnt from them.
+/// Number of items that are read before the first is judged. They determine the usual sampling intervals.
 const OPENING: usize = 65_536;
 
-/// Vehicles that are never there with another and have a note of their own, at most.
+/// Largest number of vehicles without company that get a note of their own.
 const MOST_ALONE: usize = 3;
 
-/// Opens the recording, each time from its beginning.
+/// Function that opens the recording at its beginning, at each call.
 pub type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + Sync + 'a;
 
 /// The recording of a request.
 #[derive(Clone)]
 pub enum Subject<'a> {
-    /// Files or folders; several are one recording with a vehicle in each.
+    /// Files or folders. Several paths are one recording, each with a vehicle of its own.
     Files {
-        /// At least one path.
+        /// Paths, at least one.
         paths: Vec<PathBuf>,
-        /// How they are read.
+        /// Options of the readers.
         options: Box<ReadOptions>,
     },
-    /// Motion that the caller holds.
+    /// Motion in the memory of the caller.
     Held {
-        /// The name of the motion in messages.
+        /// Name of the motion in messages.
         name: &'a str,
         /// Limits, obstacles and audit of a flight of `tautline run`.
         own: Option<&'a OwnRecording>,
-        /// Opens the motion.
+        /// Function that opens the motion.
         open: &'a Open<'a>,
     },
 }
 
 impl Subject<'_> {
-    /// The name of the recording in messages.
+    /// Returns the name of the recording in messages.
     #[must_use]
     pub fn called(&self) -> String {
         match self {
@@ -69,7 +69,7 @@ impl Subject<'_> {
     /// Opens the recording at its beginning.
     ///
     /// # Errors
-    /// [`ReadError`] where it cannot be read.
+    /// [`ReadError`] if the recording cannot be read.
     pub fn open(&self) -> Result<Box<dyn Tracks<Error = ReadError> + '_>, ReadError> {
         match self {
             Self::Files { paths, options } => open(paths, options).map(|recording| recording as _),
@@ -77,7 +77,7 @@ impl Subject<'_> {
         }
     }
 
-    /// The only file and how it is read, where there is one.
+    /// Returns the path and the options if the recording is a single file.
     fn only_file(&self) -> Option<(&Path, &ReadOptions)> {
         match self {
             Self::Files { paths, options } => match &paths[..] {
@@ -95,7 +95,7 @@ impl Subject<'_> {
         }
     }
 
-    /// What a recording of `tautline run` holds beside positions, and the limit that a show states \[m\].
+    /// Returns the contents of a recording of `tautline run` besides positions, and the limit that a show states \[m\].
     fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
         match self {
             Self::Held { own, .. } => Ok((own.cloned(), None)),
@@ -110,7 +110,7 @@ impl Subject<'_> {
 /// Opens files or folders as one recording.
 ///
 /// # Errors
-/// [`ReadError`] where one cannot be read.
+/// [`ReadError`] if one of them cannot be read.
 pub fn open(paths: &[PathBuf], options: &ReadOptions) -> Result<read::Recording, ReadError> {
     match paths {
         [path] => read::open(&recording_in(path), options),
@@ -118,17 +118,17 @@ pub fn open(paths: &[PathBuf], options: &ReadOptions) -> Result<read::Recording,
     }
 }
 
-/// The recording in the folder of a run; any other path as it is.
+/// Returns the recording in the folder of a run, and any other path unchanged.
 #[must_use]
 pub fn recording_in(path: &Path) -> PathBuf {
     let recorded = path.join(RECORDING);
     if recorded.is_file() { recorded } else { path.to_owned() }
 }
 
-/// Returns what a recording of `tautline run` holds beside positions; `None` for any other recording.
+/// Returns the contents of a recording of `tautline run` besides positions; `None` for any other recording.
 ///
 /// # Errors
-/// [`Failure`] where its scenario cannot be read.
+/// [`Failure`] if its scenario cannot be read.
 pub fn own_recording(
     paths: &[PathBuf],
     options: &ReadOptions,
@@ -142,15 +142,15 @@ pub fn own_recording(
     }
 }
 
-/// Which `tautline.toml` fills what a request leaves open.
+/// Choice of the `tautline.toml` that fills options which the request leaves open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ConfigFile {
-    /// The nearest beside the recording and above it, up to the working folder.
+    /// The nearest file in the recording's folder and its parents, up to the working folder.
     #[default]
     Nearest,
     /// This file.
     File(PathBuf),
-    /// None.
+    /// No file.
     None,
 }
 
@@ -159,30 +159,30 @@ pub enum ConfigFile {
 pub struct AuditRequest<'a> {
     /// The recording.
     pub subject: Subject<'a>,
-    /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence of a file are added to these.
+    /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence from files are added to them.
     pub settings: Settings,
     /// TOML file of obstacles.
     pub obstacles: Option<PathBuf>,
     /// TOML file of a fence.
     pub fence: Option<PathBuf>,
-    /// The number of vehicles that must be there to judge.
+    /// Number of vehicles that must be present.
     pub expect_vehicles: Option<usize>,
     /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
     pub independent: bool,
-    /// Whether an undecided verdict is good.
+    /// Whether an undecided verdict counts as good.
     pub allow_undecided: bool,
-    /// Which file fills what is left open. Motion that the caller holds has no nearest file.
+    /// Choice of the `tautline.toml`. Motion in memory has no nearest file.
     pub config: ConfigFile,
-    /// The command or expression that judges again, for the page.
+    /// Command or expression that repeats the audit, for the page.
     pub command: String,
-    /// Where the page with figures is written.
+    /// Path of the page with figures.
     pub html: Option<PathBuf>,
-    /// Where a proof is written that `check_proof.py` confirms; of one CSV table and a safety distance alone.
+    /// Path of the proof, which `check_proof.py` confirms. Available for one CSV table and a safety distance alone.
     pub proof: Option<PathBuf>,
 }
 
 impl<'a> AuditRequest<'a> {
-    /// A request that asks nothing yet.
+    /// Returns a request without limits.
     #[must_use]
     pub fn new(subject: Subject<'a>) -> Self {
         Self {
@@ -206,14 +206,14 @@ impl<'a> AuditRequest<'a> {
 pub struct Audited {
     /// The report.
     pub report: RecordedReport,
-    /// Whether an undecided verdict is good.
+    /// Whether an undecided verdict counts as good.
     pub allows_undecided: bool,
-    /// A note on the file of settings that was used.
+    /// Note on the `tautline.toml` in use.
     pub asked_by: Option<String>,
 }
 
 impl Audited {
-    /// Whether the verdict is clear, or undecided where that is allowed.
+    /// Returns whether the verdict is clear, or undecided if that is allowed.
     #[must_use]
     pub fn is_good(&self) -> bool {
         match self.report.status {
@@ -224,11 +224,11 @@ impl Audited {
     }
 }
 
-/// A request that is complete: no file of settings fills it any more.
+/// A complete request, with the options of `tautline.toml`.
 #[derive(Clone)]
 pub struct ConfiguredAudit<'a> {
     request: AuditRequest<'a>,
-    /// A note on the file of settings that was used.
+    /// Note on the `tautline.toml` in use.
     asked_by: Option<String>,
 }
 
@@ -251,7 +251,7 @@ pub struct ConfiguredAudit<'a> {
 /// ```
 ///
 /// # Errors
-/// [`Failure`] where the question or the recording is wrong, or a file cannot be written. The monitor has the verdict
+/// [`Failure`] if the request or the recording is wrong, or a file cannot be written. The monitor receives the verdict
 /// before files are written.
 pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<Audited, Failure> {
     request.check_outputs(&[])?;
@@ -261,10 +261,10 @@ pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<
 }
 
 impl<'a> AuditRequest<'a> {
-    /// Fills what is left open as the file of settings says.
+    /// Fills options that are left open from the `tautline.toml`.
     ///
     /// # Errors
-    /// [`Failure`] where the file of settings is wrong.
+    /// [`Failure`] if that file is wrong.
     pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
         let mut request = self.clone();
         if let Subject::Files { paths, .. } = &mut request.subject {
@@ -275,10 +275,10 @@ impl<'a> AuditRequest<'a> {
         config::configured(request)
     }
 
-    /// Refuses outputs of the request, and `more` of the caller, that would overwrite an input or each other.
+    /// Rejects outputs of the request and `more` outputs of the caller that would overwrite an input or each other.
     ///
     /// # Errors
-    /// [`Failure`] that names both.
+    /// [`Failure`] that names both files.
     pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
         let Self { subject, obstacles, fence, html, proof, .. } = self;
         let settings = config::file_of(self);
@@ -291,27 +291,27 @@ impl<'a> AuditRequest<'a> {
         outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
     }
 
-    /// Whether a radius is given for all vehicles or for one.
+    /// Returns whether a radius is given, for all vehicles or for one.
     fn has_radius(&self) -> bool {
         self.settings.radius_m.is_some() || self.settings.vehicles.values().any(|of| of.radius_m.is_some())
     }
 
-    /// Whether a largest acceleration is given for all vehicles or for one.
+    /// Returns whether a largest acceleration is given, for all vehicles or for one.
     fn has_max_accel(&self) -> bool {
         self.settings.max_accel_m_s2.is_some() || self.settings.vehicles.values().any(|of| of.max_accel_m_s2.is_some())
     }
 
-    /// Whether no limit on distances is given.
+    /// Returns whether no limit on distances is given.
     fn is_silent(&self) -> bool {
         self.settings.delta_m.is_none() && !self.has_radius() && self.settings.ellipsoid_m.is_none()
     }
 
-    /// The settings with the obstacles and the fence of files.
+    /// Returns the settings with the obstacles and the fence of the files.
     fn complete_settings(&self) -> Result<Settings, Failure> {
         if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
             return Err(Failure::input(
                 "audit/unused-acceleration",
-                "--max-accel says nothing of a motion that is known exactly",
+                "--max-accel has no effect on a motion that is known exactly",
                 "add --motion bounded, or leave --max-accel out",
             ));
         }
@@ -341,7 +341,7 @@ impl<'a> AuditRequest<'a> {
         Ok(settings)
     }
 
-    /// Refuses to judge a vehicle alone, and another number of vehicles than is expected.
+    /// Rejects a single vehicle without other limits, and a number of vehicles other than the expected one.
     fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
         let path = self.subject.called();
         let judged = outcome.presence.iter().flatten().count();
@@ -360,12 +360,13 @@ impl<'a> AuditRequest<'a> {
         let asked = asked.count();
         if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
             let message =
-                format!("{path}: {} to judge, and nothing to keep apart", counted(asked as u64, "vehicle", "vehicles"));
-            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME say which are there), or --obstacles, --limit, --fence";
+                format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
+                 --limit, --fence";
             return Err(Failure::input("audit/nothing-to-judge", message, help));
         }
         if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
-            let message = format!("{path}: no vehicle is there between --from and --to");
+            let message = format!("{path}: no vehicle is present between --from and --to");
             return Err(Failure::input(
                 "audit/empty-window",
                 message,
@@ -375,10 +376,10 @@ impl<'a> AuditRequest<'a> {
         Ok(())
     }
 
-    /// Refuses a question in seconds if the unit of time is a guess. Seconds are accepted if milliseconds would make the vehicles of
-    /// these first items faster than sound.
+    /// Rejects options in seconds if the unit of time is a guess. Seconds are accepted if the unit milliseconds would
+    /// make the vehicles of these first items faster than sound.
     fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
-        /// Speed that no vehicle of a swarm has \[m/s\]: that of sound.
+        /// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
         const FASTEST_M_S: f64 = 340.0;
         let settings = &self.settings;
         let asked = [
@@ -393,25 +394,25 @@ impl<'a> AuditRequest<'a> {
         let path = self.subject.called();
         if unit != "s" {
             let message = format!(
-                "{path}: only the steps of its whole numbers suggest that times are in {unit}, and {option} depends on it"
+                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
+                 depends on it"
             );
             return Err(Failure::input(
                 "audit/guessed-time-unit",
                 message,
-                format!("say --time-unit {unit}, or --time-unit s"),
+                format!("give --time-unit {unit}, or --time-unit s"),
             ));
         }
         if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
             return Ok(());
         }
-        let message = format!(
-            "{path}: its times may be seconds or milliseconds, going by their steps, and {option} depends on it"
-        );
-        Err(Failure::input("audit/guessed-time-unit", message, "say --time-unit s, or --time-unit ms"))
+        let message =
+            format!("{path}: by their steps the times may be in seconds or milliseconds, and {option} depends on it");
+        Err(Failure::input("audit/guessed-time-unit", message, "give --time-unit s, or --time-unit ms"))
     }
 
-    /// Returns what is taken to happen between samples, for a recording of curves alone or one of `tautline run`. Nothing is
-    /// proved where the samples themselves are assumed.
+    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved if the
+    /// samples themselves are assumed.
     fn between(&self, curves: bool, holds_every_step: bool, answer: &RunAnswer, assumed: Option<&str>) -> Between {
         let most = || {
             let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
@@ -559,7 +560,7 @@ impl ConfiguredAudit<'_> {
     }
 }
 
-/// The limits and obstacles that a recording states itself, as far as the request leaves them open.
+/// Limits and obstacles that the recording states itself and the request leaves open.
 struct Taken<'a> {
     delta_m: Option<f64>,
     ellipsoid_m: Option<Vector3<f64>>,
@@ -567,7 +568,7 @@ struct Taken<'a> {
 }
 
 impl<'a> Taken<'a> {
-    /// Fills the settings with what the recording states.
+    /// Fills the settings with the limits and obstacles of the recording.
     fn fill(
         settings: &mut Settings,
         request: &AuditRequest<'_>,
@@ -580,7 +581,8 @@ impl<'a> Taken<'a> {
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
         settings.is_own_limit = is_silent && request.obstacles.is_none();
-        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two samples.
+        // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two
+        // samples.
         settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));
         let is_asked = request.obstacles.is_none() && settings.ellipsoid_m.is_none();
         let obstacles = own.map(|own| &own.obstacles[..]).filter(|own| is_asked && !own.is_empty());
@@ -588,7 +590,7 @@ impl<'a> Taken<'a> {
         Self { delta_m, ellipsoid_m, obstacles }
     }
 
-    /// Notes on how a recording of `tautline run` was flown, and on what it states itself.
+    /// Returns notes on the flight of a `tautline run` recording, and on the limits that it states.
     fn notes(&self, request: &AuditRequest<'_>, own: Option<&OwnRecording>) -> Vec<String> {
         let mut notes: Vec<String> = own.and_then(OwnRecording::note_on_law).into_iter().collect();
         notes.extend(self.delta_m.map(|m| format!("the safety distance is the recording's own, {m:?} m")));
@@ -600,9 +602,9 @@ impl<'a> Taken<'a> {
             let why = if request.obstacles.is_some() {
                 "--obstacles names others"
             } else {
-                "they have no place among ellipsoids"
+                "ellipsoids and obstacles are not judged together"
             };
-            notes.push(format!("the obstacles that were flown past are not judged: {why}"));
+            notes.push(format!("the obstacles of the recording are not judged: {why}"));
         }
         notes.extend(self.obstacles.map(|obstacles| {
             let names: Vec<_> = obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
@@ -612,32 +614,32 @@ impl<'a> Taken<'a> {
     }
 }
 
-/// Notes on vehicles that are never there together with another.
+/// Returns notes on vehicles that are never present together with another one.
 fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
     outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
         let Presence { from_s, to_s } = outcome.presence[vehicle]?;
         let name = outcome.name(vehicle);
         Some(format!(
-            "{name}, there from {from_s:?} s to {to_s:?} s, is never there with another: nothing is said of it (--offset \
-             {name}=SECONDS sets a wrong clock right)"
+            "{name}, present from {from_s:?} s to {to_s:?} s, is never present with another and is not judged \
+             (--offset {name}=SECONDS corrects a clock)"
         ))
     })
 }
 
-/// A recording after it was judged.
+/// A recording after its audit.
 struct Judged {
     outcome: Outcome,
     clock: Clock,
     notes: Vec<String>,
-    /// What was assumed to know its samples.
+    /// Assumption about the samples themselves.
     assumed: Option<String>,
-    /// Whether it has curves and no samples.
+    /// Whether the recording has curves instead of samples.
     curves: bool,
-    /// Whether some height is not known.
+    /// Whether the height of a vehicle is unknown.
     is_planar: bool,
 }
 
-/// The largest speed from sample to sample of a vehicle \[m/s\]; 0 of curves.
+/// Returns the largest speed of a vehicle between two samples \[m/s\]; 0 for curves.
 fn fastest_m_s(items: &[Item]) -> f64 {
     let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
     let samples = items.iter().filter_map(|item| match item {

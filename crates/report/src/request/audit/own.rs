@@ -35,7 +35,7 @@ pub struct OwnRecording {
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
     /// Violations and approaches of the events of the run.
-    witnessed: Vec<RunFinding>,
+    run_findings: Vec<RunFinding>,
     /// Whether the audit ignores the run's audit.
     is_independent: bool,
     /// Whether positions and times are read unchanged.
@@ -105,8 +105,8 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
 }
 
 impl OwnRecording {
-    /// Returns the contents for a flight in memory, with the reason of its early end and the name of its law where the law
-    /// is not the scenario's.
+    /// Returns the contents for a flight in memory, with the reason of its early end, and with the name of its law if
+    /// it is not that of the scenario.
     #[must_use]
     pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>, reason: Option<String>) -> Self {
         let (at_s, duration_s) = (report.run.duration_s, scenario.time.duration_s);
@@ -124,7 +124,7 @@ impl OwnRecording {
             obstacles: scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect(),
             early_end: None,
             audit: StoredAudit::None,
-            witnessed: Vec::new(),
+            run_findings: Vec::new(),
             is_independent: false,
             is_read_as_written: true,
             scale,
@@ -148,8 +148,7 @@ impl OwnRecording {
             let why = why.lines().next().unwrap_or_default();
             let message =
                 format!("{} was flown by another tautline: its scenario cannot be read: {why}", path.display());
-            let help =
-                "audit it with the tautline that flew it, or export it as CSV and say how close vehicles may come";
+            let help = "audit it with the tautline that flew it, or export it as CSV and give --delta";
             Failure::input("recording/foreign-scenario", message, help)
         })?;
         let mut own = Self::of(&scenario, header.delta_m, options.metres());
@@ -168,7 +167,7 @@ impl OwnRecording {
                 }
                 Entry::Event(Event::OtherLaw { name, .. }) => own.other_law = Some(name),
                 Entry::Event(Event::EndedEarly { reason: why, .. }) => reason = Some(why),
-                Entry::Event(event) => own.witnessed.extend(witnessed(&event, &scenario)),
+                Entry::Event(event) => own.run_findings.extend(run_finding(&event, &scenario)),
             }
         }
         if reason.is_some() || last_step < scenario.time.steps() {
@@ -214,12 +213,12 @@ impl OwnRecording {
         let audit = match &self.audit {
             _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
-                note("the recording holds no audit of its run; a run writes its audit at its end");
-                return self.of_samples(outcome, settings, &[&self.witnessed]);
+                note("the recording holds no audit of its run, which a run writes at its end");
+                return self.of_samples(outcome, settings, &[&self.run_findings]);
             }
             StoredAudit::Altered => {
-                note("the recording is not as the run wrote it, so the run's audit may be of other samples");
-                return self.of_samples(outcome, settings, &[&self.witnessed]);
+                note("the recording was changed after the run, so the run's audit may refer to other samples");
+                return self.of_samples(outcome, settings, &[&self.run_findings]);
             }
             StoredAudit::AsWritten(audit) => audit,
         };
@@ -239,10 +238,10 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.witnessed]);
+            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.run_findings]);
         }
         if self.is_contradicted(outcome, audit, status) {
-            note("they show vehicles closer than the run's audit says");
+            note("they show vehicles closer than the run's audit");
             return RunAnswer::Samples;
         }
         match status {
@@ -273,9 +272,9 @@ impl OwnRecording {
         }
     }
 
-    /// Returns why a clear answer of the samples is not certain: the run found two closer, between samples, than the
-    /// question allows. Distances of another metric are compared by an upper bound. Motion that `--offset` shifts in time is
-    /// not that of the run.
+    /// Returns the reason why a clear answer of the samples is not certain: between samples the run found a pair closer
+    /// than the request allows. Distances of another metric are compared by an upper bound. Motion that `--offset`
+    /// shifts in time is not that of the run.
     fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<String> {
         if outcome.separation != Some(Status::Clear) {
             return None;
@@ -366,7 +365,7 @@ impl OwnRecording {
 }
 
 /// Returns the violation or the approach of an event, in the lengths of [`run_audit`].
-fn witnessed(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
+fn run_finding(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
     let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
     let finding = |vehicle: usize, time_s: f64, limit_m: f64, min_m: f64| RunFinding {
         vehicle: vehicle as u64 + 1,
@@ -397,7 +396,7 @@ fn witnessed(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
     }
 }
 
-/// Leaves the answer of the samples undecided, for a reason that the run's audit gives.
+/// Leaves the answer of the samples undecided, for a reason of the run's audit.
 fn undecided(outcome: &mut Outcome, why: String) -> RunAnswer {
     outcome.status = outcome.status.and(Status::Undecided);
     outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));

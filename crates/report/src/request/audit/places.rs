@@ -1,4 +1,4 @@
-//! Questions about heights and places that a recording cannot answer.
+//! Rejection of limits on heights and places that a recording cannot answer.
 
 use super::super::Failure;
 use super::AuditRequest;
@@ -8,13 +8,13 @@ use tautline_audit::recorded::Settings;
 use tautline_core::track::{EarthOrigin, Item, Tracks};
 use tautline_recordings::read::ReadError;
 
-/// Largest distance of level ground below the level plane of the origin at which z counts as a height \[m\].
+/// Largest drop of level ground below the tangent plane of the origin at which z counts as a height \[m\].
 const MOST_DROP_M: f64 = 1.0;
 
 /// Mean radius of the Earth \[m\].
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
 
-/// What is asked about places.
+/// Limits and obstacles of a request that depend on heights or places.
 struct Asked<'a> {
     settings: &'a Settings,
 }
@@ -43,7 +43,7 @@ impl Asked<'_> {
         obstacle.map(|obstacle| format!("the obstacle `{}`", obstacle.name))
     }
 
-    /// What needs the height of each vehicle.
+    /// Returns the part of the request that needs the height of each vehicle.
     fn of_heights(&self) -> Option<String> {
         let upright = || {
             let tilted = self.obstacle(|of| !of.is_upright_through_ground())?;
@@ -53,27 +53,26 @@ impl Asked<'_> {
         limit.or_else(|| self.fence_with_heights()).or_else(|| self.above()).or_else(upright)
     }
 
-    /// What depends on where positions are measured from.
+    /// Returns the part of the request that depends on the origin of the positions.
     fn of_places(&self) -> Option<String> {
         let limit = self.limit(Quantity::needs_origin);
         limit.or_else(|| self.fence()).or_else(|| self.above()).or_else(|| self.obstacle(|_| true))
     }
 
-    /// What takes z for a height above level ground.
+    /// Returns the part of the request that takes z as a height above level ground.
     fn of_level(&self) -> Option<String> {
         self.limit(Quantity::needs_origin).or_else(|| self.fence_with_heights()).or_else(|| self.above())
     }
 }
 
-/// Looks whether z is a height wherever vehicles are, where a question needs that.
+/// Checks that z is a height above ground at all vehicles, if the request needs that.
 pub(super) struct Level<'a> {
     settings: &'a Settings,
-    /// What is asked; none where nothing is to be looked at.
+    /// Part of the request that needs heights; `None` without a check.
     asked: Option<String>,
 }
 
-/// Refuses questions about heights where the recording has none, and about places whose origin
-/// is not given.
+/// Rejects limits on heights if the recording has no heights, and limits on places if the origin is not given.
 pub(super) fn refuse_unknown<'a>(
     request: &AuditRequest<'_>,
     asked_by: Option<&str>,
@@ -83,15 +82,15 @@ pub(super) fn refuse_unknown<'a>(
     let asked = Asked { settings };
     let of_heights = || {
         let asked = asked.of_heights().filter(|_| recording.is_planar())?;
-        let help = "name the column of the height with --column z=NAME, or leave the question out";
-        Some((format!("the heights of its vehicles are not known, and {asked} needs them"), help))
+        let help = "name the column of the height with --column z=NAME, or remove the limit";
+        Some((format!("the heights of its vehicles are unknown, and {asked} needs them"), help))
     };
     let origin = recording.earth_origin();
     let of_places = || {
         let EarthOrigin { place, .. } = origin.filter(|origin| origin.is_inferred)?;
         let asked = asked.of_places()?;
-        let help = "say what they are measured from with --origin LAT,LON,HEIGHT; a HEIGHT of 0 is the ellipsoid";
-        Some((format!("places are measured from the first one, {place}, and {asked} depends on that"), help))
+        let help = "give the origin with --origin LAT,LON,HEIGHT; a HEIGHT of 0 is the ellipsoid";
+        Some((format!("positions are relative to the first one, {place}, and {asked} depends on that"), help))
     };
     let Some((problem, help)) = of_heights().or_else(of_places) else {
         return Ok(Level { settings, asked: origin.and_then(|_| asked.of_level()) });
@@ -105,7 +104,7 @@ pub(super) fn refuse_unknown<'a>(
 }
 
 impl Level<'_> {
-    /// Refuses positions that are judged and so far from the origin that level ground is well below its level plane.
+    /// Rejects judged positions so far from the origin that level ground is well below the tangent plane.
     pub(super) fn check(&self, path: &str, names: &[String], items: &[Item]) -> Result<(), Failure> {
         let Some(asked) = &self.asked else { return Ok(()) };
         let Settings { from_s, to_s, only, .. } = self.settings;
@@ -122,8 +121,8 @@ impl Level<'_> {
             if drop_m > MOST_DROP_M && is_judged(name, sample.time_s) {
                 let (time_s, away_km) = (sample.time_s, away_m / 1000.0);
                 let message = format!(
-                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is {drop_m:.1} m \
-                     lower, and {asked} needs heights above the ground"
+                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is \
+                     {drop_m:.1} m lower, and {asked} needs heights above the ground"
                 );
                 let help = "give an --origin within 3 km of all vehicles, or judge a part with --ids, --from and --to";
                 return Err(Failure::input("audit/far-from-origin", message, help));

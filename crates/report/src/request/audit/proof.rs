@@ -18,14 +18,14 @@ use tautline_audit::recorded::{Interpolation, Outcome, Proof, ProofBuilder, Proo
 use tautline_recordings::read;
 use tautline_recordings::read::{ColumnNames, ReadOptions};
 
-/// Names of the column of time that the checker knows.
+/// Names of the time column that the checker accepts.
 const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
-/// Names of all other columns that it reads.
+/// Names of the other columns that it reads.
 const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
-/// Names of columns that straight lines between samples do not need.
+/// Names of columns that straight motion between samples does not need.
 const VELOCITIES: [&str; 3] = ["vx", "vy", "vz"];
 
-/// The content of the file.
+/// Content of the file.
 #[derive(Serialize)]
 struct ProofFile<'a> {
     format: &'static str,
@@ -35,14 +35,14 @@ struct ProofFile<'a> {
     windows: &'a [ProofWindow],
 }
 
-/// What the claim is about.
+/// The recording of the claim.
 #[derive(Serialize)]
 struct Data<'a> {
     recording: &'a str,
     sha256: String,
 }
 
-/// What is claimed.
+/// The claim.
 #[derive(Serialize)]
 struct Claim<'a> {
     status: Status,
@@ -51,13 +51,13 @@ struct Claim<'a> {
     #[serde(flatten)]
     proof: &'a Proof,
     vehicles: &'a [String],
-    /// Samples farther apart than this are not joined \[s\]; null where all are.
+    /// Largest gap that is joined \[s\]; null if every gap is joined.
     max_gaps_s: &'a [f64],
     offsets_s: BTreeMap<&'a str, f64>,
     clock: &'a Clock,
 }
 
-/// Refuses questions that a proof does not answer, before the work.
+/// Rejects requests without a proof, before the work begins.
 pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(), Failure> {
     if request.proof.is_none() {
         return Ok(());
@@ -92,14 +92,14 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
     Ok(())
 }
 
-/// Whether a file is read as it is, in metres.
+/// Returns whether a file is read unchanged, in metres.
 fn is_read_plainly(options: &ReadOptions) -> bool {
     let is_moved = options.scale.is_some() || options.axes.is_some() || options.times_per_second.is_some();
     let is_chosen = options.sort || options.one_vehicle || options.duplicates.is_some();
     options.columns == ColumnNames::default() && !is_moved && !is_chosen
 }
 
-/// Whether a file is a table that the checker reads.
+/// Returns whether the file is a table that the checker reads.
 fn is_table(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let mut lines = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(file);
@@ -109,7 +109,7 @@ fn is_table(path: &Path) -> bool {
     let is_known = |name: &str| TIMES.contains(&name) || COLUMNS.contains(&name) || VELOCITIES.contains(&name);
     let are_others_unread = names.iter().all(|name| is_known(name) || !read::is_read(name));
     let is_plain = count(&TIMES) == 1 && COLUMNS.iter().all(|column| count(&[column]) == 1) && are_others_unread;
-    // A row of units below the header has no digit in the column of the time.
+    // A row of units below the header has no digit in the time column.
     let time = names.iter().position(|name| TIMES.contains(name));
     let first = lines.records().next().and_then(Result::ok);
     let has_units = time
@@ -118,7 +118,7 @@ fn is_table(path: &Path) -> bool {
     is_plain && !has_units
 }
 
-/// Reads the recording again and writes the proof; what it says where there is none.
+/// Reads the recording again and writes the proof. Returns a note if there is no proof.
 pub(super) fn write(
     file: &Path,
     path: &Path,
@@ -140,7 +140,7 @@ pub(super) fn write(
         builder.push(&items)?;
     }
     let Some(proof) = builder.finish(outcome) else {
-        return none("the limit is that of radii which the recording holds, or it is not one of samples");
+        return none("the recording gives radii, or it does not hold samples");
     };
     let bytes = fs::read(path).map_err(|error| {
         Failure::machine("recording/cannot-read", format!("cannot read {}: {error}", path.display()))

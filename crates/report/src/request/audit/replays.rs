@@ -1,4 +1,4 @@
-//! Replays of recordings that were judged, and figures of the closest pairs.
+//! Replays of judged recordings, and figures of the closest pairs.
 
 use std::collections::BTreeMap;
 
@@ -15,22 +15,23 @@ use tautline_audit::recorded::{
 use tautline_audit::{Slice, Slices};
 use tautline_core::track::Item;
 
-/// Most times of a recording that are kept while it is judged.
+/// Largest number of times that are kept during an audit.
 const MOST_TIMES: usize = 1 << 20;
-/// Instants a second at which known curves are drawn \[Hz\].
+/// Rate at which curves are drawn \[Hz\].
 const CURVE_HZ: f64 = 30.0;
 
-/// When a recording says something, as it is read.
+/// Times of the samples of a recording.
 #[derive(Default)]
 pub(super) struct Instants {
     times_s: Vec<f64>,
-    /// Different times.
+    /// Number of different times.
     seen: usize,
     has_curves: bool,
 }
 
 impl Instants {
-    /// Takes note of items, by clocks that these settings set right. Beyond a million times every second one is dropped.
+    /// Adds the times of items, corrected by the clocks of the settings. Every second time is dropped beyond
+    /// [`MOST_TIMES`].
     pub(super) fn note(&mut self, items: &[Item], names: &[String], settings: &Settings) {
         let offsets: BTreeMap<usize, f64> =
             names.iter().enumerate().filter_map(|(k, name)| Some((k, settings.vehicles.get(name)?.offset_s))).collect();
@@ -51,7 +52,7 @@ impl Instants {
         }
     }
 
-    /// The times that are shown of a recording with this outcome.
+    /// Returns the times that the replay shows for this outcome.
     fn shown(self, outcome: &Outcome, spans: &[Span]) -> Vec<f64> {
         let Some((from_s, to_s)) = outcome.span_s else { return Vec::new() };
         let mut times_s = self.times_s;
@@ -69,7 +70,8 @@ impl Instants {
     }
 }
 
-/// Reads a recording again for its replay, or why there is none, and for the figures of those who came closest.
+/// Reads a recording again and returns its replay, or the reason for its absence, and the figures of the closest
+/// pairs.
 pub(super) fn of_recording(
     open: &Open<'_>,
     monitor: &dyn Monitor,
@@ -103,10 +105,10 @@ pub(super) fn of_recording(
     Ok((Replay::new(&stage, &log, &moments, report.judgement(), PAGE_BYTES), figures))
 }
 
-/// Pairs, and approaches to obstacles, that are drawn.
+/// Largest number of pairs, and of approaches to obstacles, in figures.
 const DRAWN: usize = 3;
 
-/// Reads the recording again for those who came closest, and for the places of all.
+/// Reads the recording again for the closest pairs and for the positions of all vehicles.
 fn encounter_figures(
     open: &Open<'_>,
     monitor: &dyn Monitor,
@@ -138,7 +140,7 @@ fn encounter_figures(
     if let Some(nearest) = pairs.first() {
         drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
         drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
-        drawn.push(figures::smallest(&over_time(&outcome.smallest), nearest, "Smallest distance of all"));
+        drawn.push(figures::smallest(&over_time(&outcome.smallest), nearest, "Smallest separation of all pairs"));
     }
     if !obstacles.is_empty() {
         drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
@@ -146,7 +148,7 @@ fn encounter_figures(
     Ok(drawn)
 }
 
-/// When the closest of all was how near, and none where nothing is known of a time in between.
+/// Returns times and smallest distances, with `None` for intervals in which they are unknown.
 fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
     let ends = std::iter::once(None).chain(slices.iter().map(|slice| Some(slice.known_s()[1])));
     let points = slices.iter().zip(ends).flat_map(|(slice, end_s)| {
@@ -156,7 +158,7 @@ fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
     points.collect()
 }
 
-/// What a figure shows of two who came close.
+/// Returns the data of a figure of a close pair.
 fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outcome: &Outcome) -> Encounter {
     let unit = if settings.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
     let mut encounter = Encounter {

@@ -10,7 +10,7 @@ use super::super::Failure;
 
 /// A kind of TOML file.
 pub(super) struct TomlFile {
-    /// Stable name of the problem of a wrong file.
+    /// Error code of a wrong file.
     pub(super) code: &'static str,
     /// Remedy for a wrong file.
     pub(super) help: &'static str,
@@ -19,7 +19,7 @@ pub(super) struct TomlFile {
 }
 
 impl TomlFile {
-    /// Returns the text of a file. Refuses a larger file and one without end.
+    /// Returns the text of a file. Rejects files above the size limit, and endless ones such as a device.
     pub(super) fn read(&self, path: &Path) -> Result<String, Failure> {
         let cannot = |error: std::io::Error| {
             Failure::input("files/cannot-read", format!("cannot read {}: {error}", path.display()), self.help)
@@ -35,7 +35,7 @@ impl TomlFile {
         Ok(text)
     }
 
-    /// Returns the content of a text of this kind.
+    /// Parses a text of this kind.
     pub(super) fn parse<T: DeserializeOwned>(&self, text: &str, path: &Path) -> Result<T, Failure> {
         toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
@@ -43,7 +43,7 @@ impl TomlFile {
         })
     }
 
-    /// Returns the failure of a text with a problem at this byte.
+    /// Returns the failure for a problem at this byte of a text.
     pub(super) fn wrong(&self, text: &str, path: &Path, start: usize, message: &str) -> Failure {
         let line = 1 + text[..start.min(text.len())].matches('\n').count();
         Failure::input(self.code, format!("{}, line {line}: {message}", path.display()), self.help)

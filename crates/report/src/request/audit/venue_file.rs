@@ -1,4 +1,4 @@
-//! Files of obstacles and of a fence.
+//! Obstacle files and fence files.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use tautline_audit::envelope::Fence;
 use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
 use tautline_sim::sim;
 
-/// Largest file that is read \[bytes\].
+/// Largest size of a file \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
 const OBSTACLES: TomlFile = TomlFile { code: "audit/obstacle-file", help: OBSTACLE_HELP, most_bytes: MOST_BYTES };
 const FENCE: TomlFile = TomlFile { code: "audit/fence-file", help: FENCE_HELP, most_bytes: MOST_BYTES };
@@ -21,15 +21,15 @@ const FENCE_HELP: &str =
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ObstacleDocument {
-    /// Of the same place, read by itself.
+    /// Tables of the same venue that are read elsewhere.
     #[serde(default)]
-    #[expect(dead_code, reason = "it may stand there")]
+    #[expect(dead_code, reason = "the key is allowed")]
     fence: Option<toml::Table>,
     #[serde(default)]
     obstacle: Vec<toml::Spanned<ObstacleTable>>,
 }
 
-/// Reads a file of obstacles.
+/// Reads the obstacles of a file.
 pub(super) fn read_obstacles(path: &Path) -> Result<Vec<Obstacle>, Failure> {
     parse_obstacles(&OBSTACLES.read(path)?, path)
 }
@@ -37,7 +37,7 @@ pub(super) fn read_obstacles(path: &Path) -> Result<Vec<Obstacle>, Failure> {
 fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     let document: ObstacleDocument = OBSTACLES.parse(text, path)?;
     if document.obstacle.is_empty() {
-        return Err(OBSTACLES.wrong(text, path, 0, "there is no [[obstacle]]"));
+        return Err(OBSTACLES.wrong(text, path, 0, "the file has no [[obstacle]]"));
     }
     let judged = |entry: toml::Spanned<ObstacleTable>| {
         let start = entry.span().start;
@@ -56,9 +56,9 @@ fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FenceDocument {
-    /// In the same place, read by themselves.
+    /// Tables of the same venue that are read elsewhere.
     #[serde(default)]
-    #[expect(dead_code, reason = "they may stand there")]
+    #[expect(dead_code, reason = "the keys are allowed")]
     obstacle: Vec<toml::Table>,
     fence: toml::Spanned<FenceTable>,
 }
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn every_shape_is_read() {
+    fn reads_every_shape() {
         let text = r#"
             [[obstacle]]
             name = "tower"
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_line() {
+    fn errors_name_their_line() {
         for (text, expected) in [
             ("[[obstacle]]\nname = \"a\"\nbal = { radius_m = 1.0 }", "line 3: unknown field `bal`"),
             ("[[obstacle]]\nname = \"a\"\nat_m = [0, 0, 0]", "line 1: obstacle `a` needs one shape"),
@@ -142,7 +142,7 @@ mod fence_file_tests {
     use super::*;
 
     #[test]
-    fn a_fence_is_read_and_what_is_wrong_is_said_with_its_line() {
+    fn reads_a_fence_and_names_the_line_of_errors() {
         let read =
             |text: &str| parse_fence(text, Path::new("fence.toml")).map_err(|failure| failure.message().to_owned());
         let fence = read("[fence]\npolygon_m = [[0, 0], [9, 0], [9, 9]]\nheight_m = [0, 50]\nmargin_m = 1.5").unwrap();
