@@ -18,7 +18,7 @@ use tautline_report::request::outputs::{self, Called, is_standard_output, write}
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 
-/// Version of the keys of every JSON file of this crate. Raised when a key is renamed, removed or changes its meaning.
+/// Version of the keys of every JSON file of this crate. It rises if a key is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 3;
 
 /// The answer of a study.

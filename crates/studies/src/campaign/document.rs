@@ -1,4 +1,4 @@
-//! The answer of a campaign for people: a sentence, notes, tables and figures.
+//! Answer of a campaign for readers: headline, notes, tables and figures.
 
 use super::summary::{LawSummary, Pair, Quantiles, Summary};
 use super::tally::{Bin, BinShares, Varied};
@@ -11,7 +11,7 @@ use tautline_core::text::{counted, significant};
 use tautline_report::figures::{Figure, Histogram, Share as Point, histograms, shares};
 use tautline_report::report::page::{Badge, Tone};
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 4] = [
     "Runs are independent draws of what varies: a share is about that distribution, and about no other. Where only grids vary, \
      runs are all of their points, and shares have no interval.",
@@ -23,20 +23,21 @@ const ASSUMED: [&str; 4] = [
      both are those of a confidence sequence.",
     "An interval holds the true value in at least 95 of 100 campaigns. Of many intervals on one page some will miss.",
 ];
-/// What estimates of rare violations rest on.
+/// Assumptions of estimates of rare violations.
 const ASSUMED_OF_SPLITTING: [&str; 2] = [
     "Each estimate is without bias for any number of flights; their mean has Student's interval, which is that of normal values.",
     "Flights from one start differ by their noise from step to step; a run draws its start, and whatever else is varied, anew.",
 ];
 
-/// A p-value in words.
+/// Returns a p-value, or its bound if it is small.
 fn p_value(p: f64) -> String {
     const LEAST: f64 = 1e-4;
     if p < LEAST { "below 0.0001".to_owned() } else { significant(p, 2) }
 }
 
 impl LawSummary {
-    /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence (one-sided)`.
+    /// Returns the violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence
+    /// (one-sided)`.
     #[must_use]
     pub fn sentence(&self) -> String {
         if let Some(splitting) = &self.splitting {
@@ -50,7 +51,7 @@ impl LawSummary {
             0 => String::new(),
             unknown => format!(", {} unknown", separated(unknown)),
         };
-        // An upper bound of 1 bounds nothing.
+        // An upper bound of 1 is no information.
         let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
             let kind = match bound.kind {
                 BoundKind::OneSided => "one-sided",
@@ -65,7 +66,7 @@ impl LawSummary {
     }
 }
 
-/// The probability of a violation in a sentence.
+/// Returns the probability of a violation in a sentence.
 fn rare(splitting: &Repetitions) -> String {
     let Repetitions { repetitions, probability, confidence, extinct, .. } = splitting;
     let range = match (probability.low, probability.high) {
@@ -86,7 +87,7 @@ fn rare(splitting: &Repetitions) -> String {
 }
 
 impl Summary {
-    /// Whether runs are estimates of rare violations.
+    /// Returns whether runs are estimates of rare violations.
     fn is_of_estimates(&self) -> bool {
         self.laws.iter().any(|law| law.splitting.is_some())
     }
@@ -158,7 +159,7 @@ impl Summary {
         drawn.into_iter().chain(arrived).collect()
     }
 
-    /// Shares over a varied key.
+    /// Returns the section with the shares over a varied key.
     fn over(&self, varied: &Varied) -> Section {
         let share = |bin: &Bin, law: usize, pick: fn(&BinShares) -> Proportion| bin.laws.get(law).map(pick);
         let violated: fn(&BinShares) -> Proportion = |of| of.violated;

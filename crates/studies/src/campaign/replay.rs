@@ -1,4 +1,4 @@
-//! Flights of a campaign flown again: the worst flights for its page, and any flight by its number.
+//! Replays of flights of a campaign: the worst flights for its page, and any flight by its number.
 
 use std::path::{Path, PathBuf};
 
@@ -17,16 +17,16 @@ use tautline_report::request::{
 };
 use tautline_sim::scenario::Scenario;
 
-/// Flight of a campaign that is flown again, and the folder of its files.
+/// Request for a replay of a flight, with the folder of its files.
 #[derive(Clone, Debug)]
 pub struct ReplayRequest {
     /// Number of the run, from 0.
     pub run: u64,
-    /// The law; the first by default.
+    /// Name of the law; the first by default.
     pub law: Option<String>,
-    /// The flight among the violated flights of this run, from 0, if runs are estimates of rare violations.
+    /// Index of the violated flight in this run, from 0, if runs are estimates of rare violations.
     pub bad: Option<usize>,
-    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
+    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the folder of the campaign.
     pub out: Option<PathBuf>,
 }
 
@@ -50,7 +50,7 @@ pub struct WorstFlight {
 }
 
 impl WorstFlight {
-    /// The section of a page on the worst flights.
+    /// Returns the section of a page on the worst flights.
     pub(super) fn section(flights: &[Self]) -> Section {
         let mut blocks = Vec::new();
         let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
@@ -69,34 +69,34 @@ impl WorstFlight {
     }
 }
 
-/// A flight of a campaign.
+/// Identity of a flight of a campaign.
 #[derive(Clone, Copy, Debug)]
 struct FlightId<'a> {
     law: &'a Law,
     run: u64,
-    /// Number among the violated flights of an estimate.
+    /// Index in the violated flights of an estimate.
     bad: Option<usize>,
 }
 
 impl FlightId<'_> {
-    /// Returns the name of its folder.
+    /// Returns the name of the flight's folder.
     fn name(self) -> String {
         let bad = self.bad.map_or_else(String::new, |bad| format!("-bad-{bad}"));
         format!("{}-run-{}{bad}", self.law.name, self.run)
     }
 
-    /// Returns the default folder of its files.
+    /// Returns the default folder of the flight's files.
     fn folder(self, folder: &Folder) -> PathBuf {
         folder.file("worst").join(self.name())
     }
 
-    /// Returns the flight in words.
+    /// Returns a description of the flight.
     fn words(self) -> String {
         let bad = self.bad.map_or_else(String::new, |bad| format!("bad flight {bad} of "));
         format!("{bad}run {} under {}", self.run, self.law.name)
     }
 
-    /// Returns its row; `None` if the run has not been flown.
+    /// Returns the row of the flight; `None` if the run has not been flown.
     fn row(self, folder: &Folder) -> Result<Option<Row>, Failure> {
         let law = folder.campaign().laws().iter().position(|law| law == self.law).unwrap_or_default();
         folder.row(self.run, law)
@@ -107,7 +107,7 @@ impl FlightId<'_> {
         scenario.map_err(|error| Failure::from(error).under(&format!("run {}", self.run)))
     }
 
-    /// Refuses a state hash other than that of the campaign.
+    /// Refuses a state hash that differs from that of the campaign.
     fn compare(self, found: &str, expected: &str) -> Result<(), Failure> {
         if found == expected {
             return Ok(());
@@ -128,8 +128,8 @@ impl FlightId<'_> {
     }
 }
 
-/// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
-/// Returns whether it passes.
+/// Flies one flight of a campaign again, with recording and pictures, and compares its state hash with that of the
+/// campaign. Returns whether the flight passes.
 ///
 /// # Errors
 /// [`Failure`] if the flight does not exist, has another state hash, or a file cannot be written.
@@ -218,12 +218,12 @@ pub(super) fn fly_worst_again(
     Ok(flights)
 }
 
-/// Flies a violated flight of an estimate again.
+/// Repeats a violated flight of an estimate.
 fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
     fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
-    // Relative to the folder of the page, so that the page has the same bytes wherever the campaign is.
+    // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
     let said = format!(
         "Bad flight {number} of run {run} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
@@ -242,8 +242,8 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     })
 }
 
-/// Flies a violated flight of an estimate again, records it, and compares the state after the step of the violation. Returns the
-/// state hash.
+/// Repeats and records a violated flight of an estimate, and compares the state after the step of the violation.
+/// Returns the state hash.
 fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
