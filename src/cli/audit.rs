@@ -1,4 +1,4 @@
-//! `tautline audit` of one recording or of several: arguments, and answers for programs.
+//! `tautline audit`: arguments, and reports on one or several recordings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -19,10 +19,10 @@ use tautline_report::report::write_atomically;
 use tautline_report::request::outputs::Called;
 use tautline_report::request::{AuditRequest, Audited, ConfigFile, Failure, Monitor as _, Subject};
 
-/// Recordings that could not be judged, and why.
+/// Recordings that could not be judged, with the failures.
 type Failures = [(String, Failure)];
 
-/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it. `command` is
+/// Judges each recording. The exit code is the worst of all. A failure does not stop the other recordings. `command` is
 /// the whole command line.
 pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, Failure> {
     let recordings = arguments.reading.recordings();
@@ -38,14 +38,14 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     let mut asked = Vec::new();
     for paths in recordings {
         let (request, settings) = arguments.request(paths, command);
-        // No output replaces an input of any recording, whether its settings can be read or not.
+        // No output may replace an input of any recording, even if the settings of a recording are wrong.
         request.check_outputs(&arguments.outputs())?;
         let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
         asked.push((request.subject.called(), configured));
     }
     let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
-    // A log in which a system looks for its own lines has none of ours, which hold foreign names.
+    // A log that the system searches for annotations contains no other lines with untrusted names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
     let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });
     let (mut judged, mut failures) = (Vec::new(), Vec::new());
@@ -69,14 +69,14 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     answer(arguments, &judged, &failures, is_one)?;
     let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
     match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| Exit::of(failure) as u8) {
-        // It was said in a line that means nothing else to the system.
+        // The annotation reports the failure.
         Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
         Some(failure) => Err(failure),
         None => Ok(worst.unwrap_or(Exit::Good)),
     }
 }
 
-/// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
+/// Writes the machine-readable outputs: one report for one recording, a list with all failures for several.
 fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, is_one: bool) -> Result<(), Failure> {
     if arguments.json {
         match judged {
@@ -96,14 +96,14 @@ fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, i
         write_atomically(file, audit_formats::junit(judged, failures)?.as_bytes())?;
     }
     if let Some(file) = &arguments.summary {
-        // Pages of jobs are written by one step after another.
+        // The steps of a job append to the same page.
         let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
         write_atomically(file, &[before, audit_formats::markdown(judged, failures).into_bytes()].concat())?;
     }
     Ok(())
 }
 
-/// An answer for each of several recordings.
+/// Reports of several recordings.
 #[derive(Serialize)]
 #[serde(transparent)]
 struct Answers<'a>(Vec<Answer<'a>>);
@@ -134,101 +134,101 @@ below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
     pub(super) reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
+    /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
     pub(super) format: Option<Format>,
 
-    /// Safety distance between two centres [m], by default that of a recording of tautline; with --ellipsoid a scaled
-    /// distance, by default 2.
+    /// Safety distance between two centres [m]; default: that of a tautline recording. With --ellipsoid, a scaled
+    /// distance; default: 2.
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) delta: Option<f64>,
-    /// What happens between samples [default: linear for samples, polynomial for curves].
+    /// Motion between samples [default: linear for samples, polynomial for curves].
     #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
     pub(super) motion: Option<Interpolation>,
-    /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
+    /// Largest acceleration [m/s^2] of all vehicles, or of one, for --motion bounded; repeatable.
     #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     pub(super) max_accel: Vec<Named>,
-    /// Radius [m] of every vehicle, or of one; may be given several times.
+    /// Radius [m] of all vehicles, or of one; repeatable.
     #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
     pub(super) radius: Vec<Named>,
-    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
+    /// Half axes [m] of an ellipsoid around each vehicle, for example its downwash; two touch at a scaled distance of
+    /// 2.
     #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
     pub(super) ellipsoid: Option<Vector3<f64>>,
-    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
+    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) obstacles: Option<PathBuf>,
-    /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
+    /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor [m].
     #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
     pub(super) limit: Vec<Limit>,
-    /// Hold mean accelerations over this time [s] against --limit accel: the change of velocity over its length, corners of
-    /// curves too.
+    /// Check means of the acceleration over this time [s] against --limit accel; corners of curves count.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) accel_window: Option<f64>,
-    /// TOML file of a fence that every vehicle must stay within.
+    /// TOML file of a fence that contains all vehicles.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) fence: Option<PathBuf>,
-    /// Judge from here on [s].
+    /// Start of the judged window [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) from: Option<f64>,
-    /// Judge up to here [s].
+    /// End of the judged window [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) to: Option<f64>,
-    /// Leave out pairs while both are at or below this height [m].
+    /// Ignore pairs while both vehicles are at or below this height [m].
     #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) above: Option<f64>,
-    /// Judge these vehicles alone; a name with a comma in quotes. May be given several times.
+    /// Judge only these vehicles; quote a name with a comma. Repeatable.
     #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
     pub(super) ids: Vec<Listed>,
-    /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
+    /// Add this to the times of a vehicle with a clock offset [s]; repeatable.
     #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
     pub(super) offset: Vec<(String, f64)>,
-    /// How many vehicles there must be to judge: another number is wrong input.
+    /// Expected number of vehicles; another number is wrong input.
     #[arg(long, value_name = "N", help_heading = "Question")]
     pub(super) expect_vehicles: Option<usize>,
-    /// Judge a recording of tautline from its samples, without the run's audit of every step.
+    /// Judge a tautline recording from its samples, without the run's audit of every step.
     #[arg(long, help_heading = "Question")]
     pub(super) independent: bool,
-    /// Leave it undecided where a vehicle is not seen over the whole window.
+    /// Report undecided if a vehicle is absent in part of the window.
     #[arg(long, help_heading = "Question")]
     pub(super) require_presence: bool,
-    /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
+    /// Longest time between two samples that is not a gap [s] [default: 1.5 of the vehicle's usual interval].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
     pub(super) max_gap: Option<f64>,
 
-    /// Ask what this file says, in the place of the nearest tautline.toml beside the recording and above it, up to the working
-    /// folder.
+    /// Read settings from this file instead of the nearest tautline.toml, which is searched from the folder of the
+    /// recording up to the working folder.
     #[arg(long, value_name = "FILE", help_heading = "Question")]
     pub(super) config: Option<PathBuf>,
-    /// Ask what the command line says alone, and look for no tautline.toml.
+    /// Ignore all tautline.toml files.
     #[arg(long, conflicts_with = "config", help_heading = "Question")]
     pub(super) no_config: bool,
 
-    /// Print the report as JSON on standard output, and nothing else there.
+    /// Print the report as JSON on standard output; all text goes to standard error.
     #[arg(long, help_heading = "Answer")]
     pub(super) json: bool,
-    /// Print no summary and no progress: the exit code says it.
+    /// Print no summary and no progress.
     #[arg(long, help_heading = "Answer")]
     pub(super) quiet: bool,
-    /// Write the verdict as a `JUnit` file.
+    /// Write the verdict as a JUnit file.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) events: Option<PathBuf>,
-    /// Write a report for people, with figures.
+    /// Write a report page with figures.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) html: Option<PathBuf>,
-    /// Write a proof of the verdict, which `check_proof.py` confirms by exact arithmetic without this program; for a CSV table and
-    /// --delta alone.
+    /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
+    /// CSV table with --delta.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) proof: Option<PathBuf>,
-    /// Write a summary in Markdown, as for the page of a job.
+    /// Write a summary in Markdown, for example for the page of a job.
     #[arg(long, value_name = "FILE", help_heading = "Answer")]
     pub(super) summary: Option<PathBuf>,
-    /// Print a line for each recording that marks it in the log and on the page of a job.
+    /// Print an annotation for each recording, in the format of this CI system.
     #[arg(long, value_name = "SYSTEM", help_heading = "Answer")]
     pub(super) annotations: Option<Annotations>,
-    /// Exit with 0 where it cannot be told, too.
+    /// Exit with 0 for undecided recordings too.
     #[arg(long, help_heading = "Answer")]
     pub(super) allow_undecided: bool,
 }
@@ -243,14 +243,14 @@ fn motion() -> impl TypedValueParser<Value = Interpolation> {
     one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
 
-/// Whose lines mark what was found.
+/// CI system whose annotations are printed.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub(super) enum Annotations {
     /// GitHub Actions
     Github,
 }
 
-/// A number, perhaps of one vehicle alone.
+/// Number, for one vehicle if it has a name.
 pub(super) type Named = (Option<String>, f64);
 
 /// Names of vehicles.
@@ -291,7 +291,7 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
     Ok(Vector3::new(x, y, z))
 }
 
-/// A limit as it is written: `speed=5`.
+/// Parses a limit such as `speed=5`.
 fn limit(text: &str) -> Result<Limit, String> {
     let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
     let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE, of {}", names()))?;
@@ -304,7 +304,7 @@ fn limit(text: &str) -> Result<Limit, String> {
 }
 
 impl AuditArguments {
-    /// The request about the recording in these files, which `command` makes again, and its settings.
+    /// Returns the request for the recording in these files, and its settings. `command` repeats the request.
     pub(super) fn request(
         &self,
         paths: Vec<PathBuf>,
@@ -371,7 +371,7 @@ impl AuditArguments {
         })
     }
 
-    /// The files that are written about all recordings together, with their options.
+    /// Returns the output files that cover all recordings, with their options.
     pub(super) fn outputs(&self) -> Vec<Called<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
         outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect()

@@ -1,4 +1,4 @@
-//! `tautline campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
+//! `tautline campaign`: many flights, merged into one answer with intervals.
 
 use std::path::PathBuf;
 
@@ -26,32 +26,32 @@ pub(super) struct CampaignArguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Fly everything on this machine, merge it and report; started again it goes on where it was.
+    /// Fly a whole campaign on this machine, merge and report it; a repeated call continues an interrupted campaign.
     Run(RunCampaign),
-    /// Split a campaign into shards, which are then flown anywhere.
+    /// Split a campaign into shards that several machines can fly.
     Plan(PlanCampaign),
-    /// Fly one shard or several.
+    /// Fly one or several shards.
     Shard(ShardCampaign),
-    /// Print the shards that are missing, as --shard takes them; exits with 0 where there are none.
+    /// Print the missing shards as a list for --shard; exits with 0 if none is missing.
     Missing(InFolder),
-    /// Put all parts together: results.parquet, campaign.json and campaign.html.
+    /// Merge all parts into results.parquet, campaign.json and campaign.html.
     Merge(Answered),
-    /// Say the answer of a campaign again, and write its page anew.
+    /// Print the answer of a merged campaign and rewrite its page.
     Report(Answered),
-    /// Fly a run again, with its recording and pictures, and compare its state hash.
+    /// Repeat one flight with recording and pictures, and compare its state hash.
     Replay(Replay),
 }
 
-/// A specification, and when to stop.
+/// Specification with the rule for an early stop.
 #[derive(Debug, Args)]
 struct SpecArguments {
-    /// The specification.
+    /// Specification of the campaign (TOML).
     #[arg(value_name = "SPEC.toml")]
     spec: PathBuf,
-    /// Stop as soon as the interval of each law's share of clear flights is no wider.
+    /// Stop when the interval of each law's share of clear flights is at most W wide.
     #[arg(long, value_name = "W")]
     until_width: Option<f64>,
-    /// Stop as soon as each law's share of clear flights is known to be above or below P.
+    /// Stop when the interval of each law's share of clear flights does not contain P.
     #[arg(long, value_name = "P")]
     until_decided: Option<f64>,
 }
@@ -60,13 +60,13 @@ struct SpecArguments {
 struct RunCampaign {
     #[command(flatten)]
     spec: SpecArguments,
-    /// Folder for everything; by default out/NAME, where NAME is the specification's.
+    /// Folder of the campaign [default: out/NAME with the name of the specification].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Parts to fly it in; one that is whole is not flown again.
+    /// Number of shards [default: one for 250 runs]; finished shards are not flown again.
     #[arg(long, value_name = "N")]
     shards: Option<u64>,
-    /// Threads to use, by default one a core; the result is the same for any number.
+    /// Number of threads [default: one for each core]; the result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     #[command(flatten)]
@@ -77,10 +77,10 @@ struct RunCampaign {
 struct PlanCampaign {
     #[command(flatten)]
     spec: SpecArguments,
-    /// Folder for everything.
+    /// Folder of the campaign.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Parts to fly it in, by default one for 250 runs.
+    /// Number of shards [default: one for 250 runs].
     #[arg(long, value_name = "N")]
     shards: Option<u64>,
 }
@@ -89,10 +89,11 @@ struct PlanCampaign {
 struct ShardCampaign {
     #[command(flatten)]
     folder: InFolder,
-    /// Which, from 0 on: 7, 3-5, 13,500-502, or env:NAME for what that variable says, such as `env:SLURM_ARRAY_TASK_ID`.
+    /// Shards to fly, from 0: 7, 3-5, 13,500-502, or env:NAME for a list in an environment variable, such as
+    /// `env:SLURM_ARRAY_TASK_ID`.
     #[arg(long, value_name = "K|A-B|env:NAME")]
     shard: String,
-    /// Threads to use; the result is the same for any number.
+    /// Number of threads; the result is the same for any number.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: u16,
     /// Print no progress.
@@ -102,7 +103,7 @@ struct ShardCampaign {
 
 #[derive(Debug, Args)]
 struct InFolder {
-    /// The folder of the campaign, or its manifest.
+    /// Folder of the campaign, or its manifest.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
@@ -115,16 +116,16 @@ struct Answered {
     says: Says,
 }
 
-/// How an answer is said.
+/// Form of an answer.
 #[derive(Debug, Args)]
 struct Says {
-    /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
+    /// Number of flights with the least clearance to repeat, each with recording, report and pictures.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
-    /// Take no pictures of them.
+    /// Take no pictures of these flights.
     #[arg(long)]
     no_snapshots: bool,
-    /// Print the answer as JSON on standard output, and nothing else there.
+    /// Print the answer as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
     /// Print no summary and no progress.
@@ -139,13 +140,13 @@ struct Replay {
     /// Number of the run, from 0.
     #[arg(long, value_name = "I")]
     run: u64,
-    /// The law, where several fly each run; the first unless given.
+    /// Law of the flight [default: the first].
     #[arg(long, value_name = "NAME")]
     law: Option<String>,
-    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    /// Index in the violated flights of the run, from 0, for campaigns that estimate rare violations.
     #[arg(long, value_name = "K")]
     bad: Option<usize>,
-    /// Folder for the recording and the report; by default worst/LAW-run-I in the campaign's.
+    /// Folder for the recording and the report [default: worst/LAW-run-I in the folder of the campaign].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take no pictures.
@@ -232,7 +233,7 @@ impl Says {
         pictures("best", !self.no_snapshots)
     }
 
-    /// Answers a request, and prints the answer as JSON where that is asked for.
+    /// Answers a request, and prints the answer as JSON with `--json`.
     fn answer(
         &self,
         request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>,

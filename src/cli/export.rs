@@ -14,25 +14,25 @@ use tautline_report::request::{ExportRequest, Failure, export_file};
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArguments {
-    /// The file to write.
+    /// File to write.
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
-    /// Format to write [default: by the extension of the file].
+    /// Format to write [default: from the extension of the file].
     #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect()))]
     format: Option<Format>,
-    /// How often curves are sampled [Hz]; what is between the samples is lost.
+    /// Sampling rate of curves [Hz]; the motion between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
-    /// Overwrite the file if it exists.
+    /// Overwrite an existing file.
     #[arg(long)]
     force: bool,
-    /// Say nothing.
+    /// Print no text.
     #[arg(long, short)]
     quiet: bool,
-    // Last, because its heading holds for all that follows.
+    // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
+    /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
     input_format: Option<Format>,
 }

@@ -1,5 +1,4 @@
-//! Commands that print a part of the program: `list` (built-in scenarios), `schema` (of the scenario file) and
-//! `completions` (of a shell).
+//! `tautline list` (built-in scenarios), `schema` (of the scenario file) and `completions` (of a shell).
 
 use std::path::Path;
 
@@ -14,8 +13,7 @@ use tautline_sim::scenario::{self, builtin};
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]
 pub(super) struct ListArguments {
-    /// Print this built-in scenario as TOML instead, or the one that a recording of a run holds, with every default
-    /// written out.
+    /// Print this built-in scenario as TOML, or the scenario in a recording of `tautline run` with all defaults.
     #[arg(long, value_name = "NAME|RECORDING")]
     show: Option<String>,
 }
@@ -32,7 +30,7 @@ pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
     Ok(Exit::Good)
 }
 
-/// The scenario of a run's recording.
+/// Returns the scenario in a recording of `tautline run`.
 fn of_recording(name: &str) -> Result<String, Failure> {
     let path = Path::new(name);
     if !path.exists() {
@@ -65,7 +63,7 @@ pub(super) fn schema() -> Result<Exit, Failure> {
 /// Arguments of `tautline completions`.
 #[derive(Debug, Args)]
 pub(super) struct CompletionsArguments {
-    /// The shell.
+    /// Shell of the script.
     shell: Shell,
 }
 

@@ -124,7 +124,7 @@ fn energy(trials: &[Trial]) -> Result<Claim, Untried> {
     let claim = stated("energy-never-increases")?;
     let rise = trials.iter().map(|trial| trial.energy_rise).fold(0.0, larger);
     let words = format!(
-        "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
+        "largest rise {} of E(0), {STARTS} random starts, {DURATION_S} s, {LOOKS_HZ} samples a second",
         bound(rise, claim.limit())
     );
     Ok(claim.measured(words, [("largest_rise_over_initial", rise)]).within_limit())
@@ -135,8 +135,8 @@ fn energy_in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
     let excess = trials.iter().map(|trial| trial.engine_energy_excess).fold(0.0, larger);
     let rise = trials.iter().map(|trial| trial.engine_energy_rise).fold(0.0, larger);
     let words = format!(
-        "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to {rise:.1e} of \
-         E(0), as the method's does where a mode oscillates",
+        "largest excess {} of E(0), every step of {}; with oscillating modes E rises above its lowest value by up to \
+         {rise:.1e} of E(0)",
         bound(excess, claim.limit()),
         population()
     );
@@ -162,8 +162,7 @@ fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
 fn in_continuous_time(trials: &[Trial]) -> Result<Claim, Untried> {
     let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
     let words = format!(
-        "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} times \
-         the certified one or more",
+        "broken {broken} times, {}; smallest margin {margin_m:.4} m; clearance at least {ratio:.2} times the certified one",
         population()
     );
     let values = [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)];
@@ -176,8 +175,8 @@ fn in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
     let difference_m = differences_m.fold(0.0, larger);
     let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
     let words = format!(
-        "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m of \
-         continuous time; steps of {:.2} ms to {:.2} ms",
+        "broken {broken} times, {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m of \
+         continuous time; steps of {:.2} to {:.2} ms",
         population(),
         shortest_s * 1e3,
         LONGEST_STEP_S * 1e3

@@ -70,11 +70,11 @@ impl Claim {
         Self {
             id: "tried",
             source: "this program",
-            statement: "These claims can be tried.",
+            statement: "The claims of this group can be measured.",
             expected: "every flight can be flown",
             measured: error.to_string(),
             tolerance: "none",
-            reason: "a law or a plant that gives up is broken",
+            reason: "a flight that fails is a defect",
             ..Self::default()
         }
     }
@@ -140,7 +140,7 @@ pub(super) type Judged = Result<Vec<Claim>, Untried>;
 /// The claim of this name as `claims.json` states it: it fails until it is judged.
 pub(super) fn stated(id: &str) -> Result<Claim, Untried> {
     let claims: Vec<Claim> = serde_json::from_str(include_str!("claims.json"))?;
-    claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("there is no claim {id}").into())
+    claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("unknown claim {id}").into())
 }
 
 /// Tries each of these in parallel, a unit of work each; the results are in their order.

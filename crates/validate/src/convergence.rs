@@ -93,7 +93,7 @@ pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untrie
 
 /// The claims about it.
 pub(super) fn claims(refinements: &[Refinement]) -> Judged {
-    let error = |first, last| format!("largest position error {first:.1e} m to {last:.1e} m");
+    let error = |first, last| format!("position error {first:.1e} to {last:.1e} m");
     let excess = |first, last| format!("difference {first:.1e} to {last:.1e} m^2/s^2");
     let [of_error, of_excess] =
         [["coarsest_error_m", "finest_error_m"], ["coarsest_excess_m2_s2", "finest_excess_m2_s2"]];
@@ -105,7 +105,7 @@ pub(super) fn claims(refinements: &[Refinement]) -> Judged {
 }
 
 fn steps() -> String {
-    format!("dt = 1/{} s to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
+    format!("dt = 1/{} to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
 }
 
 /// Judges that a number of each flight falls with the square of the step. The names and the words are those of its first and
@@ -169,7 +169,7 @@ pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, Untried> {
     progress(1);
     let claim = stated("free-decay")?;
     let words = format!(
-        "largest relative error {} after {FREE_STEPS} steps of mixed lengths with a22 of {FREE_A22_PER_S:?} 1/s",
+        "relative error {} after {FREE_STEPS} steps of mixed lengths, a22 = {FREE_A22_PER_S:?} 1/s",
         bound(largest, claim.limit())
     );
     Ok(claim.measured(words, [("relative_error", largest)]).within_limit())

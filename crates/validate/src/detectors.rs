@@ -94,7 +94,7 @@ fn agree_on_clear(flight: &Flight) -> Result<Claim, Untried> {
     let (found, contacts) = (violating(flight), &flight.engine_contacts);
     let (parry, disagreements) = (flight.audit.parry.min_toi_s, flight.audit.parry.disagreements);
     let words = format!(
-        "violations: {}; contacts by parry: {}; overlaps in Rapier: {}; {disagreements} disagreements in {} casts",
+        "violations: {}; contacts of parry: {}; overlaps of Rapier: {}; {disagreements} disagreements in {} casts",
         names(&found),
         parry.map_or("none".to_owned(), |time_s| format!("from {time_s:.3} s")),
         names(contacts),
@@ -111,8 +111,8 @@ fn agree_on_violation(flight: &Flight) -> Result<Claim, Untried> {
     let first_s = flight.audit.violations.iter().map(|violation| violation.from_s).fold(f64::INFINITY, f64::min);
     let contact_s = flight.audit.parry.min_toi_s.unwrap_or(f64::NAN);
     let words = format!(
-        "violations: {}; overlaps in Rapier: {}; first contact at {first_s:.3} s by the closed form and {contact_s:.3} s by \
-         parry; {disagreements} disagreements in {} casts",
+        "violations: {}; overlaps of Rapier: {}; first contact at {first_s:.3} s (closed form) and {contact_s:.3} s (parry); \
+         {disagreements} disagreements in {} casts",
         names(&found),
         names(contacts),
         flight.audit.pairs_checked

@@ -133,13 +133,13 @@ fn flights(offs: &[Off]) -> Result<[Claim; 2], Untried> {
     let closest_m = largest(offs, |off| off.closest_m);
     let lengths = stated("displacement-flights")?.measured(
         format!(
-            "E(0) off by {energy:.1e}, the certified distance by {certified_m:.1e} m, the closest approach by {closest_m:.1e} m"
+            "E(0) off by {energy:.1e}, certified separation by {certified_m:.1e} m, closest approach by {closest_m:.1e} m"
         ),
         [("energy_relative", energy), ("certified_m", certified_m), ("closest_m", closest_m)],
     );
     let reached_s = largest(offs, |off| off.reached_s);
     let arrival = stated("displacement-arrival")?
-        .measured(format!("times of arrival off by at most {reached_s:.4} s"), [("reached_s", reached_s)]);
+        .measured(format!("off by at most {reached_s:.4} s"), [("reached_s", reached_s)]);
     Ok([lengths.within_limit(), arrival.within_limit()])
 }
 
@@ -166,7 +166,7 @@ fn on_a_ring() -> Result<Claim, Untried> {
     let (own_m, weak_m) = (error_m(1.0)?, error_m(connectivity / 12.0)?);
     Ok(stated("displacement-ring")?
         .measured(
-            format!("{own_m:.1e} m left after {DURATION_S} s with sigma = 1/lambda2, {weak_m:.2} m with sigma = 1/N"),
+            format!("error after {DURATION_S} s: {own_m:.1e} m with sigma = 1/lambda2, {weak_m:.2} m with sigma = 1/N"),
             [("left_m", own_m), ("left_with_1_over_n_m", weak_m)],
         )
         .pass(own_m < REACHED_M && weak_m > 1.0))
@@ -214,10 +214,10 @@ fn energies() -> Result<Claim, Untried> {
     };
     let own = highest(scenario.law()?.as_mut());
     let flipped = highest(&mut Flipped(scenario.law()?));
-    let shown = if flipped.is_finite() { format!("{flipped:.3}") } else { "without bound".to_owned() };
+    let shown = if flipped.is_finite() { format!("{flipped:.3}") } else { "unbounded".to_owned() };
     Ok(stated("displacement-energy")?
         .measured(
-            format!("at most {own:.6} of E(0); with the tension's sign flipped {shown}"),
+            format!("at most {own:.6} of E(0); flipped: {shown}"),
             [("highest_over_initial", own), ("highest_flipped", flipped)],
         )
         .pass(own <= 1.0 + 1e-9 && flipped > 1.01))
@@ -250,7 +250,7 @@ fn lags() -> Result<Claim, Untried> {
     let limit = claim.limit();
     Ok(claim
         .measured(
-            format!("{fed_m:.1e} m with it; without {late_m:.5} m, where |r''|/k is {expected_m:.5} m"),
+            format!("{fed_m:.1e} m; without feed-forward {late_m:.5} m, |r''|/k = {expected_m:.5} m"),
             [("lag_fed_m", fed_m), ("lag_not_fed_m", late_m), ("expected_m", expected_m)],
         )
         .pass(fed_m < 1e-6 && (late_m / expected_m - 1.0).abs() < limit))

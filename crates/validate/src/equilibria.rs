@@ -103,10 +103,9 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let changed = rests.iter().filter(|(fine, coarse)| fine.reached() != coarse.reached()).count();
     let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
     let words = format!(
-        "{reached} of the {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the \
-         pentagon; the other {} come to rest with every pull {} m/s^2 and a largest edge error of {least_m:.2} m to \
-         {most_m:.2} m (ordering 1, 2, 3, 4, 5: {in_order_m:.2} m); {changed} outcomes change with a hundred times the \
-         solver's tolerance",
+        "{reached} of {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the \
+         pentagon; {} come to rest with pulls {} m/s^2 and edge errors of {least_m:.2} to {most_m:.2} m (ordering \
+         1-2-3-4-5: {in_order_m:.2} m); {changed} outcomes change with 100 times the solver tolerance",
         orderings.len(),
         elsewhere.len(),
         bound(pull_m_s2, REST_M_S2)
@@ -144,7 +143,7 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let reached = [0, 1, 2, 3].map(reached_by);
     let list = POLYGON_TIMES_S.iter().zip(reached).map(|(time_s, reached)| format!("{reached} after {time_s} s"));
     let words = format!(
-        "so many of {POLYGON_STARTS} starts have formed it (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} m): {}",
+        "of {POLYGON_STARTS} starts (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} m): {}",
         list.collect::<Vec<_>>().join(", ")
     );
     let pass = reached[0] * 10 <= POLYGON_STARTS && reached[3] * 10 >= 9 * POLYGON_STARTS;

@@ -41,7 +41,8 @@ fn against_reference(claim: Claim, measured: &[f64]) -> Claim {
     };
     let pass = expected.len() == measured.len() && entries().all(|(_, printed, measured)| agrees(measured, printed));
     let values: Vec<_> = entries().map(|(name, _, measured)| (name, measured)).collect();
-    claim.measured(entries().map(words).collect::<Vec<_>>().join(", "), values).pass(pass)
+    let words = if pass { "equal".to_owned() } else { entries().map(words).collect::<Vec<_>>().join(", ") };
+    claim.measured(words, values).pass(pass)
 }
 
 /// An experiment: the scenario, its flight, and its numbers.
@@ -85,8 +86,7 @@ impl Experiment {
         let (min_m, at_s) = self.closest();
         let (reached_at_s, error_m) = (self.reached_at_s(), self.last_edge_error_m());
         let words = format!(
-            "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from {reached_at_s:.1} s on, {} m \
-             after {DURATION_S} s",
+            "closest {min_m:.6} m at {at_s:.3} s; reached at {reached_at_s:.1} s; edge error {} m after {DURATION_S} s",
             bound(error_m, CONVERGED_M)
         );
         let values =
@@ -142,7 +142,7 @@ fn baseline() -> Result<Claim, Untried> {
     let (min_m, min_at_s) = flight.closest();
     let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
     let words = format!(
-        "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest edge error {} m after \
+        "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s; edge error {} m after \
          {DURATION_S} s",
         flight.reached_at_s(),
         bound(error_m, CONVERGED_M)
@@ -159,7 +159,7 @@ fn straight_line() -> Result<Claim, Untried> {
     let states = &flight.solution.states;
     let off_line_m = states.iter().map(|state| state.positions_m.columns(1, 2).amax()).fold(0.0, f64::max);
     let words = format!(
-        "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after {DURATION_S} s",
+        "distance from the line {}; closest {min_m:.6} m; edge error {error_m:.2} m after {DURATION_S} s",
         if off_line_m == 0.0 { "exactly 0".to_owned() } else { format!("{off_line_m:.1e} m") }
     );
     let pass = off_line_m == 0.0 && agrees(min_m, "2.458145") && agrees(error_m, "8.57");
@@ -190,8 +190,7 @@ fn up_to_rigid_motion() -> Result<Claim, Untried> {
     let offsets_m = (0..formation.count()).map(|i| (row(positions_m, i) - row(&formation.slots_m, i)).norm());
     let farthest_m = offsets_m.fold(0.0, f64::max);
     let words = format!(
-        "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} m from its \
-         slot",
+        "rigid fit of both ends {} m (rms); turned by {turn_rad:.6} rad and {}; up to {farthest_m:.2} m from the slots",
         bound(fit_m, CONVERGED_M),
         if mirrored { "mirrored" } else { "not mirrored" }
     );
@@ -213,7 +212,7 @@ fn relative_motion() -> Result<Claim, Untried> {
     let apart_m = |other| (0..first.count()).map(move |i| (offset(other, i) - offset(first, i)).norm());
     let difference_m = others.iter().flat_map(apart_m).fold(0.0, larger);
     let words = format!(
-        "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
+        "difference after {COMPARED_S} s {} m, a22 = {A22_PER_S:?} 1/s",
         bound(difference_m, CONVERGED_M)
     );
     Ok(stated("relative-motion")?.measured(words, [("largest_difference_m", difference_m)]).within_limit())

@@ -104,7 +104,7 @@ fn within_rounding(
 }
 
 fn matrix_form(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest difference {bound} of the largest component, {} states", states.len());
+    let words = |bound: &str| format!("difference {bound} of the largest component, {} states", states.len());
     within_rounding(states, "matrix-form", "largest_relative_difference", words, |state| {
         let control = state.control()?;
         Ok((state.law()?.matrix_form(&state.swarm)? - &control).amax() / control.amax())
@@ -112,7 +112,7 @@ fn matrix_form(states: &[State]) -> Result<Claim, Untried> {
 }
 
 fn zero_sum(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest mean {bound} of the largest component, {} states", states.len());
+    let words = |bound: &str| format!("mean {bound} of the largest component, {} states", states.len());
     within_rounding(states, "zero-net-control", "largest_relative_mean", words, |state| {
         let control = state.control()?;
         Ok(mean_row(&control).norm() / control.amax())
@@ -126,7 +126,7 @@ fn of_scale(number: f64, scale: f64) -> f64 {
 
 fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
     let words =
-        |bound: &str| format!("largest relative error {bound} over {STATES} states with a22 of {A22_PER_S:?} 1/s");
+        |bound: &str| format!("relative error {bound}, {STATES} states, a22 = {A22_PER_S:?} 1/s");
     within_rounding(states, "energy-rate", "largest_relative_error", words, |state| {
         if !state.graph.is_complete() {
             return Ok(0.0);
@@ -137,7 +137,7 @@ fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
 }
 
 fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest relative excess {bound} over {} states", states.len());
+    let words = |bound: &str| format!("relative excess {bound}, {} states", states.len());
     within_rounding(states, "energy-rate-on-graphs", "largest_relative_excess", words, |state| {
         let (rate, scale) = state.energy_rate()?;
         let (a22, connectivity) = (state.parameters.a22_per_s, state.graph.algebraic_connectivity());
@@ -167,7 +167,7 @@ fn literal_baseline() -> Result<Claim, Untried> {
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
     let claim = stated("goal-as-printed")?;
     let words = format!(
-        "at rest at h_p the law still commands {at_goal:.4} m/s^2, at {f2_per_s} h_p {}",
+        "command at rest: {at_goal:.4} m/s^2 at h_p, {} at {f2_per_s} h_p",
         bound(at_scaled, claim.limit())
     );
     let pass = at_goal > 0.1 && at_scaled <= claim.limit();

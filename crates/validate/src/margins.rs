@@ -186,9 +186,9 @@ fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, Untried>
     let words: Vec<_> = GRAPHS
         .iter()
         .zip(&margins)
-        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} s, predicted {predicted_s:.3} s"))
+        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} s ({predicted_s:.3} s)"))
         .collect();
-    Ok(stated(id)?.measured(words.join("; "), [("largest_relative_difference", worst)]).within_limit())
+    Ok(stated(id)?.measured(format!("{}; predicted in brackets", words.join(", ")), [("largest_relative_difference", worst)]).within_limit())
 }
 
 /// The delay at which a disturbance of the pentagon in contact begins to grow \[s\], between that of the contact formula and that
@@ -222,8 +222,7 @@ fn with_tension(progress: &Progress<'_>) -> Result<Claim, Untried> {
     Ok(stated("margin-in-contact")?
         .measured(
             format!(
-                "near ones seen as late as all else {late_s:.2} s, near ones seen at once {at_once_s:.2} s; contact formula \
-                 {contact_s:.3} s, free formula {free_s:.3} s"
+                "contact {contact_s:.3} s, near late {late_s:.2} s, near at once {at_once_s:.2} s, free {free_s:.3} s"
             ),
             [("near_late_s", late_s), ("near_at_once_s", at_once_s), ("contact_s", contact_s), ("free_s", free_s)],
         )

@@ -7,6 +7,10 @@ use super::tension;
 use tautline_report::figures::{self, Figure, Step};
 use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
+/// Head of the table of a group of claims.
+const HEAD: &str = "| claim | result | statement (source) | expected | measured | tolerance (reason) |\n\
+                    | --- | --- | --- | --- | --- | --- |\n";
+
 impl Validation {
     /// The result in one line.
     #[must_use]
@@ -40,32 +44,30 @@ impl Validation {
     pub fn markdown(&self) -> String {
         let mut page = format!("{}.\n\n## Errata of the paper\n\n{}", capitalised(&self.headline()), self.errata());
         for group in &self.groups {
-            page.extend(["\n## ", group.title, "\n"]);
-            for claim in &group.claims {
-                page += &entry(claim);
-            }
+            page.extend(["\n## ", group.title, "\n\n", HEAD]);
+            page.extend(group.claims.iter().map(entry));
         }
         page + "\n## Convergence ladder\n\n" + &self.convergence_table()
     }
 
     fn errata(&self) -> String {
         let mut table =
-            "| finding | the statement | what was measured | claim |\n| --- | --- | --- | --- |\n".to_owned();
+            "| finding | refuted statement of the paper | claim |\n| --- | --- | --- |\n".to_owned();
         let mut findings: Vec<(&str, &Claim)> = self
             .claims()
             .filter(|claim| claim.kind == Kind::PaperRefuted)
             .filter_map(|claim| Some((claim.finding?, claim)))
             .collect();
         findings.sort_by_key(|&(finding, _)| finding);
-        for (finding, Claim { id, statement, measured, .. }) in findings {
-            table.extend(["| ", finding, " | ", statement, " | ", measured, " | `", id, "` |\n"]);
+        for (finding, Claim { id, statement, .. }) in findings {
+            table.extend(["| ", finding, " | ", &cell(statement), " | `", id, "` |\n"]);
         }
         table
     }
 
     fn convergence_table(&self) -> String {
-        let head = "Largest position error on the pentagon's flight against continuous time, 10 looks a second for 10 \
-                    seconds.\n\n| step [s] | position error [m] | order | energy excess [m^2/s^2] |\n\
+        let head = "Largest position error in the pentagon flight against continuous time, at 10 samples a second for \
+                    10 s.\n\n| step [s] | position error [m] | order | energy excess [m^2/s^2] |\n\
                     | --- | --- | --- | --- |\n";
         let rows = self.convergence.iter().map(|Refinement { dt_s, error_m, order, energy_excess_m2_s2, .. }| {
             let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
@@ -81,10 +83,17 @@ fn capitalised(text: &str) -> String {
     rest.next().map(|first| first.to_uppercase().chain(rest).collect()).unwrap_or_default()
 }
 
+/// Returns the row of a claim.
 fn entry(claim: &Claim) -> String {
     let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
-    let head = format!("\n### {}: `{id}`\n\n{statement} ({source})\n\n", capitalised(claim.outcome()));
-    head + &format!("- expected: {expected}\n- measured: {measured}\n- tolerance: {tolerance} ({reason})\n")
+    let [statement, expected, measured] = [*statement, *expected, measured.as_str()].map(cell);
+    let outcome = claim.outcome();
+    format!("| `{id}` | {outcome} | {statement} ({source}) | {expected} | {measured} | {tolerance} ({reason}) |\n")
+}
+
+/// Escapes a text for a cell of a Markdown table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|")
 }
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
@@ -117,10 +126,10 @@ fn named(name: &str, figure: Figure) -> Figure {
 
 /// What the claims rest on.
 const ASSUMED: [&str; 3] = [
-    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, which knows nothing \
-     of the physics engine.",
-    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps that line.",
-    "Random starts come from fixed seeds: the same program finds the same numbers.",
+    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, independent of the \
+     physics engine.",
+    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps this line.",
+    "Random starts come from fixed seeds, so the same program gives the same numbers.",
 ];
 
 impl Validation {
@@ -188,7 +197,7 @@ fn convergence(refinements: &[Refinement]) -> Markup {
         [format!("1/{:.0}", 1.0 / dt_s), error, order, excess]
     };
     page::numbers(
-        "Largest position error of Rapier on the pentagon's flight, by step",
+        "Largest position error of Rapier in the pentagon flight, by step",
         &["Step [s]", "Position error [m]", "Order", "Energy excess [m²/s²]"],
         refinements.iter().map(row),
     )
@@ -224,8 +233,8 @@ mod tests {
         );
         assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  [F9] none"));
         let page = judged.markdown();
-        assert!(page.contains("| F9 | Nothing moves. | none | `c` |"), "{page}");
-        assert!(page.contains("### Paper: refuted: `c`"), "{page}");
+        assert!(page.contains("| F9 | Nothing moves. | `c` |"), "{page}");
+        assert!(page.contains("| `c` | paper: refuted | Nothing moves. (equation (0)) | no motion | none |"), "{page}");
         assert!(judged.to_html().contains("paper: refuted"));
     }
 

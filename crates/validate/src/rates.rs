@@ -78,7 +78,7 @@ fn bent_hexagon() -> Result<Claim, Untried> {
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
     let words = format!(
-        "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
+        "bend of {BEND_M} m at first, {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s, \
          {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
     );
     let claim = stated("bent-hexagon")?;
@@ -139,12 +139,11 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
         Ending::Completed => "flown to its end",
         Ending::Interrupted => "interrupted",
         Ending::LawUndefined(_) => "ended by a collision",
-        Ending::BrokeDown(_) => "ended by numbers that ran out",
+        Ending::BrokeDown(_) => "ended by overflow",
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
     let words = format!(
-        "the hexagon, at rest in formation, is {lost}; the flight is {ending} at {:.0} s with a common \
-         speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
+        "{lost}; {ending} at {:.0} s, common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
         flight.duration_s
     );
     let values =

@@ -42,7 +42,7 @@ fn minimum() -> Result<Claim, Untried> {
     let claim = stated("tension-minimum")?;
     let near_0 = |number| bound(number, claim.limit());
     let words = format!(
-        "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
+        "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) as printed {}; V' {}",
         near_0(value),
         near_0(slope),
         near_0(literal),
@@ -58,7 +58,7 @@ fn figure_1() -> Result<Claim, Untried> {
     let claim = stated("figure-1-caption")?;
     let printed_of = |number: f64| (number - FIGURE_1_PRINTED).abs() <= claim.limit();
     let pass = printed_of(of_other) && !printed_of(of_caption);
-    let words = format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1");
+    let words = format!("{of_caption:.9} for delta = 0.5, {of_other:.9} for delta = 1");
     let values = [("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)];
     Ok(claim.measured(words, values).pass(pass))
 }
@@ -89,7 +89,7 @@ fn largest_difference(
 /// A claim about such an error.
 fn of_difference(id: &str, error: f64, more: &str) -> Result<Claim, Untried> {
     let decades = f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2;
-    let words = format!("largest relative error {error:.0e} over {decades:.0} decades of clearance{more}");
+    let words = format!("relative error {error:.0e} over {decades:.0} decades of clearance{more}");
     Ok(stated(id)?.measured(words, [("largest_relative_error", error)]).within_limit())
 }
 
