@@ -30,10 +30,10 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     let refuse = |message: &str, help: &str| Err(Failure::input("usage/several-recordings", message, help));
     if !is_one && arguments.html.is_some() {
         let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
-        return refuse("--html is a page on one recording, and several are given", help);
+        return refuse("--html: must be given with one recording only", help);
     }
     if !is_one && arguments.proof.is_some() {
-        return refuse("--proof is about one recording, and several are given", "audit one at a time");
+        return refuse("--proof: must be given with one recording only", "audit one at a time");
     }
     let mut asked = Vec::new();
     for paths in recordings {
@@ -127,9 +127,9 @@ impl<'a> Answers<'a> {
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where nothing came too close, proved or as assumed between samples, with 1 where something did or where it \
-cannot be told (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
-below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
+Exit codes: 0 clear, by proof or with the assumed motion between samples; 1 violation or undecided (0 for undecided with \
+--allow-undecided); 2 wrong input; 3 failure of the machine. A separation strictly below its limit is a violation. The limit \
+of two vehicles is max(delta, r1 + r2).")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
@@ -140,105 +140,105 @@ pub(super) struct AuditArguments {
 
     /// Safety distance between two centres [m]; default: that of a tautline recording. With --ellipsoid, a scaled
     /// distance; default: 2.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) delta: Option<f64>,
     /// Motion between samples [default: linear for samples, polynomial for curves].
-    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
+    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Judging")]
     pub(super) motion: Option<Interpolation>,
     /// Largest acceleration [m/s^2] of all vehicles, or of one, for --motion bounded; repeatable.
-    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) max_accel: Vec<Named>,
     /// Radius [m] of all vehicles, or of one; repeatable.
-    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) radius: Vec<Named>,
     /// Half axes [m] of an ellipsoid around each vehicle, for example its downwash; two touch at a scaled distance of
     /// 2.
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
+    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Judging")]
     pub(super) ellipsoid: Option<Vector3<f64>>,
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) obstacles: Option<PathBuf>,
     /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor [m].
-    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
+    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Judging")]
     pub(super) limit: Vec<Limit>,
     /// Check means of the acceleration over this time [s] against --limit accel; corners of curves count.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) accel_window: Option<f64>,
     /// TOML file of a fence that contains all vehicles.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) fence: Option<PathBuf>,
     /// Start of the judged window [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) from: Option<f64>,
     /// End of the judged window [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) to: Option<f64>,
     /// Ignore pairs while both vehicles are at or below this height [m].
-    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) above: Option<f64>,
     /// Judge only these vehicles; quote a name with a comma. Repeatable.
-    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
+    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
     pub(super) ids: Vec<Listed>,
     /// Add this to the times of a vehicle with a clock offset [s]; repeatable.
-    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
+    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Judging")]
     pub(super) offset: Vec<(String, f64)>,
     /// Expected number of vehicles; another number is wrong input.
-    #[arg(long, value_name = "N", help_heading = "Question")]
+    #[arg(long, value_name = "N", help_heading = "Judging")]
     pub(super) expect_vehicles: Option<usize>,
     /// Judge a tautline recording from its samples, without the run's audit of every step.
-    #[arg(long, help_heading = "Question")]
+    #[arg(long, help_heading = "Judging")]
     pub(super) independent: bool,
     /// Report undecided if a vehicle is absent in part of the window.
-    #[arg(long, help_heading = "Question")]
+    #[arg(long, help_heading = "Judging")]
     pub(super) require_presence: bool,
     /// Longest time between two samples that is not a gap [s] [default: 1.5 of the vehicle's usual interval].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) max_gap: Option<f64>,
 
     /// Read settings from this file instead of the nearest tautline.toml, which is searched from the folder of the
     /// recording up to the working folder.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) config: Option<PathBuf>,
     /// Ignore all tautline.toml files.
-    #[arg(long, conflicts_with = "config", help_heading = "Question")]
+    #[arg(long, conflicts_with = "config", help_heading = "Judging")]
     pub(super) no_config: bool,
 
     /// Print the report as JSON on standard output; all text goes to standard error.
-    #[arg(long, help_heading = "Answer")]
+    #[arg(long, help_heading = "Output")]
     pub(super) json: bool,
     /// Print no summary and no progress.
-    #[arg(long, help_heading = "Answer")]
+    #[arg(long, help_heading = "Output")]
     pub(super) quiet: bool,
-    /// Write the verdict as a JUnit file.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    /// Write the verdict as a `JUnit` file.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) events: Option<PathBuf>,
     /// Write a report page with figures.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) html: Option<PathBuf>,
     /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
     /// CSV table with --delta.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) proof: Option<PathBuf>,
     /// Write a summary in Markdown, for example for the page of a job.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) summary: Option<PathBuf>,
     /// Print an annotation for each recording, in the format of this CI system.
-    #[arg(long, value_name = "SYSTEM", help_heading = "Answer")]
+    #[arg(long, value_name = "SYSTEM", help_heading = "Output")]
     pub(super) annotations: Option<Annotations>,
     /// Exit with 0 for undecided recordings too.
-    #[arg(long, help_heading = "Answer")]
+    #[arg(long, help_heading = "Output")]
     pub(super) allow_undecided: bool,
 }
 
 fn motion() -> impl TypedValueParser<Value = Interpolation> {
     let help = |motion| match motion {
         Interpolation::Linear => "Straight lines",
-        Interpolation::Hold => "Nothing, with a jump at each sample",
+        Interpolation::Hold => "Constant positions, with a jump at each sample",
         Interpolation::Polynomial => "The recording's own curves",
-        Interpolation::Bounded => "Anything within the largest acceleration",
+        Interpolation::Bounded => "Any motion within the largest acceleration",
     };
     one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
@@ -294,9 +294,9 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
 /// Parses a limit such as `speed=5`.
 fn limit(text: &str) -> Result<Limit, String> {
     let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
-    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE, of {}", names()))?;
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE with a limit of {}", names()))?;
     let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.name() == name.trim());
-    let quantity = quantity.ok_or_else(|| format!("`{name}` is no limit: the limits are {}", names()))?;
+    let quantity = quantity.ok_or_else(|| format!("unknown limit `{name}`; the limits are {}", names()))?;
     match value.trim().parse::<f64>() {
         Ok(allowed) if allowed.is_finite() => Ok(Limit { quantity, allowed }),
         _ => Err(format!("`{value}` is not a number")),
@@ -400,9 +400,9 @@ mod tests {
         assert_eq!((read.quantity, read.allowed), (Quantity::Climb, 2.5));
         assert_eq!(
             limit("speed").unwrap_err(),
-            "write LIMIT=VALUE, of speed, horizontal, climb, descent, accel, height, floor"
+            "write LIMIT=VALUE with a limit of speed, horizontal, climb, descent, accel, height, floor"
         );
-        assert!(limit("spee=3").unwrap_err().starts_with("`spee` is no limit"));
+        assert!(limit("spee=3").unwrap_err().starts_with("unknown limit `spee`"));
         assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");
     }
 }

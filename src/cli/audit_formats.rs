@@ -1,4 +1,4 @@
-//! Machine-readable reports of `tautline audit`: Markdown and annotations for GitHub, CSV, and JUnit.
+//! Machine-readable reports of `tautline audit`: Markdown and annotations for GitHub, CSV, and `JUnit`.
 
 use std::fmt::Write as _;
 
@@ -152,7 +152,7 @@ fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
 /// Returns a summary in Markdown: a row for each recording, then the findings of each recording that is not clear.
 pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> String {
     let mut text =
-        "## tautline audit\n\n| recording | verdict | closest | who | at |\n| --- | --- | --- | --- | --- |\n"
+        "## tautline audit\n\n| recording | verdict | closest | vehicles | at |\n| --- | --- | --- | --- | --- |\n"
             .to_owned();
     for Audited { report, .. } in judged {
         let closest = report.closest.first();

@@ -16,9 +16,8 @@ use tautline_studies::campaign::{
 /// Arguments of `tautline campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where no flight violated (missing: where nothing is missing), with 1 where one did, where that is not known of all, \
-or where it was interrupted, with 2 for wrong input, other campaigns' parts and missing shards, with 3 where the machine failed or two machines flew \
-different results. docs/campaigns.md says more.")]
+Exit codes: 0 no violation (`missing`: no missing shard); 1 violations, unknown flights, or an interruption; 2 wrong input, parts of \
+other campaigns, or missing shards; 3 failure of the machine, or two machines with different results. See docs/campaigns.md.")]
 pub(super) struct CampaignArguments {
     #[command(subcommand)]
     what: What,

@@ -44,8 +44,8 @@ pub(super) fn timeline(
     console: Console,
 ) -> Result<Timeline, Failure> {
     if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
-        let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
-        return Err(Failure::input("render/out-of-range", format!("--delta is {delta_m:?}"), help));
+        let message = format!("--delta: must be more than 0 and at most {FARTHEST_M:e}, got {delta_m:?}");
+        return Err(Failure::input("render/out-of-range", message, "give a distance in metres"));
     }
     // Recordings of tautline also contain formation, graph and law.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::MCAP);
@@ -110,19 +110,18 @@ fn has_nothing_yet(recording: &Path, reading: &ReadOptions) -> bool {
 /// Refuses options that have no effect on a tautline recording.
 fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Option<f64>) -> Result<(), Failure> {
     if delta_m.is_some() {
-        let message =
-            format!("the recording is of tautline and was judged by its own delta, {} m", ours.header().delta_m);
+        let message = format!("--delta: the recording was judged by its own delta, {} m", ours.header().delta_m);
         return Err(Failure::input(
             "render/own-recording",
             message,
-            "leave --delta out; `tautline audit` judges it by another",
+            "leave --delta out; `tautline audit` judges by another delta",
         ));
     }
     let said = ReadOptions { format: None, allow_unfinished: false, ..reading.clone() };
     if said != ReadOptions::default() {
         return Err(Failure::input(
             "render/own-recording",
-            "the recording is of tautline and says itself how it is read",
+            "options for reading: have no effect on a recording of tautline",
             "leave --time-unit, --scale, --column, --axis-order and --frame out",
         ));
     }

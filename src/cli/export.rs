@@ -40,7 +40,7 @@ pub(super) struct ExportArguments {
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let [paths] = &arguments.reading.recordings()[..] else {
         let help = "give --join if each file holds a vehicle of one recording";
-        let message = "several recordings are given, and one is exported";
+        let message = "RECORDING: must be one recording, got several";
         return Err(Failure::input("usage/several-recordings", message, help));
     };
     let request = ExportRequest {

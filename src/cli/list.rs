@@ -34,10 +34,11 @@ pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
 fn of_recording(name: &str) -> Result<String, Failure> {
     let path = Path::new(name);
     if !path.exists() {
-        let help = "`tautline list` shows their names; a recording is given by its path, such as out/pentagon/run.mcap";
+        let help =
+            "`tautline list` shows the built-in scenarios; give a recording by its path, such as out/pentagon/run.mcap";
         return Err(Failure::input(
             "scenario/not-found",
-            format!("there is no built-in scenario and no recording `{name}`"),
+            format!("no built-in scenario and no recording `{name}`"),
             help,
         ));
     }

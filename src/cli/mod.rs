@@ -69,7 +69,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
+    after_help = "Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -77,7 +77,7 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+#[expect(clippy::large_enum_variant, reason = "one value per process")]
 enum Command {
     /// Fly a scenario, audit every step, and write a recording and a report.
     Run(run::RunArguments),

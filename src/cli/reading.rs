@@ -43,7 +43,7 @@ pub(super) struct ReadArguments {
     /// Row to read of several rows of a vehicle at one time [default: refuse, unless they are equal].
     #[arg(long, value_name = "WHICH", value_parser = duplicates())]
     duplicates: Option<Duplicates>,
-    /// Read all rows of a table as one vehicle and ignore an id column.
+    /// Read all rows of a table as one vehicle, whatever its other columns.
     #[arg(long)]
     one_vehicle: bool,
     /// Numbers of a vehicle in a table without a header: x and y, x to z, or these with their velocities.
@@ -86,8 +86,8 @@ impl ReadArguments {
         if self.more.is_empty() {
             return Ok(&self.recording);
         }
-        let message = format!("several recordings are given, and one is {done}");
-        let help = "put the files into a folder if each holds a vehicle of one recording, and give that";
+        let message = format!("RECORDING: must be one recording to be {done}, got several");
+        let help = "if each file holds a vehicle of one recording, give a folder with the files";
         Err(Failure::input("usage/several-recordings", message, help))
     }
 
@@ -139,7 +139,7 @@ fn column(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((role, name)) if roles.contains(&role) && !name.is_empty() => Ok((role.to_owned(), name.to_owned())),
         Some((role, _)) if !roles.contains(&role) => {
-            Err(format!("`{role}` is no column: the columns are {}", roles.join(", ")))
+            Err(format!("unknown role `{role}`; the roles are {}", roles.join(", ")))
         }
         _ => Err("write ROLE=NAME, such as x=pos_east".to_owned()),
     }
@@ -153,7 +153,7 @@ fn start(text: &str) -> Result<(String, [f64; 3]), String> {
 fn origin(text: &str) -> Result<[f64; 3], String> {
     match three(text)? {
         [latitude, longitude, _] if latitude.abs() > 90.0 || longitude.abs() > 360.0 => {
-            Err("a latitude is within 90 degrees, and a longitude within 360".to_owned())
+            Err("the latitude must be within 90 degrees, the longitude within 360".to_owned())
         }
         place => Ok(place),
     }
@@ -174,7 +174,7 @@ pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
     let names = choices.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     PossibleValuesParser::new(names).try_map(move |given| {
         let chosen = choices.iter().find(|(name, _)| name.get_name() == given);
-        chosen.map(|(_, value)| value.clone()).ok_or("it is none of the possible values")
+        chosen.map(|(_, value)| value.clone()).ok_or("not one of the possible values")
     })
 }
 

@@ -33,11 +33,6 @@ const WAITING_BYTES: usize = 256 << 20;
 // `--fps` is the frame rate of the film here.
 #[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
 pub(super) struct RenderArguments {
-    #[command(flatten)]
-    reading: ReadArguments,
-    /// Format of the recording [default: detected from its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
-    input_format: Option<tautline_recordings::read::Format>,
     /// Safety distance for a recording without one [m]: vehicles get shells of half of it, and violations are those of
     /// straight lines between samples.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
@@ -82,6 +77,12 @@ pub(super) struct RenderArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
+    // Last, because its help heading also applies to all later arguments.
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: detected from its content].
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
+    input_format: Option<tautline_recordings::read::Format>,
 }
 
 /// Picture to take.
@@ -122,8 +123,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
     if let Some((path, format)) = film {
         if path.is_dir() {
-            let message = format!("{} is a folder, not a film", path.display());
-            return Err(Failure::input("files/is-directory", message, "name a file with --film"));
+            let message = format!("--film: {} is a folder", path.display());
+            return Err(Failure::input("files/is-directory", message, "give the path of a file"));
         }
         format.check(view.size_px, fps)?;
         format.check_encoder()?;
@@ -244,7 +245,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             "start" => (start_s, "start".to_owned()),
             "end" => (end_s, "end".to_owned()),
             "closest" => {
-                let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
+                let none = "--at: `closest` needs two vehicles at a time";
                 let closest = timeline
                     .log
                     .closest()
@@ -254,15 +255,15 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             seconds => {
                 let help = "give start, closest, end or seconds, such as --at start,12.5,end";
                 let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
-                let time_s =
-                    time_s.ok_or_else(|| Failure::input("render/time", format!("`{text}` is not a time"), help))?;
+                let time_s = time_s
+                    .ok_or_else(|| Failure::input("render/time", format!("--at: `{text}` is not a time"), help))?;
                 (time_s, format!("at-{time_s:.3}s"))
             }
         };
         if !(start_s..=end_s).contains(&time_s) {
             return Err(Failure::input(
                 "render/out-of-range",
-                format!("{time_s} s is outside the recording, which goes from {start_s} s to {end_s} s"),
+                format!("--at: must be from {start_s} s to {end_s} s, got {time_s} s"),
                 "give a time within the recording with --at",
             ));
         }
@@ -288,8 +289,8 @@ fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64
     if count > MOST_PICTURES {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("these would be {count:.0} pictures, more than {MOST_PICTURES:.0}"),
-            format!("give a larger number with {option}"),
+            format!("{option}: must give at most {MOST_PICTURES:.0} pictures, got {count:.0}"),
+            "give a larger number",
         ));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded above")]
@@ -301,7 +302,7 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
     if number > 0.0 && number.is_finite() {
         return Ok(number);
     }
-    let message = format!("{option}: {number} is not a positive number");
+    let message = format!("{option}: must be more than 0, got {number}");
     Err(Failure::input("render/out-of-range", message, format!("give a positive number with {option}")))
 }
 
@@ -326,7 +327,7 @@ fn sheet_plan(
     if size_px.contains(&0) {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("a sheet of {columns} x {rows} pictures does not fit into {width} x {height} pixels"),
+            format!("--sheet: {columns} x {rows} pictures do not fit into {width} x {height} pixels"),
             "give fewer pictures with --sheet, or a larger --size",
         ));
     }
@@ -335,7 +336,7 @@ fn sheet_plan(
     if last > MOST_PICTURES {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("{columns} x {rows} pictures are more than {MOST_PICTURES:.0}"),
+            format!("--sheet: must have at most {MOST_PICTURES:.0} pictures, got {columns} x {rows}"),
             "give fewer pictures with --sheet",
         ));
     }

@@ -115,8 +115,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane, \
-step-too-long, drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
+Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed (relative-velocity-unstable, start-on-line, \
+start-in-plane, step-too-long, drift-unresolved); 2 wrong input, such as a desired distance of at most delta.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,

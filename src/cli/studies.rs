@@ -82,8 +82,8 @@ struct RunArguments {
 /// Arguments of `tautline compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 once the comparison is made, whatever the laws did; with 1 where it was interrupted. A law's keys stand in \
-[laws.NAME] of the scenario; NAME is its kind, or any name with a `kind` inside. docs/compare.md says what each number means.")]
+Exit codes: 0 complete, for any result; 1 interrupted. The keys of a law are in [laws.NAME] of the scenario; NAME is its \
+kind, or any name if the table has a `kind`. docs/compare.md explains the numbers.")]
 pub(super) struct CompareArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -112,9 +112,9 @@ impl CompareArguments {
 /// Arguments of `tautline margin`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where the verdict turns or holds everywhere, with 1 where it holds nowhere or the search was interrupted. Flown \
-once (--runs 1) everything but the key is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and \
-where nothing is random the start is moved a little. docs/margins.md says more.")]
+Exit codes: 0 the verdict turns or holds everywhere; 1 it holds nowhere, or the search was interrupted. A single run \
+(--runs 1) changes only the key. With more runs, run k has start.seed and noise.seed = S + k, and a scenario without \
+randomness gets a small jitter of the start. See docs/margins.md.")]
 pub(super) struct MarginArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -145,8 +145,8 @@ pub(super) struct MarginArguments {
 
 fn verdict() -> impl TypedValueParser<Value = Question> {
     let help = |question| match question {
-        Question::Pass => "It passes: clear, and its formation reached as far as asked",
-        Question::Clear => "No two vehicles come closer than delta, to the end of the flight",
+        Question::Pass => "Clear, and the formation is reached as far as the scenario requires",
+        Question::Clear => "No two vehicles come closer than delta up to the end",
         Question::Reached => "The formation is reached and kept to the end",
     };
     one_of(Question::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
@@ -168,9 +168,8 @@ impl MarginArguments {
 /// Arguments of `tautline sweep`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 once the sweep is made, whatever the flights did; with 1 where it was interrupted. Flown once (--runs 1) everything \
-but the keys is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and where nothing is random the \
-start is moved a little. docs/sweeps.md says more.")]
+Exit codes: 0 complete, for any result; 1 interrupted. A single run (--runs 1) changes only the keys. With more runs, run k \
+has start.seed and noise.seed = S + k, and a scenario without randomness gets a small jitter of the start. See docs/sweeps.md.")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -199,8 +198,8 @@ impl SweepArguments {
 /// Arguments of `tautline attack`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where the search found no violation, with 1 where it found one or was interrupted. What it did not find may be \
-there all the same: it is a search, not a proof. docs/attack.md says more.")]
+Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may exist \
+within the bounds. See docs/attack.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,

@@ -23,7 +23,7 @@ const WAITING: usize = 256;
 /// Arguments of `tautline view`.
 #[derive(Debug, Args)]
 #[command(mut_arg("recording", |what| {
-    let help = "A recording, a scenario file, or the name of a built-in scenario";
+    let help = "Recording, scenario file, or name of a built-in scenario";
     what.required(false).default_value("pentagon").value_name("RECORDING|SCENARIO").help(help)
 }))]
 pub(super) struct ViewArguments {
@@ -52,21 +52,20 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format);
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
-    let no_effect =
-        |what: &str, help: &str| Err(Failure::input("usage/no-effect", format!("{what} has no effect on it"), help));
+    let no_effect = |message: &str, help: &str| Err(Failure::input("usage/no-effect", message, help));
     let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
-            return no_effect("a recording has been flown: --set", "leave --set out, or give a scenario");
+            return no_effect("--set: has no effect on a recording", "leave --set out, or give a scenario");
         }
         (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
-            let help = "leave --delta out, or give --set with the scenario's own key";
-            return no_effect("a scenario has its own safety distance: --delta", help);
+            let help = "leave --delta out, or set the key with --set law.delta_m=METRES";
+            return no_effect("--delta: has no effect on a scenario, which has its own safety distance", help);
         }
         if reading != ReadOptions::default() {
-            let help = "leave the options of reading out, or give a recording";
-            return no_effect("a scenario is flown: the way in which a recording is read", help);
+            let help = "leave these options out, or give a recording";
+            return no_effect("options for reading: have no effect on a scenario", help);
         }
         let scenario = ScenarioRequest::named(&path.to_string_lossy(), &arguments.overrides)?.read()?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
@@ -121,7 +120,7 @@ impl Sink for LiveSink {
 
 /// Reports that the display is gone. Its resources cannot be released any more, so the program must end at once.
 pub(super) fn lose_display() -> Exit {
-    let help = "open it again on a display that stays, or draw without one: tautline render RECORDING";
+    let help = "open the window again, or draw without a display: tautline render RECORDING";
     let message = "the display is gone, and the window with it";
     console::show(&Failure::machine("render/no-display", message).with_help(help))
 }

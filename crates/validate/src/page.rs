@@ -1,8 +1,8 @@
-//! The result in words: a line a claim for the terminal, tables for `docs/validation.md`.
+//! Result of a validation as text, as the tables of `docs/validation.md`, and as a page.
 
-use super::claim::{Claim, Group, Kind, Untried, Validation};
+use super::claim::{Claim, Group, Kind, MeasureError, Validation};
 use super::convergence::Refinement;
-use super::detectors::{Flights, Flown};
+use super::detectors::{BuiltinFlight, Flights};
 use super::tension;
 use tautline_report::figures::{self, Figure, Step};
 use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
@@ -51,8 +51,7 @@ impl Validation {
     }
 
     fn errata(&self) -> String {
-        let mut table =
-            "| finding | refuted statement of the paper | claim |\n| --- | --- | --- |\n".to_owned();
+        let mut table = "| finding | refuted statement of the paper | claim |\n| --- | --- | --- |\n".to_owned();
         let mut findings: Vec<(&str, &Claim)> = self
             .claims()
             .filter(|claim| claim.kind == Kind::PaperRefuted)
@@ -97,7 +96,7 @@ fn cell(text: &str) -> String {
 }
 
 /// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
-pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, Untried> {
+pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, MeasureError> {
     let steps: Vec<Step> = convergence.iter().map(|&Refinement { dt_s, error_m, .. }| Step { dt_s, error_m }).collect();
     let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
     drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
@@ -110,7 +109,7 @@ pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<
 }
 
 /// Paths, control effort and distances.
-fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
+fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
     let [a, b, c] = names;
     let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
     [
