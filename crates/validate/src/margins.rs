@@ -186,10 +186,10 @@ fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, MeasureE
     let words: Vec<_> = GRAPHS
         .iter()
         .zip(&margins)
-        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} s ({predicted_s:.3} s)"))
+        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} ({predicted_s:.3})"))
         .collect();
     Ok(stated(id)?
-        .measured(format!("{}; predicted in brackets", words.join(", ")), [("largest_relative_difference", worst)])
+        .measured(format!("{} s (predicted)", words.join(", ")), [("largest_relative_difference", worst)])
         .within_limit())
 }
 

@@ -8,8 +8,7 @@ use tautline_report::figures::{self, Figure, Step};
 use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
 /// Head of the table of a group of claims.
-const HEAD: &str = "| claim | result | statement (source) | expected | measured | tolerance (reason) |\n\
-                    | --- | --- | --- | --- | --- | --- |\n";
+const HEAD: &str = "| claim | result | statement | measured | tolerance |\n| --- | --- | --- | --- | --- |\n";
 
 impl Validation {
     /// The result in one line.
@@ -84,10 +83,14 @@ fn capitalised(text: &str) -> String {
 
 /// Returns the row of a claim.
 fn entry(claim: &Claim) -> String {
-    let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
-    let [statement, expected, measured] = [*statement, *expected, measured.as_str()].map(cell);
+    let Claim { id, statement, source, expected, measured, tolerance, .. } = claim;
+    let statement = match claim.kind {
+        Kind::Ours => (*statement).to_owned(),
+        Kind::PaperHolds => format!("{statement} ({source})"),
+        Kind::PaperRefuted => format!("{statement} ({source}) Correct: {expected}."),
+    };
     let outcome = claim.outcome();
-    format!("| `{id}` | {outcome} | {statement} ({source}) | {expected} | {measured} | {tolerance} ({reason}) |\n")
+    format!("| `{id}` | {outcome} | {} | {} | {tolerance} |\n", cell(&statement), cell(measured))
 }
 
 /// Escapes a text for a cell of a Markdown table.
@@ -233,7 +236,10 @@ mod tests {
         assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  [F9] none"));
         let page = judged.markdown();
         assert!(page.contains("| F9 | Nothing moves. | `c` |"), "{page}");
-        assert!(page.contains("| `c` | paper: refuted | Nothing moves. (equation (0)) | no motion | none |"), "{page}");
+        assert!(
+            page.contains("| `c` | paper: refuted | Nothing moves. (equation (0)) Correct: no motion. | none |"),
+            "{page}"
+        );
         assert!(judged.to_html().contains("paper: refuted"));
     }
 
