@@ -127,9 +127,9 @@ impl<'a> Answers<'a> {
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 clear, by proof or with the assumed motion between samples; 1 violation or undecided (0 for undecided with \
---allow-undecided); 2 wrong input; 3 failure of the machine. A separation strictly below its limit is a violation. The limit \
-of two vehicles is max(delta, r1 + r2).")]
+Exit codes: 0 clear, by proof or with the assumed motion between samples; 1 violation or undecided (0 for undecided \
+with --allow-undecided); 2 wrong input; 3 failure of the machine. A separation strictly below its limit is a \
+violation. The limit of two vehicles is max(delta, r1 + r2).")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
@@ -151,15 +151,28 @@ pub(super) struct AuditArguments {
     /// Radius [m] of all vehicles, or of one; repeatable.
     #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) radius: Vec<Named>,
-    /// Half axes [m] of an ellipsoid around each vehicle, for example its downwash; two touch at a scaled distance of
-    /// 2.
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Judging")]
+    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
+    #[arg(
+        long,
+        value_name = "AX,AY,AZ",
+        value_parser = axes,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["radius", "obstacles"],
+        help_heading = "Judging"
+    )]
     pub(super) ellipsoid: Option<Vector3<f64>>,
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
     #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) obstacles: Option<PathBuf>,
     /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor [m].
-    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Judging")]
+    #[arg(
+        long,
+        value_name = "LIMIT=VALUE,...",
+        value_parser = limit,
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "Judging"
+    )]
     pub(super) limit: Vec<Limit>,
     /// Check means of the acceleration over this time [s] against --limit accel; corners of curves count.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]

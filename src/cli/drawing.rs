@@ -135,8 +135,8 @@ const NO_LAYER: &str = "NODEVICE_SELECT";
 #[cfg(target_os = "linux")]
 const CHOICE: &str = "MESA_VK_DEVICE_SELECT";
 
-/// Replaces the process by the same program without the layer, once, if there is no desktop. Without a desktop the layer writes
-/// complaints to standard error. If the program cannot be started again, this process continues.
+/// Restarts the program once without the layer if there is no desktop, where the layer writes complaints to standard
+/// error. If the program cannot be restarted, this process continues.
 #[cfg(target_os = "linux")]
 pub(super) fn silence_driver() {
     use std::env::{args_os, current_exe, var_os};

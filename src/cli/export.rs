@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::TypedValueParser;
 
 use super::Exit;
 use super::console::{Console, Terminal};
@@ -18,7 +19,7 @@ pub(super) struct ExportArguments {
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
     /// Format to write [default: from the extension of the file].
-    #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect()))]
+    #[arg(long, value_name = "FORMAT", value_parser = written_format())]
     format: Option<Format>,
     /// Sampling rate of curves [Hz]; the motion between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
@@ -53,4 +54,9 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     };
     export_file(&request, &Terminal::new(Console { data_on_stdout: false, quiet: arguments.quiet })?)?;
     Ok(Exit::Good)
+}
+
+/// Returns a parser of writable formats.
+fn written_format() -> impl TypedValueParser<Value = Format> {
+    one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect())
 }

@@ -36,7 +36,7 @@ pub fn main() -> ExitCode {
     entry(&std::env::args_os().collect::<Vec<_>>()).into()
 }
 
-/// Runs the program with arguments, the first of which is its own name, and returns the exit code.
+/// Runs the program with arguments, beginning with its own name, and returns the exit code.
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();

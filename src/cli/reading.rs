@@ -32,7 +32,12 @@ pub(super) struct ReadArguments {
     #[arg(long, value_name = "UNIT", value_parser = unit())]
     time_unit: Option<TimeUnit>,
     /// Frames per second, for times in frames.
-    #[arg(long = "fps", value_name = "HZ", conflicts_with_all = ["time_unit", "time_scale"], allow_negative_numbers = true)]
+    #[arg(
+        long = "fps",
+        value_name = "HZ",
+        conflicts_with_all = ["time_unit", "time_scale"],
+        allow_negative_numbers = true
+    )]
     frames_per_s: Option<f64>,
     /// Seconds per unit of time.
     #[arg(long, value_name = "SECONDS", conflicts_with = "time_unit", allow_negative_numbers = true)]

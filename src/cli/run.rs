@@ -72,8 +72,7 @@ pub(super) struct RunArguments {
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Number of threads, of which at most 2 are used [default: one for each core]; the recording has the same bits for
-    /// any number.
+    /// Number of threads, at most 2 in use [default: one for each core]; the recording is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
@@ -115,8 +114,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed (relative-velocity-unstable, start-on-line, \
-start-in-plane, step-too-long, drift-unresolved); 2 wrong input, such as a desired distance of at most delta.")]
+Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed (relative-velocity-unstable, \
+start-on-line, start-in-plane, step-too-long, drift-unresolved); 2 wrong input, such as a desired distance of at most \
+delta.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,

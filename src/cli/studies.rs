@@ -82,8 +82,8 @@ struct RunArguments {
 /// Arguments of `tautline compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 complete, for any result; 1 interrupted. The keys of a law are in [laws.NAME] of the scenario; NAME is its \
-kind, or any name if the table has a `kind`. docs/compare.md explains the numbers.")]
+Exit codes: 0 complete, for any result; 1 interrupted. The keys of a law are in [laws.NAME] of the scenario. NAME is \
+the kind of the law, or any name if the table has a `kind`. See docs/compare.md.")]
 pub(super) struct CompareArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -168,8 +168,9 @@ impl MarginArguments {
 /// Arguments of `tautline sweep`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 complete, for any result; 1 interrupted. A single run (--runs 1) changes only the keys. With more runs, run k \
-has start.seed and noise.seed = S + k, and a scenario without randomness gets a small jitter of the start. See docs/sweeps.md.")]
+Exit codes: 0 complete, for any result; 1 interrupted. A single run (--runs 1) changes only the keys. With more runs, \
+run k has start.seed and noise.seed = S + k, and a scenario without randomness gets a small jitter of the start. \
+See docs/sweeps.md.")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -198,8 +199,8 @@ impl SweepArguments {
 /// Arguments of `tautline attack`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may exist \
-within the bounds. See docs/attack.md.")]
+Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may \
+exist within the bounds. See docs/attack.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -219,7 +220,12 @@ pub(super) struct AttackArguments {
     #[arg(long, value_name = "F", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(FLIGHTS))]
     flights: u64,
     /// Fly each candidate with K seeds of noise, from that of the scenario on; the worst one counts.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(SEEDS_OF_A_CANDIDATE))]
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u64).range(SEEDS_OF_A_CANDIDATE)
+    )]
     seeds: u64,
     /// Seed of the search; noise has the seed of the scenario.
     #[arg(long, value_name = "S", default_value_t = 0)]

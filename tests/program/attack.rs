@@ -57,7 +57,7 @@ fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
         let more = ["--threads", threads, "--csv", &csv, "--html", &html, "--json", &json];
         let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &more].concat());
         assert_eq!(exit, Some(0), "{err}");
-        assert!(out.starts_with("no violation found in 9 flights: the worst came to "), "{out}");
+        assert!(out.starts_with("no violation found in 9 flights: smallest separation "), "{out}");
         assert!(out.contains("a search, not a proof"), "{out}");
         [csv, html, json].map(|file| std::fs::read_to_string(folder.path().join(file)).expect("written"))
     };

@@ -393,7 +393,7 @@ fn rare_violations_are_estimated_and_bad_flights_flown_again_to_the_same_state()
     assert_eq!(page.exit, Some(1), "an estimate of violations is no good news");
     assert!(page.out.contains("a flight is violated with a probability of"), "{}", page.out);
     let none = place.campaign(&["replay", "one", "--run", "0", "--bad", "7"]);
-    assert!(none.exit == Some(2) && none.err.contains("no bad flight 7"), "{}", none.err);
+    assert!(none.exit == Some(2) && none.err.contains("no violated flight 7"), "{}", none.err);
     // Nothing random from step to step: two flights from one state are one flight.
     fs::write(place.path("pair.toml"), PAIR.replace("position_noise_m = 0.12, ", "")).expect("written");
     let still = place.campaign(&["run", "spec.toml", "--out", "still"]);

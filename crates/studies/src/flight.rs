@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_told_twice_counts_once_and_a_law_without_an_answer_leaves_the_last_command() {
+    fn a_repeated_step_counts_once_and_a_missing_command_keeps_the_last_one() {
         let mut effort = seen(10);
         let (way_m, control_m_s) = (effort.path_length_m(), effort.total_control_m_s());
         let swarm = Swarm::at_rest(Rows::from_row_slice(&[1.0, 0.0, 0.0, 2.0, 0.0, 0.0]));

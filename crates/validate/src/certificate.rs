@@ -163,8 +163,8 @@ fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
 fn in_continuous_time(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
     let words = format!(
-        "broken {broken} times in {STARTS} starts; smallest margin {margin_m:.4} m; clearance at least {ratio:.2} times the \
-         certified one"
+        "broken {broken} times in {STARTS} starts; smallest margin {margin_m:.4} m; clearance at least {ratio:.2} \
+         times the certified one"
     );
     let values = [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)];
     Ok(stated("certificate")?.measured(words, values).pass(broken == 0))

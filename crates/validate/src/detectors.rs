@@ -111,8 +111,8 @@ fn agree_on_violation(flight: &Flight) -> Result<Claim, MeasureError> {
     let first_s = flight.audit.violations.iter().map(|violation| violation.from_s).fold(f64::INFINITY, f64::min);
     let contact_s = flight.audit.parry.min_toi_s.unwrap_or(f64::NAN);
     let words = format!(
-        "violations: {}; overlaps of Rapier: {}; first contact at {first_s:.3} s (closed form) and {contact_s:.3} s (parry); \
-         {disagreements} disagreements in {} casts",
+        "violations: {}; overlaps of Rapier: {}; first contact at {first_s:.3} s (closed form) and {contact_s:.3} s \
+         (parry); {disagreements} disagreements in {} casts",
         names(&found),
         names(contacts),
         flight.audit.pairs_checked

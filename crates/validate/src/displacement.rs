@@ -133,7 +133,8 @@ fn flights(deviations: &[Deviation]) -> Result<[Claim; 2], MeasureError> {
     let closest_m = largest(deviations, |of| of.closest_m);
     let lengths = stated("displacement-flights")?.measured(
         format!(
-            "E(0) off by {energy:.1e}, certified separation by {certified_m:.1e} m, closest approach by {closest_m:.1e} m"
+            "E(0) off by {energy:.1e}, certified separation by {certified_m:.1e} m, closest approach by \
+             {closest_m:.1e} m"
         ),
         [("energy_relative", energy), ("certified_m", certified_m), ("closest_m", closest_m)],
     );

@@ -104,8 +104,8 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
     let words = format!(
         "{reached} of {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the \
-         pentagon; {} come to rest with pulls {} m/s^2 and edge errors of {least_m:.2} to {most_m:.2} m (ordering \
-         1-2-3-4-5: {in_order_m:.2} m); {changed} outcomes change with 100 times the solver tolerance",
+         pentagon. The other {} come to rest with pulls {} m/s^2 and edge errors of {least_m:.2} to {most_m:.2} m. \
+         Ordering 1-2-3-4-5: {in_order_m:.2} m. {changed} outcomes change with 100 times the solver tolerance",
         orderings.len(),
         elsewhere.len(),
         bound(pull_m_s2, REST_M_S2)

@@ -48,8 +48,9 @@ impl State {
         Ok(control)
     }
 
-    /// Returns dE/dt at this state from E alone, and the sum of the magnitudes of its terms. dE/dt is the sum of v~ v~'
-    /// + (1/N) grad V v, with the gradient from [`EdgeTension`] edge by edge.
+    /// Returns dE/dt at this state from E, and the sum of the magnitudes of its terms.
+    ///
+    /// `dE/dt = sum v~ v~' + (1/N) grad V v`, with the gradient from [`EdgeTension`] edge by edge.
     fn energy_rate(&self) -> Result<(f64, f64), MeasureError> {
         let (swarm, count) = (&self.swarm, self.swarm.count() as f64);
         let control = self.control()?;

@@ -11,7 +11,7 @@ use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone
 const HEAD: &str = "| claim | result | statement | measured | tolerance |\n| --- | --- | --- | --- | --- |\n";
 
 impl Validation {
-    /// The result in one line.
+    /// Returns the result in one line.
     #[must_use]
     pub fn headline(&self) -> String {
         let count = |kind: Kind| self.claims().filter(|claim| claim.kind == kind && claim.pass).count();
@@ -20,14 +20,15 @@ impl Validation {
             return format!("NOT VALID: {failed} of {all} claims are not as expected");
         }
         format!(
-            "valid: all {all} claims are as expected: {} of ours hold, {} of the paper's hold, {} of the paper's are refuted",
+            "valid: all {all} claims are as expected: {} of ours hold, {} of the paper's hold, {} of the paper's are \
+             refuted",
             count(Kind::Ours),
             count(Kind::PaperHolds),
             count(Kind::PaperRefuted)
         )
     }
 
-    /// A line a claim: how it fared, its name, what was measured.
+    /// Returns a line for each claim: result, name and measurement.
     #[must_use]
     pub fn text(&self) -> String {
         let width = |of: fn(&Claim) -> usize| self.claims().map(of).max().unwrap_or(0);
@@ -38,7 +39,7 @@ impl Validation {
         })
     }
 
-    /// The generated part of `docs/validation.md`.
+    /// Returns the generated part of `docs/validation.md`.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut page = format!("{}.\n\n## Errata of the paper\n\n{}", capitalised(&self.headline()), self.errata());
@@ -98,7 +99,7 @@ fn cell(text: &str) -> String {
     text.replace('|', "\\|")
 }
 
-/// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
+/// Draws Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
 pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, MeasureError> {
     let steps: Vec<Step> = convergence.iter().map(|&Refinement { dt_s, error_m, .. }| Step { dt_s, error_m }).collect();
     let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
@@ -111,7 +112,7 @@ pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<
     Ok(drawn)
 }
 
-/// Paths, control effort and distances.
+/// Returns the figures of paths, control effort and distances.
 fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
     let [a, b, c] = names;
     let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
@@ -126,17 +127,17 @@ fn named(name: &str, figure: Figure) -> Figure {
     Figure { name: name.to_owned(), ..figure }
 }
 
-/// What the claims rest on.
+/// Assumptions of the claims.
 const ASSUMED: [&str; 3] = [
-    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, independent of the \
-     physics engine.",
+    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, independent \
+     of the physics engine.",
     "Within a step the engine moves every vehicle on a straight line, and the audit sweeps this line.",
     "Random starts come from fixed seeds, so the same program gives the same numbers.",
 ];
 
 impl Validation {
-    /// The result as a self-contained page: claims, figures and the convergence. Two validations by one program give the same
-    /// bytes.
+    /// Returns the result as a self-contained page: claims, figures and the convergence. The bytes are the same for any
+    /// validation by the same program.
     #[must_use]
     pub fn to_html(&self) -> String {
         let failed = self.claims().filter(|claim| !claim.pass);
@@ -146,12 +147,12 @@ impl Validation {
         sections.extend([
             section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
             section("The paper's figures", &[page::figures(&of_paper)]),
-            section("What was assumed", &[page::list(&ASSUMED)]),
-            section("Repeat it", &[page::command("tautline validate")]),
+            section("Assumptions", &[page::list(&ASSUMED)]),
+            section("Command", &[page::command("tautline validate")]),
         ]);
         Page {
             title: "Validation".to_owned(),
-            kind: "Every claim, ours and the paper's, judged by measurement",
+            kind: "Measurement of every claim of tautline and of its source paper",
             badge: Badge::judged(self.pass),
             verdict: self.headline(),
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
@@ -223,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refuted_statement_of_the_paper_is_called_refuted_and_is_no_failure() {
+    fn a_refuted_statement_of_the_paper_is_not_a_failure() {
         let judged = validation(vec![
             claim("a", Kind::Ours, true),
             claim("b", Kind::PaperHolds, true),
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_that_is_not_as_expected_is_never_hidden() {
+    fn a_claim_that_is_not_as_expected_is_reported() {
         for (kind, outcome) in [(Kind::Ours, "FAILS"), (Kind::PaperHolds, "FAILS"), (Kind::PaperRefuted, "NOT REFUTED")]
         {
             let judged = validation(vec![claim("a", Kind::Ours, true), claim("b", kind, false)]);

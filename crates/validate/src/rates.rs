@@ -78,8 +78,8 @@ fn bent_hexagon() -> Result<Claim, MeasureError> {
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
     let words = format!(
-        "bend of {BEND_M} m at first, {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s, \
-         {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
+        "bend {BEND_M} m, after 100 s {at_100_m:.2} m, after 300 s {at_300_m:.2} m, after 10000 s {at_10000_m:.3} m; \
+         exponent up to 30000 s {exponent:.2}"
     );
     let claim = stated("bent-hexagon")?;
     // 1/A^2 grows linearly, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
@@ -143,7 +143,8 @@ fn lost_to_rounding() -> Result<Claim, MeasureError> {
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
     let words = format!(
-        "{lost}; {ending} at {:.0} s, common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
+        "{lost}; {ending} at {:.0} s, common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = \
+         {DELTA_M} m",
         flight.duration_s
     );
     let values =

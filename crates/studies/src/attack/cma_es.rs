@@ -294,7 +294,7 @@ mod tests {
     use super::*;
 
     /// Returns the number of candidates until a value is below `goal`; panics after `most` candidates.
-    fn asked(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
+    fn count_candidates(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
         let mut normals = Normals::new(3, 0);
         let mut search = CmaEs::new(&vec![0.5; n], 0.3, usual_population(n));
         let mut count = 0;
@@ -316,12 +316,12 @@ mod tests {
         // Hansen's tutorial and the BBOB tables: about 1e3 candidates for a sphere, about 6e3 for Rosenbrock in ten
         // dimensions.
         let ball = |x: &[f64]| x.iter().map(|x| (x - 0.2) * (x - 0.2)).sum::<f64>();
-        assert!(asked(10, 1e-9, 2_500, &ball) > 300);
+        assert!(count_candidates(10, 1e-9, 2_500, &ball) > 300);
         let narrow = |x: &[f64]| {
             let scale = |k: usize| libm::pow(1e6, k as f64 / 9.0);
             x.iter().enumerate().map(|(k, x)| scale(k) * (x - 0.2) * (x - 0.2)).sum::<f64>()
         };
-        asked(10, 1e-9, 9_000, &narrow);
+        count_candidates(10, 1e-9, 9_000, &narrow);
         let valley = |x: &[f64]| {
             let part = |pair: &[f64]| {
                 100.0 * (pair[1] - pair[0] * pair[0]) * (pair[1] - pair[0] * pair[0])
@@ -329,12 +329,12 @@ mod tests {
             };
             x.windows(2).map(part).sum::<f64>()
         };
-        asked(10, 1e-9, 12_000, &valley);
+        count_candidates(10, 1e-9, 12_000, &valley);
     }
 
     #[test]
     fn one_dimension_and_equal_values_work() {
-        asked(1, 1e-9, 400, &|x| (x[0] - 0.9) * (x[0] - 0.9));
+        count_candidates(1, 1e-9, 400, &|x| (x[0] - 0.9) * (x[0] - 0.9));
         let mut search = CmaEs::new(&[0.5, 0.5], 0.3, 6);
         let mut normals = Normals::new(0, 0);
         for _ in 0..50 {

@@ -39,17 +39,16 @@ const MOST_REFUSED: usize = 1000;
 const MOST_PLACES: usize = 4;
 
 /// Caveat in every headline.
-const CAVEAT: &str = "This is a search, not a proof: what it did not find may be there all the same, and the worst found need not be the worst.";
+const CAVEAT: &str = "This is a search, not a proof: worse flights may exist within the bounds.";
 
 /// Assumptions of the numbers.
 const ASSUMED: [&str; 4] = [
     CAVEAT,
-    "A candidate is as bad as its flight brings two vehicles close, as the judge saw it between the samples too; clearances of \
-     obstacles are judged, and not searched for.",
-    "Bounds are a box: every number is free between its own two, whatever the others are. What cannot be flown, such as a start of \
-     two vehicles within delta, is no attack and costs no flight.",
-    "Noise has the seed of the scenario, and those that follow it where several are asked for: another seed does not make a scenario \
-     harder.",
+    "The search minimises the smallest separation of two vehicles, also between samples. Clearances of obstacles are \
+     judged, but not minimised.",
+    "Bounds are a box: each number varies independently of the others. Candidates that cannot be flown, such as a start \
+     of two vehicles within delta, cost no flight.",
+    "Noise has the seed of the scenario, or with --seeds also the next: a seed does not make a scenario harder.",
 ];
 
 /// Options of an attack.
@@ -170,7 +169,7 @@ impl Experiment for Options {
         batch
             .monitor()
             .begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(self.flights.saturating_add(1))));
-        let as_it_is = |error| Failure::from(error).under("with the keys as they are");
+        let as_it_is = |error| Failure::from(error).under("in the unchanged scenario");
         let Some(own) = batch.fly(base.own(), space.noise_seed(0)).map_err(as_it_is)? else { return Ok(None) };
         let delta_m = base.own().delta_m;
         let mut search = Search {
@@ -363,20 +362,20 @@ impl Attack {
     fn result(&self) -> String {
         let flights = counted(self.flights, "flight", "flights");
         let delta = exact(self.about.delta_m);
-        let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
+        let Some(worst) = self.worst() else { return "no flight was flown: every candidate was refused".to_owned() };
         let closest = self.closest(worst);
         if self.violated > 0 {
             return format!("VIOLATION found: {closest} (delta {delta} m); {} of {flights} violated", self.violated);
         }
         if self.own.outcome == Outcome::Violated {
             return format!(
-                "VIOLATION in the scenario as it is; {flights} beside it found none: the worst came to {closest}"
+                "VIOLATION in the unchanged scenario; none in {flights} of the search: smallest separation {closest}"
             );
         }
         if self.ended_early + self.undecided >= self.flights {
-            return format!("nothing is known: of {flights} none was flown to its end and judged");
+            return format!("no result: none of {flights} ended with a verdict");
         }
-        format!("no violation found in {flights}: the worst came to {closest} (delta {delta} m)")
+        format!("no violation found in {flights}: smallest separation {closest} (delta {delta} m)")
     }
 
     /// Returns the closest approach of a candidate: separation, time and vehicles.
@@ -412,26 +411,25 @@ impl Study for Attack {
 
     fn notes(&self) -> Vec<String> {
         let flights = |count: u64| counted(count, "flight", "flights");
-        let flown = format!("of {} flights {} were flown", self.flights_asked, self.flights);
+        let flown = format!("{} of {} flights were flown", self.flights, self.flights_asked);
         let mut notes = Vec::new();
         let mut note = |is: bool, text: String| notes.extend(is.then_some(text));
         note(
             self.certificates_broken > 0,
             format!(
-                "DEFECT: in {} two came closer than the law's certificate promises; that is a defect of law, plant or step, \
-                 whatever delta says: please report it with the command below",
+                "DEFECT: in {} two vehicles came closer than certified, because of a defect of law, plant or step; \
+                 please report it with the command below",
                 flights(self.certificates_broken)
             ),
         );
         note(
             self.certified > 0 && self.certified == self.flights && self.certificates_broken == 0,
-            "every flight had a certificate of its law and kept it; a certificate, unlike a search, is a proof"
-                .to_owned(),
+            "every flight had a certificate and kept it; unlike the search, a certificate is a proof".to_owned(),
         );
         let worst = self.worst().map(|worst| &worst.flown);
         note(
             worst.is_some_and(|of| of.outcome == Outcome::Violated && of.clearance_m().is_some_and(|of| of >= 0.0)),
-            "the violation is of an obstacle's clearance; the search looks at separations of vehicles alone".to_owned(),
+            "the violation is of an obstacle's clearance; the search minimises separations of vehicles only".to_owned(),
         );
         note(self.interrupted, format!("interrupted: {flown}"));
         note(
@@ -443,21 +441,21 @@ impl Study for Attack {
         note(self.refused > 0, format!("{candidates} could not be flown and cost no flight{first}"));
         note(
             worst.is_some_and(|of| of.min_at_s == Some(0.0)),
-            "the worst is the distance of two starts; --apart keeps starts farther apart".to_owned(),
+            "the smallest separation is that of two starts; --apart keeps starts farther apart".to_owned(),
         );
         note(
             self.ended_early > 0,
             format!(
-                "{} ended early without a violation, and count with what the judge saw up to then",
+                "{} ended early without a violation, and count with their separation up to the end",
                 flights(self.ended_early)
             ),
         );
-        note(self.undecided > 0, format!("the judge cannot decide about {}", flights(self.undecided)));
+        note(self.undecided > 0, format!("{} undecided", flights(self.undecided)));
         notes
     }
 
     fn records(&self) -> Table {
-        let table = Table::of("Candidates that were each worse than all before", &self.progress)
+        let table = Table::of("Candidates that were worse than all before", &self.progress)
             .column("flight", "Flight", Kind::Count, |of| of.flight)
             .column("noise_seed", "", Kind::Integer, |of| of.flown.seed)
             .column("outcome", "Verdict", Kind::Text, |of| of.flown.outcome.name())
@@ -474,10 +472,10 @@ impl Study for Attack {
     fn sections(&self) -> Vec<Section> {
         let found = self.progress.iter().filter_map(|worst| Some((worst.flight, worst.flown.min_m?)));
         let chart = figure(&found.collect::<Vec<_>>(), self.flights, self.about.delta_m, self.own.min_m);
-        let own = ("as the scenario is", &self.own);
-        let worst = self.worst().map(|worst| ("the worst found", &worst.flown));
+        let own = ("unchanged scenario", &self.own);
+        let worst = self.worst().map(|worst| ("worst found", &worst.flown));
         let flights: Vec<_> = std::iter::once(own).chain(worst).collect();
-        let flights = Table::of("The scenario as it is, and the worst found", &flights)
+        let flights = Table::of("Unchanged scenario and worst flight found", &flights)
             .column("", "Flight", Kind::Text, |(what, _)| *what)
             .column("", "Separation [m]", Kind::AtLeast, |(_, flown)| flown.min_m)
             .column("", "Certified [m]", Kind::AtLeast, |(_, flown)| flown.certified_m)
@@ -485,7 +483,7 @@ impl Study for Attack {
             .build();
         let worst = |k: usize| self.worst().and_then(|worst| worst.values.get(k).copied());
         let bounds: Vec<_> = self.bounds.iter().enumerate().collect();
-        let bounds = Table::of("All else is as the scenario says", &bounds)
+        let bounds = Table::of("All other keys keep the values of the scenario", &bounds)
             .column("", "Key", Kind::Text, |(_, bound)| bound.key.clone())
             .column("", "Smallest", Kind::Exact, |(_, bound)| bound.low)
             .column("", "Largest", Kind::Exact, |(_, bound)| bound.high)
@@ -506,7 +504,7 @@ impl Study for Attack {
     }
 
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
-        let worst = self.worst().map(|_| ("Fly the worst again:".to_owned(), scenario.run_command(&self.sets)));
+        let worst = self.worst().map(|_| ("Repeat the worst flight:".to_owned(), scenario.run_command(&self.sets)));
         worst.into_iter().collect()
     }
 }

@@ -89,7 +89,7 @@ fn wrong(why: &str) -> Failure {
     Failure::input(
         "attack/variation",
         format!("--vary: {why}"),
-        "write a key that is a number and two different finite numbers, the smaller one first, as in --vary network.loss=0..0.3",
+        "write a numeric key and two finite numbers in increasing order, such as --vary network.loss=0..0.3",
     )
 }
 
@@ -112,8 +112,8 @@ impl SearchSpace {
         if seeds == 0 || flights < seeds {
             return Err(Failure::input(
                 "attack/too-few-flights",
-                format!("of {flights} flights none is left for a candidate that is flown with {seeds} seeds"),
-                "give --flights at least as many as --seeds",
+                format!("--flights: must be at least the {seeds} of --seeds, got {flights}"),
+                "give more flights or fewer seeds",
             ));
         }
         let mut space = Self { base: base.clone(), options: options.clone(), bounds: Vec::new() };
@@ -124,13 +124,13 @@ impl SearchSpace {
             is_random |= varied.is_random_in_flight();
             space.bounds.push(bound);
         }
-        let reaches = [("the start", start_m), ("the velocity at the start", velocity_m_s)];
-        for (what, by) in reaches.into_iter().filter_map(|(what, by)| Some((what, by?))) {
+        let reaches = [("--start", start_m), ("--velocity", velocity_m_s)];
+        for (option, by) in reaches.into_iter().filter_map(|(option, by)| Some((option, by?))) {
             if !(by.is_finite() && by > 0.0) {
                 return Err(Failure::input(
                     "attack/out-of-range",
-                    format!("{what} is to be varied by {by}"),
-                    "give --start metres and --velocity metres a second, each a positive finite number",
+                    format!("{option}: must be a finite number above 0, got {by}"),
+                    "give --start in metres and --velocity in metres per second",
                 ));
             }
         }
@@ -139,15 +139,15 @@ impl SearchSpace {
         if space.bounds.is_empty() {
             return Err(Failure::input(
                 "attack/nothing-varied",
-                "nothing is varied: the only flight to search is the scenario's own",
-                "say what may be varied: --start 1 moves every start by up to 1 m, --vary network.loss=0..0.3 a key",
+                "nothing is varied",
+                "vary starts, such as --start 1 (up to 1 m), or a key, such as --vary network.loss=0..0.3",
             ));
         }
         if seeds > 1 && !is_random {
             return Err(Failure::input(
                 "attack/nothing-random",
-                format!("nothing in the flight is random: with each of {seeds} seeds it is the same"),
-                "leave --seeds out, or give the scenario turbulence, noise of measurement, loss or jitter",
+                format!("--seeds: nothing in the flight is random, so all {seeds} seeds give the same flight"),
+                "leave --seeds out, or add turbulence, noise of measurement, loss or jitter to the scenario",
             ));
         }
         Ok(space)
@@ -196,7 +196,7 @@ impl SearchSpace {
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
-                    Err(format!("two vehicles start {near_m} m apart, nearer than the {apart_m} m that were asked for"))
+                    Err(format!("two vehicles start {near_m} m apart, less than --apart {apart_m} m"))
                 }
                 _ => Ok(scenario),
             }
@@ -219,15 +219,15 @@ impl SearchSpace {
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
-                format!("{key} is varied twice"),
+                format!("--vary: {key} is varied twice"),
                 "vary each key once; --start and --velocity vary the whole of [start]",
             ));
         }
         if key.rsplit('.').next() == Some("seed") {
             return Err(Failure::input(
                 "attack/seed-varied",
-                format!("{key} is a seed: varying a seed does not make a scenario harder"),
-                "leave it out; --seeds K flies each candidate with K seeds of noise",
+                format!("--vary: {key} is a seed, and varying a seed does not make a scenario harder"),
+                "leave the seed out; --seeds K flies each candidate with K seeds of noise",
             ));
         }
         Ok(())
@@ -237,16 +237,15 @@ impl SearchSpace {
     fn check_apart(&self) -> Result<(), Failure> {
         let Some(apart_m) = self.options.apart_m else { return Ok(()) };
         let (delta_m, own_m) = (self.base.own().delta_m, closest_start_m(self.base.own()));
-        let is_asked = apart_m.is_finite() && apart_m > delta_m && own_m >= apart_m;
-        if is_asked {
+        if apart_m.is_finite() && apart_m > delta_m && own_m >= apart_m {
             return Ok(());
         }
         Err(Failure::input(
             "attack/out-of-range",
             format!(
-                "starts are to be {apart_m} m apart, where delta is {delta_m} m and the scenario's own are {own_m} m apart"
+                "--apart: must be more than delta ({delta_m} m) and at most the scenario's own {own_m} m, got {apart_m}"
             ),
-            "give --apart a distance between the two, or leave it out",
+            "give a distance in this range, or leave --apart out",
         ))
     }
 

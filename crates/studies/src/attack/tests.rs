@@ -27,7 +27,7 @@ dt_s = 0.01
 record_hz = 10
 "#;
 
-fn asked(flights: u64) -> Options {
+fn start_options(flights: u64) -> Options {
     Options { start_m: Some(1.5), flights, ..Options::default() }
 }
 
@@ -90,7 +90,7 @@ fn a_search_without_a_violation_states_that_it_is_no_proof() {
     let attack = searched(&sets, &asked(40));
     assert_eq!((attack.violated, attack.certificates_broken), (0, 0));
     let said = attack.headline();
-    assert!(said.starts_with("no violation found in 40 flights: the worst came to 1."), "{said}");
+    assert!(said.starts_with("no violation found in 40 flights: smallest separation 1."), "{said}");
     assert!(said.contains("a search, not a proof"), "{said}");
     assert!(
         attack.certified == 40 && attack.notes().iter().any(|note| note.contains("certificate")),
@@ -107,9 +107,9 @@ fn a_search_without_a_violation_states_that_it_is_no_proof() {
 
 #[test]
 fn a_broken_certificate_comes_first_in_the_headline() {
-    let attack = searched(&["law.kind=displacement"], &asked(4));
+    let attack = searched(&["law.kind=displacement"], &start_options(4));
     let says_so = |attack: &Attack| {
-        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two came closer"));
+        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two vehicles came closer"));
         (attack.headline().starts_with("CERTIFICATE BROKEN, "), noted, attack.is_bad())
     };
     assert_eq!(says_so(&attack), (false, false, false));
@@ -147,11 +147,11 @@ fn starts_keep_the_separation_of_apart() {
     let (near_m, attack) = nearest(&Options { apart_m: Some(4.0), ..wide.clone() });
     assert!(near_m >= 4.0 && attack.refused > anywhere.refused, "{near_m}");
     let why = attack.first_refusal.expect("a reason");
-    assert!(why.contains("nearer than the 4 m"), "{why}");
+    assert!(why.contains("less than --apart 4 m"), "{why}");
     for apart_m in [1.0, 5.1, f64::NAN] {
         let refused =
             space(&sets, &Options { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
-        assert!(refused.contains("where delta is 1 m and the scenario's own are 5 m apart"), "{refused}");
+        assert!(refused.contains("must be more than delta (1 m) and at most the scenario's own 5 m"), "{refused}");
     }
 }
 
@@ -188,7 +188,7 @@ fn an_interrupted_search_has_a_note_or_no_answer() {
     let fly = |most: u64| {
         let monitor = InterruptAfter::new(most);
         let batch = Batch::new(Some(1), &monitor).expect("a batch");
-        asked(60).fly(&blind(&[]), &batch).expect("no failure")
+        start_options(60).fly(&blind(&[]), &batch).expect("no failure")
     };
     assert!(fly(0).is_none());
     let attack = fly(20 * 600).expect("flights");
@@ -201,10 +201,14 @@ fn wrong_options_are_refused() {
     let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
     let start = || asked(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
-    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("the start is to be varied by 0"));
+    assert!(
+        refused(Options { start_m: Some(0.0), ..start() }).contains("--start: must be a finite number above 0, got 0")
+    );
     assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(refused(Options { flights: 0, ..start() }).contains("of 0 flights none is left"));
-    assert!(refused(Options { seeds: 11, ..start() }).contains("of 10 flights none is left"));
+    assert!(refused(Options { flights: 0, ..start() }).contains("--flights: must be at least the 1 of --seeds, got 0"));
+    assert!(
+        refused(Options { seeds: 11, ..start() }).contains("--flights: must be at least the 11 of --seeds, got 10")
+    );
     assert!(refused(Options { seeds: 2, ..start() }).contains("nothing in the flight is random"));
     assert!(refused(varied(&["law.f1=0..1"], 10)).contains("f1"));
     assert!(refused(varied(&["law.kind=0..1"], 10)).contains("law.kind = 0"));

@@ -112,11 +112,11 @@ impl Campaign {
         let first = campaign.first();
         if first != campaign.manifest.first {
             let problem = format!(
-                "run 0 is another flight here than where the campaign was planned (SHA-256 {} here, {} there)",
+                "run 0 differs from the planned campaign (SHA-256 {} here, {} in the manifest)",
                 first.join(", "),
                 campaign.manifest.first.join(", ")
             );
-            let remedy = "provide the same files of the scenario everywhere";
+            let remedy = "use the same files of the scenario on all machines";
             return Err(other_campaign(&campaign.manifest.folder, problem, remedy));
         }
         Ok(campaign)
@@ -183,8 +183,8 @@ impl Campaign {
         let runs = self.manifest.runs;
         if runs > 1 && self.splitting.is_none() && self.runs_are_equal() {
             let problem = format!("runs: all {runs} runs are the same flight");
-            let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], or \
-                          give the scenario a random start or wind";
+            let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in \
+                          [vary], or give the scenario a random start or wind";
             return Err(spec.refuse("runs", problem, remedy));
         }
         for law in &self.laws {

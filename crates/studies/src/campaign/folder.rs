@@ -295,8 +295,8 @@ pub(super) fn different_results(shard: u64, kept: &Path, other: &Path) -> Failur
 }
 
 /// Remedy for a flight with different bits on two machines.
-pub(super) const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine, or a machine with another \
-                                 program; remove the wrong part to continue";
+pub(super) const FAULTY: &str = "equal flights have equal bits on all machines: look for a faulty machine, or one with \
+                                 another program; remove the wrong part to continue";
 
 /// Kind of the file with the rows of a process that is running or was killed.
 pub(super) const JOURNAL: &str = "journal";
@@ -478,7 +478,7 @@ impl Manifest {
             );
             return foreign(
                 &problem,
-                "use the same program everywhere, or plan the campaign again into another folder",
+                "use the same program on all machines, or plan the campaign again into another folder",
             );
         }
         Ok(read)
@@ -504,7 +504,7 @@ pub(super) fn cannot(what: &'static str, path: &Path) -> impl FnOnce(std::io::Er
     let path = path.display();
     move |error| {
         Failure::machine("files/cannot-access", format!("{path}: cannot {what} the file: {error}"))
-            .with_help("free some space or mend access, and start again: finished flights are kept")
+            .with_help("free some space or correct the permissions, and start again: finished flights are kept")
     }
 }
 

@@ -55,7 +55,7 @@ impl WorstFlight {
         let mut blocks = Vec::new();
         let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
         if flights.is_empty() {
-            blocks.push(page::list(&["There are none."]));
+            blocks.push(page::list(&["None."]));
         }
         blocks.push(page::pictures(&pictures));
         for flight in flights {
@@ -92,7 +92,7 @@ impl FlightId<'_> {
 
     /// Returns a description of the flight.
     fn words(self) -> String {
-        let bad = self.bad.map_or_else(String::new, |bad| format!("bad flight {bad} of "));
+        let bad = self.bad.map_or_else(String::new, |bad| format!("violated flight {bad} of "));
         format!("{bad}run {} under {}", self.run, self.law.name)
     }
 
@@ -112,10 +112,7 @@ impl FlightId<'_> {
         if found == expected {
             return Ok(());
         }
-        let problem = format!(
-            "{}: flown again it has the state hash {found}, and in the campaign it had {expected}",
-            self.words()
-        );
+        let problem = format!("{}: the replay has the state hash {found}, the campaign {expected}", self.words());
         Err(Failure::machine("campaign/other-bits", problem).with_help(FAULTY))
     }
 
@@ -174,7 +171,7 @@ pub fn replay(
             check(flight, &left, &row.state_hash)?;
             monitor.say(&format!("state hash {}, as in the campaign", row.state_hash));
         }
-        None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
+        None => monitor.warn("note: the campaign has not flown this run, so its state hash is not compared"),
     }
     Ok(left.report.verdict.pass)
 }
@@ -204,7 +201,7 @@ pub(super) fn fly_worst_again(
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     for (law, worst) in worst.into_iter().take(most) {
         if monitor.is_interrupted() {
-            monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
+            monitor.warn("interrupted: flights that were not repeated have no recordings on the page");
             break;
         }
         let flight = FlightId { law, run: worst.run, bad: None };
@@ -226,7 +223,8 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
     let said = format!(
-        "Bad flight {number} of run {run} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
+        "Violated flight {number} of run {run} under {}: {} m below delta in step {}. To repeat it, in the folder of \
+         this page:",
         law.name,
         metres(-bad.clearance_m),
         bad.violated_at_step
@@ -248,7 +246,7 @@ fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Res
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
         let problem = format!("--bad: the campaign has no {}", flight.words());
-        let remedy = format!("{} are kept of this run, counted from 0", kept.len());
+        let remedy = format!("this run has {} kept flights, counted from 0", kept.len());
         return Err(Failure::input("campaign/no-flight", problem, remedy));
     };
     let scenario = flight.scenario(folder.campaign())?;

@@ -65,7 +65,7 @@ impl CampaignRequest {
             Failure::input(
                 "campaign/cannot-read",
                 format!("cannot read {shown}: {error}"),
-                "give the path of a specification, as docs/campaigns.md shows one",
+                "give the path of a specification; docs/campaigns.md has an example",
             )
         })?;
         let mut spec = Spec::read(&shown, &text)?;
@@ -147,7 +147,7 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
     for &shard in shards {
         let Some(Shard { rows, flown }) = fly_shard(folder, shard, &batch, monitor)? else { return Ok(false) };
         monitor.say(&match flown {
-            0 => format!("shard {shard}: {} flights had been flown", rows.len()),
+            0 => format!("shard {shard}: {} flights were finished before", rows.len()),
             flown => format!("shard {shard}: {flown} flights flown"),
         });
     }
@@ -161,9 +161,8 @@ fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monit
     let flown = folder.fly(shard, batch)?;
     if flown.is_none() {
         monitor.finish();
-        monitor.warn(&format!(
-            "interrupted in shard {shard}: what was flown is kept, and the same command goes on from there"
-        ));
+        monitor
+            .warn(&format!("interrupted in shard {shard}: finished flights are kept, and the same command continues"));
     }
     Ok(flown)
 }
@@ -183,7 +182,7 @@ pub fn missing_shards(folder: &Folder, monitor: &dyn Monitor) -> Result<Vec<u64>
 /// Warns of a damaged part, whose shard is flown again.
 fn warn_of_damage(shard: u64, damage: Option<&str>, monitor: &dyn Monitor) {
     if let Some(damage) = damage {
-        monitor.warn(&format!("{damage}; shard {shard} is to be flown again, which replaces it"));
+        monitor.warn(&format!("{damage}; flying shard {shard} again replaces it"));
     }
 }
 

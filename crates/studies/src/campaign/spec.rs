@@ -17,8 +17,9 @@ use tautline_sim::scenario::{Place, ScenarioError};
 /// Source of overrides in errors of a scenario.
 const SET: &str = "--set";
 /// Forms of a variation.
-const VARIATIONS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, { normal = [mean, deviation] }, \
-                          { integer = [low, high] }, { list = [...] }, { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
+const VARIATIONS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, \
+                          { normal = [mean, deviation] }, { integer = [low, high] }, { list = [...] }, \
+                          { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
 
 /// Names of distributions. A table in `[vary]` with one of these keys is a variation; any other table holds scenario
 /// keys.
@@ -35,7 +36,7 @@ pub struct Spec {
     /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
-    /// Laws, each of which flies every run; by default the scenario's own.
+    /// Laws that fly every run; by default the scenario's own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub laws: Vec<String>,
     /// Scenario keys with the same value in every run.
@@ -76,7 +77,7 @@ pub enum Method {
 }
 
 impl Method {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
     fn is_flights(&self) -> bool {
         *self == Self::Flights
     }
@@ -344,8 +345,8 @@ mod tests {
 
     #[test]
     fn a_key_or_else_its_table_is_found_in_any_notation() {
-        const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = 1\nlaw.alpha = { unifrom = [0, 1] }\n\
-                            [vary.network]\n  loss = 2\n[stop]\nwidth = 3\n";
+        const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = 1\n\
+                            law.alpha = { unifrom = [0, 1] }\n[vary.network]\n  loss = 2\n[stop]\nwidth = 3\n";
         let spec = Spec::read("spec.toml", KEYS).expect("read");
         let at = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
         assert_eq!(at("runs"), Some((2, 1)));

@@ -29,7 +29,7 @@ fn an_interrupted_comparison_keeps_complete_starts() {
     assert_eq!((found.runs, found.runs_asked), (1, 3));
     assert!(found.laws.iter().all(|law| law.flights.len() == 1 && law.flights[0].seed == 3));
     assert!(found.laws.iter().all(|law| law.flights[0].steps == 360), "whole flights");
-    assert!(found.notes()[0].starts_with("interrupted: of 3 starts, 1 were flown"), "{:?}", found.notes());
+    assert!(found.notes()[0].starts_with("interrupted: the comparison has 1 of 3 starts"), "{:?}", found.notes());
     assert!(interrupted_after(100, 1).is_none());
     // Two threads, each with a law of the second start: a law that has finished the start keeps it.
     let paired = interrupted_after(360 * 3 + 200, 2).expect("a comparison");

@@ -67,8 +67,8 @@ impl Settings {
 fn warning(flights: u64) -> Option<String> {
     (flights < ENOUGH as u64).then(|| {
         format!(
-            "{flights} flights at a time are few: where the event is rare, most estimates end at 0 and a few far above the truth, \
-             so that their mean is right only over very many of them; take {ENOUGH} or more"
+            "{flights} flights at a time are few: for a rare event most estimates are 0, and their mean is \
+             unreliable; take {ENOUGH} or more"
         )
     })
 }
@@ -103,8 +103,10 @@ pub struct Splitting {
 /// its end.
 ///
 /// The result depends only on the scenario, the settings, `seed` and `repetition`. `carry_on` is called after each step
-/// with the number of all steps; if it breaks, the result is `None`. Memory holds at most ten states of each flight
-/// ([`Saved`]), each 30 kB for 3 vehicles and 0.3 MB for 100: 100 flights of 100 vehicles take 0.3 GB.
+/// with the number of all steps; if it breaks, the result is `None`.
+///
+/// Memory holds at most ten states of each flight ([`Saved`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
+/// flights of 100 vehicles take 0.3 GB.
 ///
 /// # Errors
 /// [`Failure`] for wrong settings, for a scenario without noise from step to step, and for a law or a judge that cannot
@@ -136,9 +138,9 @@ pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), Failure> {
     }
     Err(Failure::input(
         "campaign/splitting",
-        "nothing in this flight is random from step to step, and splitting needs two flights from one state to differ",
-        "add turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses or jitter of \
-         messages (network.loss, network.jitter_s)",
+        "nothing in this flight is random from step to step, as splitting requires",
+        "add turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses \
+         or jitter of messages (network.loss, network.jitter_s)",
     ))
 }
 
@@ -320,14 +322,14 @@ impl Repetitions {
         let mut advice: Vec<_> = fewest.and_then(warning).into_iter().collect();
         if extinct > 0 {
             advice.push(format!(
-                "{extinct} of {} estimates ended with no flight left, at 0: {}; fly more at a time",
+                "{extinct} of {} estimates ended without a survivor, at 0: {}; fly more at a time",
                 estimates.len(),
-                if all_extinct { "there is no upper bound" } else { "the mean rests on the others" }
+                if all_extinct { "there is no upper bound" } else { "the mean comes from the others" }
             ));
         }
         if estimates.len() < MANY {
             advice.push(format!(
-                "the interval of {} estimates is that of normal values, which estimates are not; {MANY} or more make it near that",
+                "the interval assumes normal values, which {} estimates do not justify; take {MANY} or more",
                 estimates.len()
             ));
         }

@@ -14,8 +14,8 @@ fn windy(law: &str, speed_m_s: f64, more: &str) -> Scenario {
     let text = format!(
         "[start]\npositions_m = [[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]]\n[formation]\nshape = \"line\"\nspacing_m = 3.0\n\
          [law]\nkind = \"{law}\"\ndelta_m = 2.0\n[vehicle]\ndrag_per_s = 0.5\n\
-         [wind]\nmean_m_s = [2.0, 0.0]\nshared = false\ndryden = {{ speed_20ft_m_s = {speed_m_s:.1}, height_m = 10.0 }}\n\
-         [time]\nduration_s = 3.0\n{more}"
+         [wind]\nmean_m_s = [2.0, 0.0]\nshared = false\n\
+         dryden = {{ speed_20ft_m_s = {speed_m_s:.1}, height_m = 10.0 }}\n[time]\nduration_s = 3.0\n{more}"
     );
     let mut scenario = Scenario::read(&Source::Text { name: "windy".to_owned(), text }, &[]).expect("a scenario");
     (scenario.time.dt_s, scenario.time.record_hz) = (0.04, 25.0);
@@ -23,7 +23,8 @@ fn windy(law: &str, speed_m_s: f64, more: &str) -> Scenario {
 }
 
 /// Errors of measurement, constant errors included.
-const SENSING: &str = "[sensing]\nposition_noise_m = 0.1\nposition_bias_m = 0.1\nvelocity_noise_m_s = 0.1\nrate_hz = 5.0\nlatency_s = 0.1\n";
+const SENSING: &str = "[sensing]\nposition_noise_m = 0.1\nposition_bias_m = 0.1\nvelocity_noise_m_s = 0.1\n\
+                       rate_hz = 5.0\nlatency_s = 0.1\n";
 
 /// Losses and delays of messages.
 const NETWORK: &str = "[network]\nloss = 0.2\nloss_burst = 2.0\njitter_s = 0.05\nlatency_s = 0.02\nrate_hz = 10.0\n";
@@ -35,7 +36,7 @@ fn all_random() -> Scenario {
 
 fn split(scenario: &Scenario, settings: &Settings, repetition: u64) -> Splitting {
     let split = estimate(scenario, settings, [7, repetition], &mut |_| ControlFlow::Continue(()));
-    split.expect("an estimate").expect("nobody ends it")
+    split.expect("an estimate").expect("no interruption")
 }
 
 /// Returns whether a flight with this noise violates delta, and the clearance of an obstacle. Asserts that the score of
@@ -71,8 +72,8 @@ fn splitting_agrees_with_plain_flights() {
     let squares = estimates.iter().map(|estimate| (estimate.probability - mean).powi(2)).sum::<f64>();
     let variance = squares / (repetitions - 1) as f64 / repetitions as f64;
     let error = (variance + share * (1.0 - share) / runs as f64).sqrt();
-    assert!(estimates.iter().all(|estimate| estimate.iterations > 0), "some are ended in each");
-    assert!((0.02..0.2).contains(&share) && 4.0 * error < share, "the check can tell it from nothing");
+    assert!(estimates.iter().all(|estimate| estimate.iterations > 0), "each estimate ends flights");
+    assert!((0.02..0.2).contains(&share) && 4.0 * error < share, "the share is significant");
     assert!((mean - share).abs() < 3.0 * error, "{mean} for {share}, {error}");
 }
 

@@ -91,12 +91,13 @@ pub struct Paired {
 }
 
 impl Paired {
-    /// Returns the statistics of `of` pairs. More discordant pairs than `of` are reduced to `of`.
+    /// Returns the statistics of `of` pairs. An `of` below the number of discordant pairs is raised to it.
     ///
     /// The difference of the two probabilities is psi (2 theta - 1): psi is the probability of a discordant pair, theta
-    /// that of one that favours the first. The interval is conservative. The intervals of Clopper and Pearson at 1 -
-    /// alpha/2 for psi (of all pairs) and theta (of the discordant pairs, given their number) hold together with a
-    /// probability of at least 1 - alpha (Bonferroni). The bounds are the smallest and the largest product within them.
+    /// that of one that favours the first. The interval is conservative: psi (of all pairs) and theta (of the
+    /// discordant pairs, given their number) have the intervals of Clopper and Pearson at 1 - alpha/2. Both hold
+    /// together with a probability of at least 1 - alpha (Bonferroni). The bounds are the smallest and the largest
+    /// product within them.
     #[must_use]
     pub fn new(only_first: u64, only_second: u64, of: u64) -> Self {
         let discordant = only_first.saturating_add(only_second);

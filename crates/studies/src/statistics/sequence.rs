@@ -10,8 +10,10 @@ const PRIOR: f64 = 0.5;
 /// Number of runs of the first look; each further look has twice the number.
 const FIRST_LOOK: u64 = 100;
 
-/// Returns `count` of the first `of` runs with an interval of a confidence sequence: with probability [`CONFIDENCE`],
-/// the true share is in the intervals of all numbers of runs at once, whenever and why the campaign stops.
+/// Returns `count` of the first `of` runs with an interval of a confidence sequence.
+///
+/// With probability [`CONFIDENCE`] the intervals of all numbers of runs contain the true share at once, for any rule by
+/// which the campaign stops.
 ///
 /// The sequence is the beta mixture (Robbins, Annals of Mathematical Statistics 41, 1970):
 ///

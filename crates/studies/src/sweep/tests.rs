@@ -36,9 +36,9 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=0:1:0", "the count `0`"),
         ("law.alpha=0:1:2.5", "the count `2.5`"),
         ("law.alpha=0:1:999999", "the count `999999`"),
-        ("law.alpha=1:1:3", "3 values from 1 to 1"),
-        ("law.alpha=0:1:1", "1 values from 0 to 1"),
-        ("law.alpha=0:inf:3", "3 values from 0 to inf"),
+        ("law.alpha=1:1:3", "got 3 from 1 to 1"),
+        ("law.alpha=0:1:1", "got 1 from 0 to 1"),
+        ("law.alpha=0:inf:3", "got 3 from 0 to inf"),
         ("law.alpha=0,inf", "is not finite"),
         ("law.alpha=nan,1", "NaN is not finite"),
         ("law.alpha=1,2,1", "1 is given twice"),
@@ -146,5 +146,5 @@ fn an_interrupted_sweep_keeps_the_flown_points() {
     let steps = base(pair(), &[]).own().time.steps();
     let sweep = fly(3 * steps).expect("a point");
     assert!(sweep.interrupted && !sweep.is_good() && sweep.points.len() == 1, "{}", sweep.points.len());
-    assert_eq!(sweep.notes()[0], "interrupted: of 3 points 1 were flown");
+    assert_eq!(sweep.notes()[0], "interrupted: 1 of 3 points were flown");
 }

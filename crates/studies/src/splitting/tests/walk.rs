@@ -55,7 +55,7 @@ impl Walk {
             Sight::Height => self.place,
             Sight::Grains(grain) => (self.place / grain).floor() * grain,
             Sight::Chance(height) if self.place > height => self.place - height,
-            // A walk in discrete time exceeds `height` about as often as one in continuous time exceeds `height + 0.58`.
+            // A walk in discrete time exceeds `height` as often as one in continuous time exceeds `height + 0.58`.
             Sight::Chance(height) => -(height - self.place + 0.58) / f64::from(STEPS - self.steps).sqrt(),
         };
         self.highest = self.highest.max(seen);
@@ -117,8 +117,10 @@ fn gauss(count: u32) -> Vec<[f64; 2]> {
     (0..count).map(root).collect()
 }
 
-/// Returns the probability that the walk exceeds `height` at one of its steps, by recursion over the density of the
-/// walks that have not yet exceeded it: on panels of length 1 from `height` down to -`depth`, with `places` nodes each.
+/// Returns the probability that the walk exceeds `height` at one of its steps.
+///
+/// The recursion is over the density of the walks that have not yet exceeded `height`, on panels of length 1 from
+/// `height` down to -`depth` with `places` nodes each.
 fn above(height: f64, depth: f64, places: u32) -> f64 {
     /// Reach of a step in panels; a longer step has a probability of 2e-33.
     const REACH: u32 = 13;
@@ -158,7 +160,7 @@ fn estimates(walk: &Walk, rule: Rule, repetitions: u64) -> Vec<f64> {
     let mut walk = walk.clone();
     let one = |repetition: u64| {
         let Ok(split) = split(&mut walk, rule, [2016, repetition], &mut |_| ControlFlow::Continue(()));
-        let split = split.expect("nobody ends it");
+        let split = split.expect("no interruption");
         assert_eq!(split.extinct, split.probability == 0.0);
         split.probability
     };
@@ -202,7 +204,7 @@ const HEIGHT_1E6: f64 = 68.5;
 const HEIGHT_1E9: f64 = 85.5;
 
 /// Describes the mean relative to the truth, its standard error, and the difference in standard errors.
-fn told(estimates: &[f64], truth: f64) -> String {
+fn described(estimates: &[f64], truth: f64) -> String {
     let mean = estimates.iter().sum::<f64>() / estimates.len() as f64;
     let off = errors_above(estimates, truth);
     format!(
@@ -218,11 +220,11 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
         let truth = above(height, 45.0, 6);
         assert!((0.5..2.0).contains(&(truth / near)), "{truth}");
         let estimates = estimates(&Walk::new(Sight::Chance(height)), Rule::new(100, 1, 0.0), repetitions());
-        assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
+        assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
         // The formula of continuous time is 20 % and 25 % too high, and the same check detects it.
         let reflected = reflected(height);
         assert!((1.19..1.27).contains(&(reflected / truth)), "{}", reflected / truth);
-        assert!(errors_above(&estimates, reflected) < -3.0, "{}", told(&estimates, reflected));
+        assert!(errors_above(&estimates, reflected) < -3.0, "{}", described(&estimates, reflected));
     }
 }
 
@@ -233,7 +235,7 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
 fn estimates_by_height_alone_have_no_bias_and_a_larger_spread() {
     let truth = above(HEIGHT_1E6, 45.0, 6);
     let estimates = estimates(&Walk::new(Sight::Height), Rule::new(400, 20, HEIGHT_1E6), repetitions() / 4);
-    assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
+    assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
 }
 
 /// With integer heights many walks have equal scores.
