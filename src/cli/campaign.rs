@@ -20,25 +20,25 @@ Exit codes: 0 no violation (`missing`: no missing shard); 1 violations, unknown 
 3 failure of the machine. See docs/campaigns.md for all causes.")]
 pub(super) struct CampaignArguments {
     #[command(subcommand)]
-    what: What,
+    command: CampaignCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum CampaignCommand {
     /// Fly a whole campaign on this machine, merge and report it; a repeated call continues an interrupted campaign.
-    Run(RunCampaign),
+    Run(RunArguments),
     /// Split a campaign into shards that several machines can fly.
-    Plan(PlanCampaign),
+    Plan(PlanArguments),
     /// Fly one or several shards.
-    Shard(ShardCampaign),
+    Shard(ShardArguments),
     /// Print the missing shards as a list for --shard; exits with 0 if none is missing.
-    Missing(InFolder),
+    Missing(FolderArguments),
     /// Merge all parts into results.parquet, campaign.json and campaign.html.
-    Merge(Answered),
+    Merge(AnswerArguments),
     /// Print the answer of a merged campaign and rewrite its page.
-    Report(Answered),
+    Report(AnswerArguments),
     /// Repeat one flight with recording and pictures, and compare its state hash.
-    Replay(Replay),
+    Replay(ReplayArguments),
 }
 
 /// Specification with the rule for an early stop.
@@ -56,7 +56,7 @@ struct SpecArguments {
 }
 
 #[derive(Debug, Args)]
-struct RunCampaign {
+struct RunArguments {
     #[command(flatten)]
     spec: SpecArguments,
     /// Folder of the campaign [default: out/NAME with the name of the specification].
@@ -69,11 +69,11 @@ struct RunCampaign {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     #[command(flatten)]
-    says: Says,
+    answer: AnswerOptions,
 }
 
 #[derive(Debug, Args)]
-struct PlanCampaign {
+struct PlanArguments {
     #[command(flatten)]
     spec: SpecArguments,
     /// Folder of the campaign.
@@ -85,9 +85,9 @@ struct PlanCampaign {
 }
 
 #[derive(Debug, Args)]
-struct ShardCampaign {
+struct ShardArguments {
     #[command(flatten)]
-    folder: InFolder,
+    folder: FolderArguments,
     /// Shards to fly, from 0: 7, 3-5, 13,500-502, or env:NAME for a list in an environment variable, such as
     /// `env:SLURM_ARRAY_TASK_ID`.
     #[arg(long, value_name = "K|A-B|env:NAME")]
@@ -101,23 +101,23 @@ struct ShardCampaign {
 }
 
 #[derive(Debug, Args)]
-struct InFolder {
+struct FolderArguments {
     /// Folder of the campaign, or its manifest.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
 
 #[derive(Debug, Args)]
-struct Answered {
+struct AnswerArguments {
     #[command(flatten)]
-    folder: InFolder,
+    folder: FolderArguments,
     #[command(flatten)]
-    says: Says,
+    answer: AnswerOptions,
 }
 
 /// Form of an answer.
 #[derive(Debug, Args)]
-struct Says {
+struct AnswerOptions {
     /// Number of flights with the least clearance to repeat, each with recording, report and pictures.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
@@ -133,9 +133,9 @@ struct Says {
 }
 
 #[derive(Debug, Args)]
-struct Replay {
+struct ReplayArguments {
     #[command(flatten)]
-    folder: InFolder,
+    folder: FolderArguments,
     /// Number of the run, from 0.
     #[arg(long, value_name = "I")]
     run: u64,
@@ -154,18 +154,18 @@ struct Replay {
 }
 
 pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
-    match &arguments.what {
-        What::Run(run) => {
+    match &arguments.command {
+        CampaignCommand::Run(run) => {
             let request = CampaignRequest {
                 out: run.out.clone(),
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
-                worst: run.says.worst.into(),
+                worst: run.answer.worst.into(),
                 ..run.spec.request()
             };
-            run.says.answer(|monitor| study::campaign(&request, &*run.says.pictures(), monitor))
+            run.answer.run(|monitor| study::campaign(&request, &*run.answer.pictures(), monitor))
         }
-        What::Plan(plan) => {
+        CampaignCommand::Plan(plan) => {
             let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
@@ -181,27 +181,27 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
             ));
             Ok(Exit::Good)
         }
-        What::Shard(shard) => {
+        CampaignCommand::Shard(shard) => {
             let folder = shard.folder.open()?;
             let shards = parse(&shard.shard, folder.campaign().manifest().shards)?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: shard.quiet })?;
             Ok(Exit::good_if(study::fly_shards(&folder, &shards, shard.threads.into(), &monitor)?))
         }
-        What::Missing(at) => {
+        CampaignCommand::Missing(at) => {
             let monitor = Terminal::without_signals(Console { data_on_stdout: true, quiet: false });
             let missing = study::missing_shards(&at.open()?, &monitor)?;
             console::data(&if missing.is_empty() { String::new() } else { listed(&missing) + "\n" })?;
             Ok(Exit::good_if(missing.is_empty()))
         }
-        What::Merge(Answered { folder, says }) => {
+        CampaignCommand::Merge(AnswerArguments { folder, answer }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::merge(&folder, says.worst.into(), &*says.pictures(), monitor))
+            answer.run(|monitor| study::merge(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
-        What::Report(Answered { folder, says }) => {
+        CampaignCommand::Report(AnswerArguments { folder, answer }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::report(&folder, says.worst.into(), &*says.pictures(), monitor))
+            answer.run(|monitor| study::report(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
-        What::Replay(replay) => {
+        CampaignCommand::Replay(replay) => {
             let request =
                 ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
             let folder = replay.folder.open()?;
@@ -221,22 +221,19 @@ impl SpecArguments {
     }
 }
 
-impl InFolder {
+impl FolderArguments {
     fn open(&self) -> Result<Folder, Failure> {
         Ok(Folder::open(&self.folder, &Program::running()?)?)
     }
 }
 
-impl Says {
+impl AnswerOptions {
     fn pictures(&self) -> Box<dyn Pictures> {
         pictures("best", !self.no_snapshots)
     }
 
     /// Answers a request, and prints the answer as JSON with `--json`.
-    fn answer(
-        &self,
-        request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>,
-    ) -> Result<Exit, Failure> {
+    fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>) -> Result<Exit, Failure> {
         let monitor = Terminal::new(Console { data_on_stdout: self.json, quiet: self.quiet })?;
         let Some(CampaignAnswer { summary, .. }) = request(&monitor)? else { return Ok(Exit::Bad) };
         if self.json {

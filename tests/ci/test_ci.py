@@ -1,8 +1,9 @@
-"""What other people's continuous integration is given: the archives, the installer, the action, the hook.
+"""Tests of the release archives, the installer, the action and the hook for continuous integration.
 
-    python -m unittest discover --start-directory tests/ci
+Command: `python -m unittest discover --start-directory tests/ci`.
 
-The action's steps are run as a runner runs them, with archives in a folder. TAUTLINE names the program [target/debug/tautline].
+The steps of the action run as on a runner, with archives in a folder. The environment variable TAUTLINE names the
+program; the default is target/debug/tautline.
 """
 
 import json
@@ -44,7 +45,7 @@ class InFolder(unittest.TestCase):
         file.write_text(text)
 
     def pack(self):
-        """An archive of the program in the test's own folder, packed once for all."""
+        """Returns an archive of the program in the folder of the test; it is packed once for all tests."""
         if not list(PACKED.glob("*.tar.gz")):
             done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, PACKED, folder=self.folder)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -57,14 +58,14 @@ class InFolder(unittest.TestCase):
 
 
 class Archives(InFolder):
-    def test_what_is_packed_is_installed_and_runs(self):
+    def test_an_archive_is_installed_and_runs(self):
         self.pack()
         done = self.install()
         self.assertEqual(done.returncode, 0, done.stderr)
         said = run(self.folder / "bin/tautline", "--version", folder=self.folder).stdout
         self.assertEqual(said, f"tautline {VERSION}\n")
 
-    def test_an_archive_that_is_not_what_its_checksum_says_is_not_installed(self):
+    def test_an_archive_with_a_wrong_checksum_is_not_installed(self):
         with self.pack().open("ab") as archive:
             archive.write(b"x")
         done = self.install()
@@ -72,7 +73,7 @@ class Archives(InFolder):
         self.assertIn("not what its checksum says", done.stderr)
         self.assertFalse((self.folder / "bin").exists())
 
-    def test_a_checksum_of_another_file_is_none_of_the_archive(self):
+    def test_a_checksum_of_another_file_is_refused(self):
         archive = self.pack()
         nothing = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855  /dev/null\n"
         archive.with_name(archive.name + ".sha256").write_text(nothing)
@@ -89,13 +90,13 @@ class Archives(InFolder):
         self.assertEqual(done.returncode, 3)
         self.assertIn("has no tautline", done.stderr)
 
-    def test_an_archive_that_is_not_there_is_named(self):
+    def test_a_missing_archive_is_named(self):
         (self.folder / "dist").mkdir()
         done = self.install()
         self.assertEqual(done.returncode, 3)
         self.assertIn(f"tautline-{VERSION}-{TARGET}.tar.gz", done.stderr)
 
-    def test_binstall_and_the_installer_look_for_the_same_archive(self):
+    def test_binstall_and_the_installer_use_the_same_archive(self):
         text = (ROOT / "Cargo.toml").read_text()
         url = re.search(r'^pkg-url = "(.*)"', text, re.MULTILINE).group(1)
         named = url.rsplit("/", 1)[1].replace("{ version }", VERSION).replace("{ target }", TARGET)
@@ -108,7 +109,7 @@ class Archives(InFolder):
 
 
 class Action(InFolder):
-    """The composite action, with what a runner would put in the place of its expressions."""
+    """The composite action, with the values of its expressions on a runner."""
 
     def act(self, **inputs):
         action = yaml.safe_load((ROOT / "action.yml").read_text())
@@ -141,7 +142,7 @@ class Action(InFolder):
     def releases(self):
         return self.pack().parent.as_uri()
 
-    def test_recordings_are_judged_summed_up_and_marked(self):
+    def test_recordings_have_verdicts_a_summary_and_annotations(self):
         self.write("flights/a.csv", CLEAR)
         self.write("flights/b.csv", CROSSING)
         code, said = self.act(recordings="flights/*.csv", arguments="--delta 1.5", releases=self.releases())
@@ -152,33 +153,33 @@ class Action(InFolder):
         self.assertEqual(summary.count("<details"), 2)
         self.assertIn("VIOLATION", summary)
 
-    def test_settings_beside_the_data_are_asked(self):
+    def test_settings_beside_the_data_apply(self):
         self.write("flights/a.csv", CLEAR)
         self.write("tautline.toml", "[audit]\ndelta_m = 1.5\n[audit.limits]\nspeed_m_s = 0.5\n")
         code, said = self.act(recordings="flights/a.csv", releases=self.releases())
         self.assertEqual(code, 1, said)
         self.assertIn("speed of a was 1.000 m/s", said)
 
-    def test_what_is_given_is_never_run(self):
+    def test_inputs_are_never_executed(self):
         self.write("a.csv", CLEAR)
         hostile = "a.csv;touch${IFS}ran $(touch ran) `touch ran`"
         code, _ = self.act(recordings=hostile, arguments="--delta 1.5 $(touch ran)", releases=self.releases())
         self.assertEqual(code, 2)
         self.assertFalse((self.folder / "ran").exists())
 
-    def test_no_recording_is_no_success(self):
+    def test_a_missing_recording_fails(self):
         code, said = self.act(recordings="flights/*.csv", releases=self.releases())
         self.assertEqual(code, 2)
         self.assertIn("there is no recording flights/*.csv", said)
         self.write("a.csv", CLEAR)
         code, said = self.act(recordings="a.csv shows/*.skyc", arguments="--delta 1.5", releases=self.releases())
-        self.assertEqual(code, 2, "what nobody looked at is not clear")
+        self.assertEqual(code, 2, "a missing recording is not clear")
         code, said = self.act(recordings=" ", releases=self.releases())
         self.assertEqual(code, 2)
 
 
 class Hook(InFolder):
-    def test_the_manifest_is_one_and_its_entry_judges_files(self):
+    def test_the_manifest_is_valid_and_its_hook_judges_files(self):
         pre_commit = [sys.executable, "-m", "pre_commit"]
         done = run(*pre_commit, "validate-manifest", ROOT / ".pre-commit-hooks.yaml", folder=self.folder)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
@@ -195,21 +196,22 @@ class Hook(InFolder):
 
 
 class Workflows(unittest.TestCase):
-    def test_they_parse_and_what_they_call_is_there(self):
+    def test_workflows_parse_and_their_files_exist(self):
         for file in sorted((ROOT / ".github/workflows").glob("*.yml")):
             workflow = yaml.safe_load(file.read_text())
             self.assertTrue(workflow["jobs"], file)
             for called in re.findall(r"(?:sh |run: )((?:source/)?\.\w+/\S+)", file.read_text()):
                 self.assertTrue((ROOT / called.removeprefix("source/")).is_file(), f"{file.name} calls {called}")
 
-    def test_what_is_released_is_what_is_installed(self):
+    def test_released_targets_are_those_of_the_installer(self):
         release = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
         targets = {of["target"] for of in release["jobs"]["program"]["strategy"]["matrix"]["include"]}
         script = (ROOT / ".github/install.sh").read_text()
         systems = re.findall(r"system=(\S+)", script)
         asked = {f"{machine}-{system}" for system in systems for machine in re.findall(r"machine=(\w+)", script)}
         self.assertLessEqual(targets, asked)
-        self.assertEqual(asked - targets, {"aarch64-pc-windows-msvc"}, "no archive is made of it, and the installer says so")
+        # The installer refuses this target, which has no archive.
+        self.assertEqual(asked - targets, {"aarch64-pc-windows-msvc"})
 
 
 class Answers(InFolder):
@@ -222,13 +224,14 @@ class Answers(InFolder):
         self.write("c.csv", "t,id,x,y\nnonsense\n")
         self.assertEqual(self.audit("a.csv", "--delta", "1.5").returncode, 0)
         self.assertEqual(self.audit("a.csv", "b.csv", "--delta", "1.5").returncode, 1)
-        done = self.audit("a.csv", "b.csv", "c.csv", "--delta", "1.5", "--json", "--summary", "s.md", "--annotations", "github")
+        outputs = ["--json", "--summary", "s.md", "--annotations", "github"]
+        done = self.audit("a.csv", "b.csv", "c.csv", "--delta", "1.5", *outputs)
         self.assertEqual(done.returncode, 2)
         self.assertEqual([of.get("status") for of in json.loads(done.stdout)], ["clear", "violation", None])
         self.assertEqual(done.stderr.count("::error file="), 2)
         self.assertIn("not judged", (self.folder / "s.md").read_text())
 
-    def test_nothing_that_is_read_is_written_over(self):
+    def test_inputs_are_never_overwritten(self):
         self.write("a.csv", CLEAR)
         self.write("b.csv", CLEAR)
         self.write("fence.toml", "[fence]\npolygon_m = [[-9, -9], [9, -9], [9, 9], [-9, 9]]\n")
@@ -243,7 +246,7 @@ class Answers(InFolder):
                     self.assertIn("would overwrite", done.stderr)
                     self.assertEqual((self.folder / kept).read_text(), before)
 
-    def test_names_mean_nothing_to_the_system_that_reads_the_log(self):
+    def test_names_cannot_inject_commands_into_the_log(self):
         hostile = ["::stop-commands::x", "y ##[error]z", "a\n::error title=pwn::pwned"]
         rows = [f'{t},"{name}",{3 * k},{t},0' for t in (0, 1) for k, name in enumerate(hostile)]
         self.write("a.csv", "t,id,x,y,z\n" + "\n".join(rows) + "\n")
@@ -254,31 +257,34 @@ class Answers(InFolder):
         self.assertEqual([line.split(" ")[0] for line in lines if line.startswith("::")], ["::error", "::error"])
         self.assertTrue(all("title=pwn" not in line.split("::")[1] for line in lines if line.startswith("::")))
 
-    def test_a_summary_is_added_to_the_page_of_a_job(self):
+    def test_a_summary_is_appended_to_the_page_of_a_job(self):
         self.write("a.csv", CLEAR)
         self.write("s.md", "# Mine\n")
         self.assertEqual(self.audit("a.csv", "--delta", "1.5", "--summary", "s.md").returncode, 0)
         self.assertRegex((self.folder / "s.md").read_text(), r"^# Mine\n## tautline audit\n")
 
-    def test_every_name_of_a_recording_finds_the_same_settings(self):
+    def test_every_path_of_a_recording_finds_the_same_settings(self):
         self.write("real/flights/a.csv", CLEAR)
         self.write("real/tautline.toml", "[audit]\ndelta_m = 9.0\n")
         (self.folder / "link").symlink_to("real")
-        for name in ("flights/a.csv", "flights/../flights/a.csv", self.folder / "link/flights/a.csv", "./flights/a.csv"):
+        link = self.folder / "link/flights/a.csv"
+        for name in ("flights/a.csv", "flights/../flights/a.csv", link, "./flights/a.csv"):
             done = run(PROGRAM, "audit", name, "--limit", "speed=9", folder=self.folder / "link")
             self.assertEqual(done.returncode, 1, name)
         (self.folder / "real/tautline.toml").unlink()
         (self.folder / "real/tautline.toml").mkdir()
-        self.assertEqual(run(PROGRAM, "audit", "flights/a.csv", "--delta", "1", folder=self.folder / "real").returncode, 2)
+        done = run(PROGRAM, "audit", "flights/a.csv", "--delta", "1", folder=self.folder / "real")
+        self.assertEqual(done.returncode, 2)
 
-    def test_the_nearest_settings_count_and_say_so(self):
+    def test_the_nearest_settings_apply_and_are_reported(self):
         self.write("flights/deep/a.csv", CLEAR)
         self.write("tautline.toml", "[audit]\ndelta_m = 9.0\n")
         self.assertEqual(self.audit("flights/deep/a.csv").returncode, 1)
         self.write("flights/tautline.toml", "[audit]\ndelta_m = 1.0\n")
         done = self.audit("flights/deep/a.csv", "--json")
         self.assertEqual(done.returncode, 0)
-        self.assertIn("what the command line leaves open is asked as flights/tautline.toml says", json.loads(done.stdout)["notes"])
+        note = "what the command line leaves open is asked as flights/tautline.toml says"
+        self.assertIn(note, json.loads(done.stdout)["notes"])
         self.assertEqual(self.audit("flights/deep/a.csv", "--delta", "9").returncode, 1)
         self.assertEqual(self.audit("flights/deep/a.csv", "--no-config").returncode, 2)
         self.assertEqual(self.audit("flights/deep/a.csv", "--config", "tautline.toml").returncode, 1)

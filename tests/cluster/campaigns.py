@@ -1,4 +1,4 @@
-"""What the tests of clusters share: the program, a campaign in a folder, and processes that are waited for."""
+"""Helpers of the tests of clusters: the program, a campaign in a folder, and processes."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ time.duration_s = {duration_s}
 
 
 def ran(*command: str | Path, **options) -> subprocess.CompletedProcess[str]:
-    """Runs a command to its end and keeps what it says."""
+    """Runs a command to its end and captures its output."""
     line = [str(word) for word in command]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=300, **options)
 
 
 def until(what: Callable[[], bool], seconds: float, why: str) -> None:
-    """Waits until ``what`` is true; fails with ``why`` after so many seconds."""
+    """Waits until ``what`` is true; fails with ``why`` after ``seconds``."""
     end = time.monotonic() + seconds
     while not what():
         if time.monotonic() > end:
@@ -42,12 +42,12 @@ def until(what: Callable[[], bool], seconds: float, why: str) -> None:
 
 
 def short_folder() -> tempfile.TemporaryDirectory[str]:
-    """A folder with so short a path that sockets can be in it."""
+    """Returns a folder with a path short enough for sockets."""
     return tempfile.TemporaryDirectory(prefix="tautline-", dir="/tmp", ignore_cleanup_errors=True)
 
 
 class Campaign:
-    """A campaign of one run a shard, planned into a folder."""
+    """A campaign in a folder, by default with one run per shard."""
 
     def __init__(self, folder: Path, runs: int, duration_s: float, shards: int | None = None) -> None:
         self.spec, self.path, self.runs = folder / "spec.toml", folder / "camp", runs
@@ -56,21 +56,21 @@ class Campaign:
         assert planned.returncode == 0, planned.stderr
 
     def flown(self) -> int:
-        """Number of parts that are there."""
+        """Returns the number of parts."""
         return len(list((self.path / "parts").glob("shard-?????????.jsonl")))
 
     def missing(self) -> str:
-        """What ``tautline campaign missing`` prints."""
+        """Returns the output of ``tautline campaign missing``."""
         return ran(TAUTLINE, "campaign", "missing", self.path).stdout.strip()
 
     def merged(self) -> str:
-        """SHA-256 of the results of all parts."""
+        """Merges all parts and returns the SHA-256 of the results."""
         merged = ran(TAUTLINE, "campaign", "merge", self.path, "--worst", "0", "--quiet")
         assert merged.returncode in (0, 1), merged.stderr
         return self.sha256(self.path)
 
     def alone(self) -> str:
-        """SHA-256 of the results of the same campaign, flown by ``tautline campaign run``."""
+        """Returns the SHA-256 of the results of the same campaign by ``tautline campaign run``."""
         out = self.path.with_name("alone")
         ran_alone = ran(TAUTLINE, "campaign", "run", self.spec, "--out", out, "--worst", "0", "--quiet")
         assert ran_alone.returncode in (0, 1), ran_alone.stderr
@@ -78,12 +78,12 @@ class Campaign:
 
     @staticmethod
     def sha256(folder: Path) -> str:
-        """SHA-256 of the results in a folder."""
+        """Returns the SHA-256 of the results in a folder."""
         return hashlib.sha256((folder / "results.parquet").read_bytes()).hexdigest()
 
 
 def children(of: int) -> list[int]:
-    """Process ids of a process and of everything that it started, parents first."""
+    """Returns the ids of a process and all its descendants, parents first."""
     started: dict[int, list[int]] = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -97,7 +97,7 @@ def children(of: int) -> list[int]:
 
 
 def words(process: int) -> str:
-    """A process's command line; empty where there is none any more."""
+    """Returns the command line of a process; empty if the process has ended."""
     try:
         return Path(f"/proc/{process}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
     except OSError:
@@ -105,7 +105,7 @@ def words(process: int) -> str:
 
 
 def end(processes: list[int]) -> None:
-    """Kills processes, frozen ones too."""
+    """Kills processes, also stopped ones."""
     for process in processes:
         try:
             os.kill(process, signal.SIGKILL)

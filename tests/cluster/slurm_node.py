@@ -1,4 +1,4 @@
-"""A cluster of Slurm with one node: this machine, with daemons, ports, keys and folders of its own."""
+"""A Slurm cluster with this machine as its only node, and its own daemons, ports, keys and folders."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Slurm:
     """A cluster whose arrays have at most ``most`` tasks."""
 
     def __init__(self, folder: Path, most: int) -> None:
-        """Starts it and waits until the node is idle; ``end`` ends it, whatever came of this."""
+        """Writes keys and configuration into a folder."""
         self.daemons: list[subprocess.Popen[bytes]] = []
         self.folder = folder
         for name, mode in [("munge", 0o711), ("state", 0o700), ("spool", 0o755)]:
@@ -66,12 +66,12 @@ class Slurm:
         """Starts the daemons and waits until the node takes jobs."""
         munge = self.folder / "munge"
         files = {"socket": "socket", "key-file": "key", "pid-file": "pid", "log-file": "log", "seed-file": "seed"}
-        # Forced to take folders that others than root can write above: they are in /tmp.
+        # --force, because the folders are in /tmp, to which all users can write.
         self.daemon("munged", "--foreground", "--force", *(f"--{name}={munge / file}" for name, file in files.items()))
         until((munge / "socket").exists, 20, "munged does not start")
         self.daemon("slurmctld", "-D")
         self.daemon("slurmd", "-D")
-        until(lambda: self.asked("sinfo", "--noheader", "--format=%t") == "idle", 60, "no node of Slurm")
+        until(lambda: self.output("sinfo", "--noheader", "--format=%t") == "idle", 60, "no node of Slurm")
 
     def daemon(self, *command: str) -> None:
         """Starts a daemon in the foreground."""
@@ -79,17 +79,17 @@ class Slurm:
             daemon = subprocess.Popen(command, stdout=log, stderr=log, env=self.environment, start_new_session=True)
         self.daemons.append(daemon)
 
-    def asked(self, *command: str | Path) -> str:
-        """What one of Slurm's commands prints; empty where it fails."""
+    def output(self, *command: str | Path) -> str:
+        """Returns the output of a command of Slurm; empty if it fails."""
         return ran(*command, env=self.environment).stdout.strip()
 
     def is_empty(self) -> bool:
-        """Whether no job is waiting or running."""
+        """Returns whether no job is waiting or running."""
         answer = ran("squeue", "--noheader", env=self.environment)
         return answer.returncode == 0 and not answer.stdout.strip()
 
     def end(self) -> None:
-        """Ends its daemons, and nothing else."""
+        """Ends the daemons of the cluster."""
         for daemon in reversed(self.daemons):
             started = children(daemon.pid)
             daemon.terminate()

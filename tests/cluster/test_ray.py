@@ -1,4 +1,4 @@
-"""The driver for Ray on a real cluster of two nodes and more."""
+"""Tests of the driver for Ray on a cluster of at least two nodes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DRIVER = ROOT / "python" / "tautline_ray.py"
 # The driver as a module that only its own process can import.
 IMPORTED = f"import sys; sys.path.insert(0, {str(DRIVER.parent)!r}); import tautline_ray; sys.exit(tautline_ray.main())"
 
-# In place of the program: shard 1 ends with the code in the file `code`, which each time takes a byte from the file `times`.
+# Replaces the program: shard 1 ends with the code in the file `code`, and each call removes a byte of the file `times`.
 STUB = """\
 #!/bin/sh
 camp=$3
@@ -66,7 +66,7 @@ class RayCluster(unittest.TestCase):
     def stubbed(
         self, name: str, code: int, times: int, by: tuple[str, ...] = (str(DRIVER),)
     ) -> tuple[subprocess.CompletedProcess[str], int]:
-        """Flies four shards of a stub of which one fails so often; gives how often it was begun and failed, too."""
+        """Flies four shards of the stub, shard 1 with ``times`` failures; also returns the number of failed calls."""
         camp = self.folder / name
         camp.mkdir()
         (camp / "code").write_text(str(code))
@@ -77,12 +77,12 @@ class RayCluster(unittest.TestCase):
         flown = ran(*self.driver(camp, "--tautline", str(program), by=by), env=ENVIRONMENT)
         return flown, len((camp / "begun").read_bytes())
 
-    def test_wrong_input_ends_it_at_once(self) -> None:
+    def test_wrong_input_ends_the_driver_at_once(self) -> None:
         flown, begun = self.stubbed("wrong", 2, 100)
         self.assertEqual((flown.returncode, begun), (2, 1), flown.stderr)
         self.assertIn("shard 1 is wrong", flown.stderr)
 
-    def test_a_failure_is_tried_five_times_more(self) -> None:
+    def test_a_failure_is_retried_five_times(self) -> None:
         flown, begun = self.stubbed("healed", 3, 5, by=("-c", IMPORTED))
         self.assertEqual((flown.returncode, begun), (0, 5), flown.stderr)
         flown, begun = self.stubbed("ill", 3, 100)
@@ -100,14 +100,15 @@ class RayCluster(unittest.TestCase):
         self.assertEqual(flown.returncode, 2, flown.stderr)
         self.assertIn("hash", flown.stderr)
 
-    def test_kill_freeze_and_add_leave_the_same_bytes(self) -> None:
+    def test_killed_stopped_and_added_nodes_give_the_same_bytes(self) -> None:
         camp = Campaign(self.folder, runs=120, duration_s=2.0)
         hasty = ["--tautline", str(TAUTLINE), "--hedge-after", "4"]
         log = self.folder / "driver.log"
 
         def begun() -> subprocess.Popen[bytes]:
             with log.open("wb") as said:
-                driver = subprocess.Popen(self.driver(camp.path, *hasty), stdout=said, stderr=said, env=ENVIRONMENT, cwd="/")
+                command = self.driver(camp.path, *hasty)
+                driver = subprocess.Popen(command, stdout=said, stderr=said, env=ENVIRONMENT, cwd="/")
             self.addClassCleanup(driver.kill)
             return driver
 
@@ -126,7 +127,7 @@ class RayCluster(unittest.TestCase):
         self.assertLess(camp.flown(), camp.runs)
         frozen = self.second.freeze()
         at, began = camp.flown(), time.monotonic()
-        self.assertLess(at, camp.runs - 10, "too late to show anything")
+        self.assertLess(at, camp.runs - 10, "too few shards left")
 
         self.assertEqual(driver.wait(timeout=200), 0, log.read_text())
         took_s = time.monotonic() - began
@@ -137,11 +138,11 @@ class RayCluster(unittest.TestCase):
         whole = camp.alone()
         self.assertEqual(camp.merged(), whole)
 
-        # What was frozen goes on, finds its shards flown, and says nothing else.
+        # The stopped processes continue, find their shards finished, and write nothing else.
         for process in frozen:
             self.assertIn("T", Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0])
             os.kill(process, signal.SIGCONT)
-        until(lambda: not self.second.flights(), 60, "what was frozen flies for ever")
+        until(lambda: not self.second.flights(), 60, "the continued processes do not end")
         self.assertEqual(list((camp.path / "parts").glob("*.differs.jsonl")), [])
         self.assertEqual(camp.merged(), whole)
         again = ran(*self.driver(camp.path, *hasty), env=ENVIRONMENT)

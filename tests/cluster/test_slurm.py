@@ -1,4 +1,4 @@
-"""The script for Slurm: its arithmetic with commands that only note what they are asked, and a campaign on a real node."""
+"""Tests of the script for Slurm: its arithmetic with stubs of commands, and a campaign on a real node."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from slurm_node import Slurm
 
 SCRIPT = ROOT / "python" / "campaign.sbatch"
 
-# Commands that note what they are asked, or say what the test wrote down for them.
+# Stubs of commands: they note their arguments, or print what the test has written.
 STUBS = {
     "sbatch": 'echo "$BLOCK $*" > "$NOTES/submitted"',
     "scontrol": 'echo "MaxArraySize            = $MOST"',
@@ -28,14 +28,14 @@ STUBS = {
 
 
 def numbers(listed: str) -> list[int]:
-    """The numbers of a list such as 13,500-502, as often as they are in it."""
+    """Returns the numbers of a list such as 13,500-502, with repetitions."""
     spans = [[int(end) for end in span.split("-")] for span in listed.split(",")]
     assert all(span == sorted(span) for span in spans), listed
     return [number for span in spans for number in range(span[0], span[-1] + 1)]
 
 
 class Arithmetic(unittest.TestCase):
-    """Every missing shard is flown once, whatever the block."""
+    """Every missing shard is flown once for any size of the blocks."""
 
     def setUp(self) -> None:
         place = short_folder()
@@ -48,11 +48,12 @@ class Arithmetic(unittest.TestCase):
 
     def script(self, *options: str, **variables: object):
         path = f"{self.notes}:{os.environ['PATH']}"
-        environment = {"PATH": path, "NOTES": str(self.notes), **{name: str(value) for name, value in variables.items()}}
+        texts = {name: str(value) for name, value in variables.items()}
+        environment = {"PATH": path, "NOTES": str(self.notes), **texts}
         return ran("sh", SCRIPT, self.notes / "camp", *options, env=environment)
 
     def submitted(self, shards: int, missing: str, **variables: object) -> tuple[int, list[int], list[str]]:
-        """The block, the tasks and the other options of what is submitted."""
+        """Returns the size of the blocks, the tasks and the other options of the submission."""
         text = f'{{\n  "scenario": "\\n  \\"shards\\": 9,",\n  "shards": {shards},\n  "folder": "/"\n}}\n'
         (self.notes / "camp" / "manifest.json").write_text(text)
         (self.notes / "missing").write_text(missing + "\n" if missing else "")
@@ -62,14 +63,15 @@ class Arithmetic(unittest.TestCase):
         return int(block), numbers(array.removeprefix("--array=")), options
 
     def flown(self, block: int, tasks: list[int]) -> list[int]:
-        """The shards that these tasks fly."""
+        """Returns the shards that these tasks fly."""
         (self.notes / "flown").write_text("")
         for task in tasks:
             self.assertEqual(self.script(BLOCK=block, SLURM_ARRAY_TASK_ID=task).returncode, 0)
         return [shard for span in (self.notes / "flown").read_text().split() for shard in numbers(span)]
 
     def test_every_shard_is_flown_once(self) -> None:
-        for shards, most in [(1, 8), (7, 8), (8, 8), (9, 8), (63, 8), (64, 8), (65, 8), (97, 10), (200, 1001), (2003, 1001)]:
+        small = [(1, 8), (7, 8), (8, 8), (9, 8), (63, 8), (64, 8), (65, 8), (97, 10)]
+        for shards, most in [*small, (200, 1001), (2003, 1001)]:
             block, tasks, options = self.submitted(shards, f"0-{shards - 1}" if shards > 1 else "0", MOST=most)
             self.assertLess(max(tasks), most)
             self.assertEqual(block, -(-shards // most))
@@ -77,7 +79,7 @@ class Arithmetic(unittest.TestCase):
             if shards <= 200:
                 self.assertEqual(self.flown(block, tasks), list(range(shards)), (shards, most))
 
-    def test_what_is_missing_is_flown_once(self) -> None:
+    def test_missing_shards_are_flown_once(self) -> None:
         for missing in ["0", "13,500-502", "0-3,5,7-19,21,29-31,599", "599", "9-10,19-20,29-30", "0-599"]:
             for block in (1, 2, 10, 7, 600, 1000):
                 of, tasks, _ = self.submitted(600, missing, BLOCK=block)
@@ -86,7 +88,7 @@ class Arithmetic(unittest.TestCase):
         flown = self.flown(7, self.submitted(600, "13,500-502,598", BLOCK=7)[1])
         self.assertEqual(flown, [*range(7, 14), *range(497, 504), *range(595, 600)])
 
-    def test_nothing_is_submitted_where_nothing_is_missing_or_something_is_wrong(self) -> None:
+    def test_without_missing_shards_or_after_an_error_no_job_is_submitted(self) -> None:
         (self.notes / "missing").write_text("")
         done = self.script()
         self.assertEqual(done.returncode, 0)
@@ -123,7 +125,7 @@ class RealNode(unittest.TestCase):
         return submitted.stdout
 
     def in_flight(self, camp: Campaign) -> int:
-        """A process of the program that flies the campaign, once there is one."""
+        """Waits for a process that flies the campaign and returns its id."""
         flying = f" campaign shard {camp.path} "
 
         def processes() -> list[int]:
@@ -133,24 +135,24 @@ class RealNode(unittest.TestCase):
         until(lambda: bool(processes()), 60, "no task began")
         return processes()[0]
 
-    def test_a_killed_task_is_submitted_again_and_the_bytes_are_the_same(self) -> None:
+    def test_a_killed_task_is_resubmitted_with_the_same_bytes(self) -> None:
         camp, began = self.campaign("killed", runs=30, duration_s=4.0, shards=30), time.monotonic()
         self.assertIn("Submitted batch job", self.submitted("sh", SCRIPT, camp.path))
         os.kill(self.in_flight(camp), signal.SIGKILL)
         until(self.slurm.is_empty, 120, "the array does not end")
         missing = camp.missing()
-        self.assertNotEqual(missing, "", "the task that was killed had flown everything")
+        self.assertNotEqual(missing, "", "the killed task had finished all shards")
         self.assertIn("Submitted batch job", self.submitted("sh", SCRIPT, camp.path))
         until(self.slurm.is_empty, 60, "the second array does not end")
         print(f"{camp.runs} shards by 8 tasks, {missing} again: {time.monotonic() - began:.1f} s", file=sys.stderr)
         self.assertIn("nothing is missing", self.submitted("sh", SCRIPT, camp.path))
         self.assertEqual(camp.merged(), camp.alone())
 
-    def test_sigterm_before_the_end_of_the_time_keeps_what_was_flown(self) -> None:
+    def test_sigterm_before_the_time_limit_keeps_finished_flights(self) -> None:
         camp = self.campaign("ended", runs=20, duration_s=20.0, shards=1)
         job = self.submitted("sh", SCRIPT, camp.path, "--output=ended.out").split()[-1]
         until(lambda: any(journal.stat().st_size for journal in camp.path.glob("parts/*.journal")), 60, "nothing flew")
-        # As --signal=B:TERM@60 does, which the script asks for.
+        # Like --signal=B:TERM@60, an option of the script.
         self.submitted("scancel", "--signal=TERM", "--batch", job)
         until(self.slurm.is_empty, 60, "the task does not end")
         self.assertIn("interrupted in shard 0", (self.folder / "ended.out").read_text())
@@ -169,7 +171,7 @@ class RealNode(unittest.TestCase):
 
 
 class Kubernetes(unittest.TestCase):
-    """What a pod of an indexed job does; there is no cluster of Kubernetes here."""
+    """The command of a pod of an indexed job, without a cluster of Kubernetes."""
 
     def test_a_pod_flies_the_shard_of_its_index(self) -> None:
         place = short_folder()

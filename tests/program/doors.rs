@@ -137,5 +137,5 @@ fn a_show_is_judged_by_its_own_smallest_distance() {
     let folder = folder(&[("near.json", &near), ("far.json", &far), ("silent.json", &show(""))]);
     let exits = ["near.json", "far.json", "silent.json"].map(|show| audit(folder.path(), &[show]).exit);
     assert_eq!(exits, [Some(0), Some(1), Some(2)]);
-    assert_eq!(audit(folder.path(), &["far.json", "--delta", "1.5"]).exit, Some(0), "what is asked goes first");
+    assert_eq!(audit(folder.path(), &["far.json", "--delta", "1.5"]).exit, Some(0), "--delta overrides the recording");
 }

@@ -96,7 +96,7 @@ fn wrong_input_ends_with_2_and_leaves_no_file() {
         (vec!["missing.csv", "-o", "out.npz"], ["missing.csv", "spelling"]),
         (vec!["flight.csv", "-o", "out"], ["does not tell a format", "--format"]),
         (vec!["flight.csv", "-o", "out.npz", "--scale", "-1"], ["--scale", "positive"]),
-        (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["`w` is no column", "radius"]),
+        (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["unknown role `w`", "radius"]),
         (vec!["flight.csv", "-o", "out.npz", "--input-format", "mcap"], ["not an MCAP file", "--format"]),
     ] {
         let refused = ran(folder.path(), &[vec!["export"], arguments.clone()].concat());

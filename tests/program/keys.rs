@@ -157,12 +157,15 @@ fn by_kind(value: Value) -> Value {
 
 #[test]
 fn every_key_of_a_campaign_is_on_its_page() {
-    const PAIR: &str = "formation = { shape = \"points\", points_m = [[0.0, 0.0], [1.3, 0.0]] }\nstart = { positions_m = [[0.0, 0.0], [3.0, \
-                        0.0]] }\nlaw = { kind = \"displacement\", delta_m = 1.0 }\ntime = { duration_s = 12.0, dt_s = 0.02 }\n";
+    const PAIR: &str = "formation = { shape = \"points\", points_m = [[0.0, 0.0], [1.3, 0.0]] }\n\
+                        start = { positions_m = [[0.0, 0.0], [3.0, 0.0]] }\n\
+                        law = { kind = \"displacement\", delta_m = 1.0 }\n\
+                        time = { duration_s = 12.0, dt_s = 0.02 }\n";
     const FLIGHTS: &str = "scenario = \"pair.toml\"\nruns = 8\nlaws = [\"displacement\", \"edge-tension\"]\n[vary]\n\
                            \"start.jitter_m\" = { uniform = [0.0, 0.1] }\n";
-    const RARE: &str = "scenario = \"pair.toml\"\nruns = 2\nmethod = \"splitting\"\n[set]\nlaw = { kind = \"laplacian\" }\nsensing = { \
-                        position_noise_m = 0.3, rate_hz = 10.0 }\n[splitting]\nflights = 10\n";
+    const RARE: &str = "scenario = \"pair.toml\"\nruns = 2\nmethod = \"splitting\"\n[set]\n\
+                        law = { kind = \"laplacian\" }\nsensing = { position_noise_m = 0.3, rate_hz = 10.0 }\n\
+                        [splitting]\nflights = 10\n";
     let folder = tempfile::tempdir().expect("a folder");
     let mut found = BTreeSet::new();
     for (name, text) in [("pair.toml", PAIR), ("flights.toml", FLIGHTS), ("rare.toml", RARE)] {

@@ -102,8 +102,8 @@ fn wrong_limits_are_refused() {
 
 /// Straight segments as in Skybrush: polynomials with a corner each second.
 fn corners() -> tempfile::TempDir {
-    let head = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,\
-                yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
+    let columns = |axis: &str| (0..8).map(|power| format!("{axis}^{power}")).collect::<Vec<_>>().join(",");
+    let head = format!("duration,{}", ["x", "y", "z", "yaw"].map(columns).join(","));
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("show")).expect("a folder");
     for (name, y) in [("cf1.csv", 0), ("cf2.csv", 9)] {

@@ -366,7 +366,8 @@ fn violations_of_obstacles_between_samples_are_in_the_audit_of_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = "start.positions_m = [[0, 0], [0, 40]]\nformation = { shape = \"line\", spacing_m = 6.0 }\n\
                     law = { kind = \"laplacian\", delta_m = 1.0 }\ntime = { duration_s = 12.0, record_hz = 1.0 }\n\
-                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\nclearance_m = 1.9\n";
+                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\n\
+                    clearance_m = 1.9\n";
     fs::write(folder.path().join("past.toml"), scenario).expect("a file");
     fly(folder.path(), "past.toml", &[]);
     let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));

@@ -1,7 +1,7 @@
 """Tests of the checker of proofs.
 
-python3 proofs.py check_proof.py FOLDER, where FOLDER holds NAME.csv and NAME.json. Each proof of the folder is confirmed,
-and denied after each alteration. The tests of `Checker` write proofs of their own.
+Command: `python3 proofs.py check_proof.py FOLDER` with pairs of NAME.csv and NAME.json in FOLDER. Each proof of the
+folder must be confirmed, and denied after each alteration. The tests of `Checker` write their own proofs.
 """
 
 import contextlib
@@ -91,7 +91,9 @@ def proof_of(text, ids=("a", "b"), boxes=(), clock=None, **claim):
         "version": 1,
         "data": {"recording": "data.csv", "sha256": hashlib.sha256(text.encode()).hexdigest()},
         "claim": usual | claim,
-        "windows": [{"from_s": begin, "to_s": end, "boxes": copy.deepcopy(boxes)} for begin, end in zip(edges, edges[1:])],
+        "windows": [
+            {"from_s": begin, "to_s": end, "boxes": copy.deepcopy(boxes)} for begin, end in zip(edges, edges[1:])
+        ],
     }
 
 
@@ -153,12 +155,13 @@ class Checker(unittest.TestCase):
 
     def test_the_line_states_what_the_claim_assumes(self):
         out = self.expect(CONFIRMED, table(), proof_of(table(), offsets_s={"b": 0.0}))
-        said = "clear, never closer than 3.0 m, a and b (limit 1.0 m); straight between samples up to 1 s apart; times in s"
-        self.assertEqual(out, f"CONFIRMED: {said}\n")
+        said = "clear, never closer than 3.0 m, a and b (limit 1.0 m); straight between samples up to 1 s apart"
+        self.assertEqual(out, f"CONFIRMED: {said}; times in s\n")
         moved = proof_of(table(), offsets_s={"a": 100.0, "b": 100.0}, time_s=104.5)
         self.expect(CONFIRMED, table(), moved, ", with clocks moved: a by 100.0 s, b by 100.0 s;")
         text = table(times=range(0, 10_000, 1000))
-        self.expect(CONFIRMED, text, proof_of(text, clock={"unit": "ms", "inferred": True}), "; times in ms (inferred)\n")
+        inferred = proof_of(text, clock={"unit": "ms", "inferred": True})
+        self.expect(CONFIRMED, text, inferred, "; times in ms (inferred)\n")
         far = proof_of(table(times=range(0, 100, 10)), time_s=45.0, max_gaps_s=[None, 10.0])
         self.expect(CONFIRMED, table(times=range(0, 100, 10)), far, "straight between samples up to 10 s apart;")
         # No other vehicle is seen in the gap of c.
@@ -182,7 +185,8 @@ class Checker(unittest.TestCase):
         self.expect(CONFIRMED, table() + "10,c,,,\n", proof_of(table() + "10,c,,,\n", ("a", "b", "c")))
         self.expect(DENIED, table() + "10,c,,,\n", proof_of(table() + "10,c,,,\n"), "c is missing")
         self.expect(DENIED, table(), proof_of(table(), ("a", "b", "c")), "c is missing")
-        for row in ("10,a,,0,\n", ",a,,,\n", "10,,9,0,0\n", "10,a,,\n", "10,a,nan,0,0\n", "10,a,1_0,0,0\n", "1e999,a,9,0,0\n"):
+        rows = ("10,a,,0,\n", ",a,,,\n", "10,,9,0,0\n", "10,a,,\n")
+        for row in (*rows, "10,a,nan,0,0\n", "10,a,1_0,0,0\n", "1e999,a,9,0,0\n"):
             self.expect(UNREADABLE, table() + row, proof_of(table() + row), "data, line 22: must")
 
     def test_dates_are_read_to_the_nanosecond(self):
@@ -195,7 +199,8 @@ class Checker(unittest.TestCase):
             self.expect(UNREADABLE, text, proof_of(text, clock={"epoch_ns": epoch_ns}), "the unit of dates is ns")
             late = proof_of(text, clock={"unit": "ns", "epoch_ns": epoch_ns + 1})
             self.expect(DENIED, text, late, "not as close as")
-        for wrong in ("2023-01-01T00:00:09", "2023-01-01T00:00:60Z", "2023-02-30T00:00:09Z", "2023-01-01T00:00:09+99:00"):
+        wrong_dates = ("2023-01-01T00:00:09", "2023-01-01T00:00:60Z", "2023-02-30T00:00:09Z")
+        for wrong in (*wrong_dates, "2023-01-01T00:00:09+99:00"):
             text = table(times=[*dates[:9], wrong])
             self.expect(UNREADABLE, text, proof_of(text, clock={"unit": "ns", "epoch_ns": epoch_ns}), "data, line 11: ")
 
@@ -237,7 +242,8 @@ class Checker(unittest.TestCase):
             text = table(ids=("a", '"' + name.replace('"', '""') + '"' if name[1] in '",' else name))
             self.expect(CONFIRMED, text, proof_of(text, ("a", name)), f"a and {ascii(name)} (limit")
             self.expect(DENIED, text, proof_of(text, ("a", "b")), "is missing")
-        for text in (table().replace("\n", "\r\n").replace("5,a", "\n \t\r\n5,a"), "\ufeff" + table(), table("t,id,x,y,z,")):
+        mixed = table().replace("\n", "\r\n").replace("5,a", "\n \t\r\n5,a")
+        for text in (mixed, "\ufeff" + table(), table("t,id,x,y,z,")):
             self.expect(CONFIRMED, text, proof_of(text))
         text = table() + '9,"a\n",9,0,0\n'
         self.expect(UNREADABLE, text, proof_of(text), "data, line 22: unexpected end of data")
@@ -246,7 +252,8 @@ class Checker(unittest.TestCase):
         self.expect(UNREADABLE, data, proof, "UnicodeDecodeError")
 
     def test_limits_are_positive_and_finite(self):
-        for limit_m, separation_m in ((-5.0, -4.0), (0.0, 3.0), (math.nan, 3.0), (math.inf, 3.0), (1.0, -4.0), (1.0, math.nan)):
+        limits = ((-5.0, -4.0), (0.0, 3.0), (math.nan, 3.0), (math.inf, 3.0))
+        for limit_m, separation_m in (*limits, (1.0, -4.0), (1.0, math.nan)):
             proof = proof_of(table(), limit_m=limit_m, separation_m=separation_m)
             self.expect(UNREADABLE, table(), proof, "must be a finite number of ")
         self.expect(CONFIRMED, table(), proof_of(table(), limit_m=5e-324))
@@ -254,7 +261,8 @@ class Checker(unittest.TestCase):
 
     def test_boxes_are_of_vehicles_of_the_claim(self):
         for box in ([7, *[0.0] * 6], [-1, *[0.0] * 6], [True, *[0.0] * 6], [0.0] * 7, [0, 0.0]):
-            self.expect(UNREADABLE, table(), proof_of(table(), boxes=[box]), "a box must have a vehicle below 2 and 6 numbers")
+            proof = proof_of(table(), boxes=[box])
+            self.expect(UNREADABLE, table(), proof, "a box must have a vehicle below 2 and 6 numbers")
         for box in ([], [1, *[math.nan] * 6], 0, "box"):
             self.expect(UNREADABLE, table(), proof_of(table(), boxes=[box]))
         self.expect(CONFIRMED, table(), proof_of(table(), boxes=[[1, 0.0, 3.0, -1.0, 9.0, 3.0, 1.0]]))
@@ -310,7 +318,8 @@ class Checker(unittest.TestCase):
                 code, out = run(proof, table())
                 self.assertNotIn("Traceback", out)
                 self.assertTrue(code != CONFIRMED or is_true(proof), f"{path} {value!r}: {out}")
-                is_typed = type(path[-1]) is int if value is MISSING else type(value) in (int, float, type(at(valid, path)))
+                types = (int, float, type(at(valid, path)))
+                is_typed = type(path[-1]) is int if value is MISSING else type(value) in types
                 self.assertTrue(code != DENIED or is_typed or path[-1] == "sha256", f"{path} {value!r}: {out}")
 
     def test_damaged_files_exit_with_a_message(self):
@@ -325,7 +334,8 @@ class Checker(unittest.TestCase):
                 proof = json.dumps(valid | {"data": {"sha256": hashlib.sha256(data).hexdigest()}}).encode()
             code, out = run(bytes(proof), bytes(data))
             self.assertRegex(out, "^(CONFIRMED|DENIED|UNREADABLE): ")
-            self.assertTrue(code != CONFIRMED or changed is data or is_true(json.loads(bytes(proof))), f"{proof!r}: {out}")
+            is_correct = code != CONFIRMED or changed is data or is_true(json.loads(bytes(proof)))
+            self.assertTrue(is_correct, f"{proof!r}: {out}")
         for proof in (b"", b"[" * 100_000, b"null", b"[]", b'{"claim": []}', b"9" * 5000, b'"\\ud800"', b"\xff"):
             self.assertEqual(run(proof, table())[0], UNREADABLE)
 

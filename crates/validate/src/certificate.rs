@@ -136,7 +136,7 @@ fn energy_in_the_engine(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let excess = trials.iter().map(|trial| trial.engine_energy_excess).fold(0.0, larger);
     let rise = trials.iter().map(|trial| trial.engine_energy_rise).fold(0.0, larger);
     let words = format!(
-        "largest excess {} of E(0), {}; with oscillating modes E rises above its lowest value by up to \
+        "largest excess {} of E(0), {}. With oscillating modes E rises above its lowest value by up to \
          {rise:.1e} of E(0)",
         bound(excess, claim.limit()),
         population()

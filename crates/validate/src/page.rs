@@ -51,15 +51,15 @@ impl Validation {
     }
 
     fn errata(&self) -> String {
-        let mut table = "| finding | refuted statement of the paper | claim |\n| --- | --- | --- |\n".to_owned();
+        let mut table = "| finding | the paper | correct | claim |\n| --- | --- | --- | --- |\n".to_owned();
         let mut findings: Vec<(&str, &Claim)> = self
             .claims()
             .filter(|claim| claim.kind == Kind::PaperRefuted)
             .filter_map(|claim| Some((claim.finding?, claim)))
             .collect();
         findings.sort_by_key(|&(finding, _)| finding);
-        for (finding, Claim { id, statement, .. }) in findings {
-            table.extend(["| ", finding, " | ", &cell(statement), " | `", id, "` |\n"]);
+        for (finding, Claim { id, statement, source, expected, .. }) in findings {
+            table += &format!("| {finding} | {} ({source}) | {} | `{id}` |\n", cell(statement), cell(expected));
         }
         table
     }
@@ -84,11 +84,11 @@ fn capitalised(text: &str) -> String {
 
 /// Returns the row of a claim.
 fn entry(claim: &Claim) -> String {
-    let Claim { id, statement, source, expected, measured, tolerance, .. } = claim;
-    let statement = match claim.kind {
-        Kind::Ours => (*statement).to_owned(),
-        Kind::PaperHolds => format!("{statement} ({source})"),
-        Kind::PaperRefuted => format!("{statement} ({source}) Correct: {expected}."),
+    let Claim { id, statement, source, measured, tolerance, .. } = claim;
+    let statement = match (claim.kind, claim.finding) {
+        (Kind::PaperRefuted, Some(finding)) => format!("{finding} above"),
+        (Kind::Ours, _) => (*statement).to_owned(),
+        _ => format!("{statement} ({source})"),
     };
     let outcome = claim.outcome();
     format!("| `{id}` | {outcome} | {} | {} | {tolerance} |\n", cell(&statement), cell(measured))
@@ -236,11 +236,8 @@ mod tests {
         );
         assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  [F9] none"));
         let page = judged.markdown();
-        assert!(page.contains("| F9 | Nothing moves. | `c` |"), "{page}");
-        assert!(
-            page.contains("| `c` | paper: refuted | Nothing moves. (equation (0)) Correct: no motion. | none |"),
-            "{page}"
-        );
+        assert!(page.contains("| F9 | Nothing moves. (equation (0)) | no motion | `c` |"), "{page}");
+        assert!(page.contains("| `c` | paper: refuted | F9 above | none |"), "{page}");
         assert!(judged.to_html().contains("paper: refuted"));
     }
 

@@ -233,7 +233,7 @@ impl Experiment for Options {
 }
 
 /// Candidate that can be flown.
-struct Next {
+struct FlyableCandidate {
     /// Coordinates on the real line.
     drawn: Vec<f64>,
     values: Vec<f64>,
@@ -270,7 +270,7 @@ impl Search<'_> {
     }
 
     /// Draws candidates that can be flown. Returns `None` if hardly any can.
-    fn next(&mut self, count: usize) -> Option<Vec<Next>> {
+    fn next(&mut self, count: usize) -> Option<Vec<FlyableCandidate>> {
         for _ in 0..MOST_PLACES {
             let next: Option<Vec<_>> = std::iter::repeat_with(|| self.flyable()).take(count).collect();
             if next.is_some() || self.batch.is_interrupted() {
@@ -281,7 +281,7 @@ impl Search<'_> {
         None
     }
 
-    fn flyable(&mut self) -> Option<Next> {
+    fn flyable(&mut self) -> Option<FlyableCandidate> {
         for _ in 0..MOST_REFUSED {
             if self.batch.is_interrupted() {
                 return None;
@@ -289,7 +289,7 @@ impl Search<'_> {
             let drawn = self.optimiser.draw();
             let values = self.space.values(&drawn.iter().copied().map(folded).collect::<Vec<_>>());
             match self.space.candidate(&values) {
-                Ok(flights) => return Some(Next { drawn, values, flights }),
+                Ok(flights) => return Some(FlyableCandidate { drawn, values, flights }),
                 Err(why) => {
                     self.found.refused += 1;
                     self.found.first_refusal.get_or_insert(why);
@@ -300,7 +300,7 @@ impl Search<'_> {
     }
 
     /// Flies candidates and returns the smallest clearance of each. Returns `None` after an interruption.
-    fn values(&mut self, next: &[Next]) -> Result<Option<Vec<f64>>, Failure> {
+    fn values(&mut self, next: &[FlyableCandidate]) -> Result<Option<Vec<f64>>, Failure> {
         let flights: Vec<_> = next
             .iter()
             .flat_map(|next| next.flights.iter().enumerate().map(move |(k, flight)| (next, k as u64, flight)))

@@ -335,7 +335,7 @@ mod tests {
         let read = Bound::parse("start.positions_m.2.x = -1.5..0.25");
         let expected = Bound::new("start.positions_m.2.x", -1.5, 0.25);
         assert_eq!(read.expect("a bound"), expected.expect("a bound"));
-        for (text, said) in [
+        for (text, why) in [
             ("law.alpha", "is not KEY=LOW..HIGH"),
             ("law.alpha=1", "is not KEY=LOW..HIGH"),
             ("law.alpha=1..", "`` is not a number"),
@@ -347,7 +347,7 @@ mod tests {
             ("law.alpha=-1e308..1e308", "must be finite"),
         ] {
             let refused = Bound::parse(text).expect_err(text);
-            assert!(refused.message().contains(said), "{text}: {refused}");
+            assert!(refused.message().contains(why), "{text}: {refused}");
         }
     }
 

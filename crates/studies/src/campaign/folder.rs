@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Campaign;
-use super::shard::{self, Found, Row, fields};
+use super::shard::{self, PartState, Row, fields};
 use super::spec::refused;
 use super::summary::{Gathered, Summary};
 use crate::SCHEMA_VERSION;
@@ -72,7 +72,7 @@ impl Folder {
             return Err(other_campaign(&there, problem, "give another folder with --out, or move the file"));
         }
         let folder = Self { path: path.to_owned(), campaign };
-        folder.make()?;
+        folder.create_parts()?;
         folder.campaign.manifest().write(&file)?;
         // If two processes plan at once, the later manifest stays, and the other process sees it here.
         let there = Manifest::read(&file, &folder.campaign.manifest().tool)?;
@@ -91,7 +91,7 @@ impl Folder {
     }
 
     /// Creates the folder of parts.
-    pub(super) fn make(&self) -> Result<(), Failure> {
+    pub(super) fn create_parts(&self) -> Result<(), Failure> {
         let parts = self.path.join("parts");
         fs::create_dir_all(&parts).map_err(cannot("write", &parts))
     }
@@ -130,13 +130,13 @@ impl Folder {
     }
 
     /// Returns a path for a file of a shard that only this process uses.
-    pub(super) fn own(&self, shard: u64, kind: &str) -> PathBuf {
+    pub(super) fn unique_path(&self, shard: u64, kind: &str) -> PathBuf {
         let number = RandomState::new().hash_one(std::process::id());
         self.path.join("parts").join(format!("{}.{number:016x}.{kind}", stem(shard)))
     }
 
     /// Returns the files of this kind that processes left for a shard.
-    pub(super) fn left(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, Failure> {
+    pub(super) fn leftovers(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, Failure> {
         let folder = self.path.join("parts");
         let (begin, end) = (format!("{}.", stem(shard)), format!(".{kind}"));
         let is_one = |path: &PathBuf| {
@@ -156,7 +156,7 @@ impl Folder {
     /// # Errors
     /// [`Failure`] if the shard was flown twice with different results, the part is of another campaign, or the file
     /// cannot be read.
-    pub fn read(&self, shard: u64) -> Result<Found, Failure> {
+    pub fn read(&self, shard: u64) -> Result<PartState, Failure> {
         let (kept, other) = (self.part(shard), self.differs(shard));
         if other.exists() {
             return Err(different_results(shard, &kept, &other));
@@ -174,9 +174,9 @@ impl Folder {
             return Ok(None);
         };
         match self.read(shard)? {
-            Found::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
-            Found::Nothing => Ok(None),
-            Found::Damaged(why) => Err(self.missing_shards(&[shard], &[self.damage(shard, why)])),
+            PartState::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
+            PartState::Missing => Ok(None),
+            PartState::Damaged(why) => Err(self.missing_shards(&[shard], &[self.damage(shard, why)])),
         }
     }
 
@@ -187,9 +187,9 @@ impl Folder {
     pub fn missing(&self) -> Result<Vec<(u64, Option<String>)>, Failure> {
         let of_shard = |shard| {
             Ok(match self.read(shard)? {
-                Found::Whole(_) => None,
-                Found::Nothing => Some((shard, None)),
-                Found::Damaged(why) => Some((shard, Some(self.damage(shard, why)))),
+                PartState::Whole(_) => None,
+                PartState::Missing => Some((shard, None)),
+                PartState::Damaged(why) => Some((shard, Some(self.damage(shard, why)))),
             })
         };
         (0..self.campaign.manifest().shards).filter_map(|shard| of_shard(shard).transpose()).collect()
@@ -201,7 +201,7 @@ impl Folder {
     /// As [`Folder::read`].
     pub fn damaged(&self, shard: u64) -> Result<Option<String>, Failure> {
         let found = self.read(shard)?;
-        Ok(if let Found::Damaged(why) = found { Some(self.damage(shard, why)) } else { None })
+        Ok(if let PartState::Damaged(why) = found { Some(self.damage(shard, why)) } else { None })
     }
 
     fn damage(&self, shard: u64, why: &str) -> String {
@@ -272,7 +272,7 @@ impl Folder {
             if gathered.is_enough() {
                 break;
             }
-            let Found::Whole(rows) = self.read(shard)? else {
+            let PartState::Whole(rows) = self.read(shard)? else {
                 let missing = self.missing()?.into_iter().filter(|&(missing, _)| missing >= shard);
                 let (missing, damaged): (Vec<_>, Vec<_>) = missing.unzip();
                 return Err(self.missing_shards(&missing, &damaged.into_iter().flatten().collect::<Vec<_>>()));

@@ -20,7 +20,7 @@ pub use flights::{Campaign, Law, MOST_RUNS};
 pub use folder::{ANSWER, Folder, Manifest, Merged, Program, RESULTS, listed, parse};
 pub use replay::{ReplayRequest, WorstFlight, replay};
 pub use request::{CampaignAnswer, CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
-pub use shard::{Found, Known, Row, Shard};
+pub use shard::{Known, PartState, Row, Shard};
 pub use spec::{Method, Spec, Stop};
 pub use summary::{BadRun, LawSummary, Pair, Quantiles, Summary, Worst};
 pub use tally::{Bin, BinShares, BoundKind, Intervals, Tally, UpperBound, Varied};

@@ -38,7 +38,7 @@ pub struct WorstFlight {
     /// The law.
     pub law: String,
     /// Description in a sentence.
-    pub said: String,
+    pub description: String,
     /// The command that repeats the flight.
     pub command: String,
     /// Path of its recording, relative to the page.
@@ -60,9 +60,9 @@ impl WorstFlight {
         blocks.push(page::pictures(&pictures));
         for flight in flights {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
-            blocks.push(page::list(&std::iter::once(flight.said.clone()).chain(recording).collect::<Vec<_>>()));
+            blocks.push(page::list(&std::iter::once(flight.description.clone()).chain(recording).collect::<Vec<_>>()));
             let replay = flight.replay.as_ref();
-            blocks.extend(replay.map(|replay| page::replay(&flight.said, replay, Start::OnDemand)));
+            blocks.extend(replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand)));
             blocks.push(page::command(&flight.command));
         }
         Section::new("The worst flights", blocks.into_iter().map(Block::Page))
@@ -222,7 +222,7 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
     // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
-    let said = format!(
+    let description = format!(
         "Violated flight {number} of run {run} under {}: {} m below delta in step {}. To repeat it, in the folder of \
          this page:",
         law.name,
@@ -232,7 +232,7 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     Ok(WorstFlight {
         run: bad.run,
         law: law.name.clone(),
-        said,
+        description,
         command: command_line(command.into_iter()),
         recording: Some(format!("worst/{}/{RECORDING}", flight.name())),
         picture: None,
@@ -276,7 +276,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
     let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
     let by_obstacle = worst.outcome == Outcome::Violated && worst.clearance_m >= 0.0;
-    let said = format!(
+    let description = format!(
         "Run {} under {}: {}{pair}{} m{at}, {} m {} delta; it {reached}.",
         flight.run,
         flight.law.name,
@@ -286,7 +286,8 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );
     let closest = left.pictures.iter().find(|(name, _)| name == "closest");
-    let picture = closest.map(|(_, picture)| Picture { description: said.clone(), data_uri: picture.data_uri.clone() });
+    let picture =
+        closest.map(|(_, picture)| Picture { description: description.clone(), data_uri: picture.data_uri.clone() });
     WorstFlight {
         run: flight.run,
         law: flight.law.name.clone(),
@@ -294,6 +295,6 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         command: flight.command(campaign),
         picture,
         replay: None,
-        said,
+        description,
     }
 }

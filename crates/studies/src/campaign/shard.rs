@@ -42,10 +42,10 @@ impl Folder {
     /// [`Failure`] if another process flew the shard with different results, a law cannot be built, or the disk is
     /// full. Finished flights are kept.
     pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Option<Shard>, Failure> {
-        if let Found::Whole(rows) = self.read(shard)? {
+        if let PartState::Whole(rows) = self.read(shard)? {
             return Ok(Some(Shard { rows, flown: 0 }));
         }
-        self.make()?;
+        self.create_parts()?;
         let began = Instant::now();
         let laws = self.campaign().laws().len();
         let places = self.campaign().manifest().range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
@@ -53,7 +53,7 @@ impl Folder {
         let there: BTreeSet<_> = rows.iter().map(Row::place).collect();
         let missing: Vec<_> = places.filter(|place| !there.contains(place)).collect();
         let flown = missing.len();
-        let journal = Mutex::new(Journal::create(self.own(shard, JOURNAL), self.campaign().manifest())?);
+        let journal = Mutex::new(Journal::create(self.unique_path(shard, JOURNAL), self.campaign().manifest())?);
         let made = batch.run(missing.len(), |number| {
             let (run, law) = missing[number];
             let row = self.campaign().row(run, law, batch)?;
@@ -66,7 +66,7 @@ impl Folder {
         rows.extend(made);
         rows.sort_by_key(Row::place);
         self.publish(shard, &rows)?;
-        self.sweep(shard)?;
+        self.remove_journals(shard)?;
         let (seconds, threads) = (began.elapsed().as_secs_f64(), batch.threads());
         let times = format!("{{\"wall_s\": {seconds:.3}, \"threads\": {threads}, \"flights\": {flown}}}\n");
         tautline_report::report::write_atomically(&self.times(shard), times.as_bytes())?;
@@ -78,7 +78,7 @@ impl Folder {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
         let manifest = self.campaign().manifest();
         let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
-        for path in self.left(shard, JOURNAL)? {
+        for path in self.leftovers(shard, JOURNAL)? {
             for row in Journal::rows(&path, manifest) {
                 if !range.contains(&row.run) || row.law >= laws {
                     continue;
@@ -98,26 +98,28 @@ impl Folder {
     /// Publishes a complete part in one step. If another process has published the part, both must be equal.
     fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
-        let (path, own) = (self.part(shard), self.own(shard, "partial"));
+        let (path, own) = (self.part(shard), self.unique_path(shard, "partial"));
         let failed = |error| cannot("write", &own)(error);
         let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
             return Err(failed(error));
         }
-        if matches!(self.read(shard), Ok(Found::Damaged(_))) {
+        if matches!(self.read(shard), Ok(PartState::Damaged(_))) {
             return fs::rename(&own, &path).map_err(failed);
         }
         // Only one process can create the link. On a file system without links the last rename wins.
         match fs::hard_link(&own, &path) {
             Ok(()) => fs::remove_file(&own).map_err(failed),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => self.settle(shard, &own, &bytes),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                self.compare_with_published(shard, &own, &bytes)
+            }
             Err(_) => fs::rename(&own, &path).map_err(failed),
         }
     }
 
     /// Compares this process's part with the published one: equal bytes are dropped, different bytes are a failure.
-    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    fn compare_with_published(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let kept = self.part(shard);
         let there = fs::read(&kept).map_err(cannot("read", &kept))?;
         if there == bytes {
@@ -129,8 +131,8 @@ impl Folder {
     }
 
     /// Removes the journals of a finished shard.
-    fn sweep(&self, shard: u64) -> Result<(), Failure> {
-        for path in self.left(shard, JOURNAL)? {
+    fn remove_journals(&self, shard: u64) -> Result<(), Failure> {
+        for path in self.leftovers(shard, JOURNAL)? {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
                     return Err(cannot("write", &path)(error));
@@ -162,9 +164,9 @@ struct Seal {
 
 /// State of the part of a shard.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Found {
+pub enum PartState {
     /// No file.
-    Nothing,
+    Missing,
     /// Truncated or altered, with the reason; to be flown again.
     Damaged(&'static str),
     /// All rows of the shard.
@@ -199,28 +201,28 @@ fn line(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
 ///
 /// # Errors
 /// [`Failure`] for a part of another campaign, and for a file that cannot be read.
-pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, Failure> {
+pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<PartState, Failure> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(PartState::Missing),
         Err(error) => return Err(cannot("read", path)(error)),
     };
     decode(&bytes, manifest, shard, laws, path)
 }
 
-fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, Failure> {
+fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<PartState, Failure> {
     const TRUNCATED: &str = "it is truncated: the SHA-256 of its rows is missing";
     const ALTERED: &str = "it was altered: its rows do not have the SHA-256 at its end";
-    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Damaged(TRUNCATED)) };
-    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(Found::Damaged(TRUNCATED)) };
+    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(PartState::Damaged(TRUNCATED)) };
+    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(PartState::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
-    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(Found::Damaged(TRUNCATED)) };
+    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
     if seal.sha256 != base16(&Sha256::digest(sealed)) {
-        return Ok(Found::Damaged(ALTERED));
+        return Ok(PartState::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
     let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<Heading>(line).ok()) else {
-        return Ok(Found::Damaged(ALTERED));
+        return Ok(PartState::Damaged(ALTERED));
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
     if !is_ours {
@@ -233,7 +235,7 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     let rows: Vec<Row> = lines.map_while(|line| serde_json::from_slice(line).ok()).collect();
     let places = manifest.range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
     let is_whole = seal.rows == rows.len() && rows.iter().map(Row::place).eq(places);
-    Ok(if is_whole { Found::Whole(rows) } else { Found::Damaged(ALTERED) })
+    Ok(if is_whole { PartState::Whole(rows) } else { PartState::Damaged(ALTERED) })
 }
 
 /// Journal of a process: its finished rows, so that a killed process loses no finished flight.

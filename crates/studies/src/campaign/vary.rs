@@ -208,13 +208,13 @@ impl Random {
 mod tests {
     use super::*;
 
-    fn said(text: &str) -> Result<Variation, String> {
+    fn parse(text: &str) -> Result<Variation, String> {
         let table: toml::Table = text.parse().expect("TOML");
         Variation::read(&table["key"])
     }
 
     fn numbers(text: &str, count: u64) -> Vec<f64> {
-        let variation = said(text).expect("a variation");
+        let variation = parse(text).expect("a variation");
         let value = |run| match variation.value(7, "key", run, run) {
             toml::Value::Float(value) => value,
             toml::Value::Integer(value) => value as f64,
@@ -287,7 +287,7 @@ mod tests {
             "key = { grid = { from = 0.0, to = 1.0, count = 1 } }",
             "key = { grid = { from = 1.0, to = 0.0, count = 3 } }",
         ] {
-            assert!(said(wrong).is_err(), "{wrong}");
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

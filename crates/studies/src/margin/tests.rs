@@ -1,6 +1,6 @@
 //! Bisection, and margins of flights.
 
-use super::{Found, Margin, Options, Range, search};
+use super::{Bisection, Margin, Options, Range, search};
 use crate::Question;
 use crate::study::{Experiment as _, Study as _};
 use crate::tests::{base, batch, pair};
@@ -9,7 +9,7 @@ fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
     Range { from, to, scan, halvings, logarithmic: false }
 }
 
-fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
+fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Bisection>, usize) {
     let mut asked = 0;
     let found = search(range, false, &mut |value| {
         asked += 1;
@@ -22,7 +22,7 @@ fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
 fn the_bracket_contains_the_turn_and_each_halving_halves_it() {
     for (from, to) in [(0.0, 4.0), (4.0, 0.0)] {
         let (turn, asked) = found(range(from, to, 5, 10), &|value| value < 1.2345);
-        let Some(Found::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
+        let Some(Bisection::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
         assert_eq!((was, turns, asked), (from < to, 1, 15));
         assert!((before - 1.2345) * (after - 1.2345) <= 0.0, "{before} {after}");
         assert_eq!((after - before).abs(), 2.0_f64.powi(-10));
@@ -40,7 +40,7 @@ fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
     for (value, exact) in asked.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
         assert!((value / exact - 1.0).abs() < 1e-12, "{value} {exact}");
     }
-    assert!(matches!(found, Ok(Some(Found::Turn { was: true, .. }))), "{found:?}");
+    assert!(matches!(found, Ok(Some(Bisection::Turn { was: true, .. }))), "{found:?}");
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn integers_are_probed_at_most_once_and_bracketed_by_neighbours() {
             asked.push(value);
             Ok::<_, ()>(Some(value < 6.5))
         });
-        let Ok(Some(Found::Turn { before, after, .. })) = found else { panic!("{found:?}") };
+        let Ok(Some(Bisection::Turn { before, after, .. })) = found else { panic!("{found:?}") };
         assert_eq!((before.min(after), before.max(after)), (6.0, 7.0));
         assert!(asked.iter().all(|value| value.fract() == 0.0), "{asked:?}");
         asked.sort_by(f64::total_cmp);
@@ -61,9 +61,9 @@ fn integers_are_probed_at_most_once_and_bracketed_by_neighbours() {
 
 #[test]
 fn constant_answers_are_even_and_two_turns_are_counted() {
-    assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Found::Even(true)), 5));
+    assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Bisection::Even(true)), 5));
     let (twice, _) = found(range(0.0, 1.0, 11, 20), &|value| !(0.33..0.77).contains(&value));
-    let Some(Found::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
+    let Some(Bisection::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
     assert!(before < 0.33 && after >= 0.33 && after - before < 1e-6, "{before} {after}");
 }
 
@@ -78,7 +78,7 @@ fn an_interrupted_search_returns_only_known_brackets() {
     };
     assert_eq!(broken(0), Ok(None));
     assert_eq!(broken(1), Ok(None), "one value is no bracket");
-    let Ok(Some(Found::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
+    let Ok(Some(Bisection::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
     assert_eq!((before, after), (0.0, 0.5));
 }
 
