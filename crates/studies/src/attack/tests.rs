@@ -58,7 +58,7 @@ fn worst_m(attack: &Attack) -> f64 {
 
 #[test]
 fn a_search_finds_a_collision_and_its_overrides_repeat_it() {
-    let (base, options) = (blind(&[]), asked(60));
+    let (base, options) = (blind(&[]), start_options(60));
     let [attack, other] = [1, 3].map(|threads| searched_on(&base, &options, threads));
     assert_eq!(
         attack.to_json().expect("JSON"),
@@ -87,7 +87,7 @@ fn a_search_finds_a_collision_and_its_overrides_repeat_it() {
 #[test]
 fn a_search_without_a_violation_states_that_it_is_no_proof() {
     let sets = ["law.kind=displacement"];
-    let attack = searched(&sets, &asked(40));
+    let attack = searched(&sets, &start_options(40));
     assert_eq!((attack.violated, attack.certificates_broken), (0, 0));
     let said = attack.headline();
     assert!(said.starts_with("no violation found in 40 flights: smallest separation 1."), "{said}");
@@ -142,7 +142,7 @@ fn starts_keep_the_separation_of_apart() {
         let nearest_m = attack.progress.iter().map(|worst| apart_m(&worst.values)).fold(f64::INFINITY, f64::min);
         (nearest_m, attack)
     };
-    let wide = Options { start_m: Some(2.4), ..asked(60) };
+    let wide = Options { start_m: Some(2.4), ..start_options(60) };
     let (_, anywhere) = nearest(&wide);
     let (near_m, attack) = nearest(&Options { apart_m: Some(4.0), ..wide.clone() });
     assert!(near_m >= 4.0 && attack.refused > anywhere.refused, "{near_m}");
@@ -199,7 +199,7 @@ fn an_interrupted_search_has_a_note_or_no_answer() {
 #[test]
 fn wrong_options_are_refused() {
     let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
-    let start = || asked(10);
+    let start = || start_options(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
     assert!(
         refused(Options { start_m: Some(0.0), ..start() }).contains("--start: must be a finite number above 0, got 0")
