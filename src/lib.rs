@@ -1,8 +1,8 @@
-//! tautline flies a swarm into formation inside a rigid-body engine and proves that nothing touched.
+//! Flies formations of vehicles in a rigid-body engine and proves that no two come too close.
 //!
-//! A control law steers N vehicles into a formation; vehicles are rigid bodies in Rapier; an independent judge sweeps
-//! every step of every pair and says whether any two came closer than a safety distance delta. This crate re-exports the
-//! crates of the workspace and holds the command line. Data flows one way:
+//! A control law steers N vehicles into a formation. Vehicles are rigid bodies in Rapier. An independent judge sweeps
+//! every step of every pair and reports whether two came closer than a safety distance delta. This crate re-exports the
+//! crates of the workspace and contains the command line. Data flows one way:
 //!
 //! ```text
 //! scenario -> sim ( advance -> judge -> sense -> command -> actuate -> apply ) -> samples -> report
@@ -27,14 +27,14 @@
 //!
 //! # Judge positions of your own
 //!
-//! [`audit::Auditor`] needs nothing but times and positions. [`law::Law`] and [`plant::Plant`] are traits: bring your
-//! own law (`examples/own_law.rs`), or your own vehicle.
+//! [`audit::Auditor`] needs only times and positions. [`law::Law`] and [`plant::Plant`] are traits: implement your own
+//! law (`examples/own_law.rs`) or your own vehicle.
 //!
 //! # Units and frames
 //!
 //! SI units, in the names (`clearance_m`, `a22_per_s`). One inertial frame, z up. Tables of vectors are N x 3, a row
-//! per vehicle. Vehicles are counted from 0 in code and from 1 in everything a person reads. Equation numbers are those
-//! of "Collision-free vehicle formation control using graph Laplacian and edge-tension function".
+//! per vehicle. Vehicles are counted from 0 in code and from 1 in output. Equation numbers are those of "Collision-free
+//! vehicle formation control using graph Laplacian and edge-tension function".
 
 pub mod cli;
 

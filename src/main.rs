@@ -1,4 +1,4 @@
-//! The program: see `tautline --help`.
+//! Executable of tautline; `tautline --help` lists its commands.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `tautline audit` of one recording or of several: arguments, and answers for programs.
+//! `tautline audit`: arguments, and reports on one or several recordings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -19,10 +19,10 @@ use tautline_report::report::write_atomically;
 use tautline_report::request::outputs::Called;
 use tautline_report::request::{AuditRequest, Audited, ConfigFile, Failure, Monitor as _, Subject};
 
-/// Recordings that could not be judged, and why.
+/// Recordings that could not be judged, with the failures.
 type Failures = [(String, Failure)];
 
-/// Judges each recording; the exit code is the worst. One that cannot be judged does not keep the others from it. `command` is
+/// Judges each recording. The exit code is the worst of all. A failure does not stop the other recordings. `command` is
 /// the whole command line.
 pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, Failure> {
     let recordings = arguments.reading.recordings();
@@ -30,22 +30,22 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     let refuse = |message: &str, help: &str| Err(Failure::input("usage/several-recordings", message, help));
     if !is_one && arguments.html.is_some() {
         let help = "give --join if each file holds a vehicle of one recording, or audit one at a time";
-        return refuse("--html is a page on one recording, and several are given", help);
+        return refuse("--html: must be given with one recording only", help);
     }
     if !is_one && arguments.proof.is_some() {
-        return refuse("--proof is about one recording, and several are given", "audit one at a time");
+        return refuse("--proof: must be given with one recording only", "audit one at a time");
     }
     let mut asked = Vec::new();
     for paths in recordings {
         let (request, settings) = arguments.request(paths, command);
-        // No output replaces an input of any recording, whether its settings can be read or not.
+        // No output may replace an input of any recording, even if the settings of a recording are wrong.
         request.check_outputs(&arguments.outputs())?;
         let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
         asked.push((request.subject.called(), configured));
     }
     let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
-    // A log in which a system looks for its own lines has none of ours, which hold foreign names.
+    // A log that the system searches for annotations contains no other lines with untrusted names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
     let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });
     let (mut judged, mut failures) = (Vec::new(), Vec::new());
@@ -69,14 +69,14 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     answer(arguments, &judged, &failures, is_one)?;
     let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
     match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| Exit::of(failure) as u8) {
-        // It was said in a line that means nothing else to the system.
+        // The annotation reports the failure.
         Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
         Some(failure) => Err(failure),
         None => Ok(worst.unwrap_or(Exit::Good)),
     }
 }
 
-/// What is for programs: of one recording by itself, of several as a list, with those that could not be judged and why.
+/// Writes the machine-readable outputs: one report for one recording, a list with all failures for several.
 fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, is_one: bool) -> Result<(), Failure> {
     if arguments.json {
         match judged {
@@ -96,14 +96,14 @@ fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, i
         write_atomically(file, audit_formats::junit(judged, failures)?.as_bytes())?;
     }
     if let Some(file) = &arguments.summary {
-        // Pages of jobs are written by one step after another.
+        // The steps of a job append to the same page.
         let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
         write_atomically(file, &[before, audit_formats::markdown(judged, failures).into_bytes()].concat())?;
     }
     Ok(())
 }
 
-/// An answer for each of several recordings.
+/// Reports of several recordings.
 #[derive(Serialize)]
 #[serde(transparent)]
 struct Answers<'a>(Vec<Answer<'a>>);
@@ -127,130 +127,143 @@ impl<'a> Answers<'a> {
 /// Arguments of `tautline audit`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where nothing came too close, proved or as assumed between samples, with 1 where something did or where it \
-cannot be told (unless --allow-undecided), with 2 where the input is wrong, and with 3 where the machine failed. A distance strictly \
-below its limit is a violation; two vehicles must keep max(delta, r1 + r2).")]
+Exit codes: 0 clear, by proof or with the assumed motion between samples; 1 violation or undecided (0 for undecided \
+with --allow-undecided); 2 wrong input; 3 failure of the machine. A separation strictly below its limit is a \
+violation. The limit of two vehicles is max(delta, r1 + r2).")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
     pub(super) reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
+    /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
     pub(super) format: Option<Format>,
 
-    /// Safety distance between two centres [m], by default that of a recording of tautline; with --ellipsoid a scaled
-    /// distance, by default 2.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Question")]
+    /// Safety distance between two centres [m]; default: that of a tautline recording. With --ellipsoid, a scaled
+    /// distance; default: 2.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) delta: Option<f64>,
-    /// What happens between samples [default: linear for samples, polynomial for curves].
-    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Question")]
+    /// Motion between samples [default: linear for samples, polynomial for curves].
+    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Judging")]
     pub(super) motion: Option<Interpolation>,
-    /// Largest acceleration [m/s^2] of every vehicle, or of one, for --motion bounded; may be given several times.
-    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    /// Largest acceleration [m/s^2] of all vehicles, or of one, for --motion bounded; repeatable.
+    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) max_accel: Vec<Named>,
-    /// Radius [m] of every vehicle, or of one; may be given several times.
-    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Question")]
+    /// Radius [m] of all vehicles, or of one; repeatable.
+    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) radius: Vec<Named>,
     /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
-    #[arg(long, value_name = "AX,AY,AZ", value_parser = axes, allow_hyphen_values = true, conflicts_with_all = ["radius", "obstacles"], help_heading = "Question")]
+    #[arg(
+        long,
+        value_name = "AX,AY,AZ",
+        value_parser = axes,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["radius", "obstacles"],
+        help_heading = "Judging"
+    )]
     pub(super) ellipsoid: Option<Vector3<f64>>,
-    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; at rest or moving.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) obstacles: Option<PathBuf>,
-    /// Limits on each vehicle by itself: speed, horizontal, climb and descent [m/s], accel [m/s^2], height and floor [m].
-    #[arg(long, value_name = "LIMIT=VALUE,...", value_parser = limit, value_delimiter = ',', allow_hyphen_values = true, help_heading = "Question")]
+    /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor [m].
+    #[arg(
+        long,
+        value_name = "LIMIT=VALUE,...",
+        value_parser = limit,
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "Judging"
+    )]
     pub(super) limit: Vec<Limit>,
-    /// Hold mean accelerations over this time [s] against --limit accel: the change of velocity over its length, corners of
-    /// curves too.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    /// Check means of the acceleration over this time [s] against --limit accel; corners of curves count.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) accel_window: Option<f64>,
-    /// TOML file of a fence that every vehicle must stay within.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    /// TOML file of a fence that contains all vehicles.
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) fence: Option<PathBuf>,
-    /// Judge from here on [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    /// Start of the judged window [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) from: Option<f64>,
-    /// Judge up to here [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    /// End of the judged window [s].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) to: Option<f64>,
-    /// Leave out pairs while both are at or below this height [m].
-    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Question")]
+    /// Ignore pairs while both vehicles are at or below this height [m].
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) above: Option<f64>,
-    /// Judge these vehicles alone; a name with a comma in quotes. May be given several times.
-    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Question")]
+    /// Judge only these vehicles; quote a name with a comma. Repeatable.
+    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
     pub(super) ids: Vec<Listed>,
-    /// Add this to the times of a vehicle whose clock was off [s]; may be given several times.
-    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Question")]
+    /// Add this to the times of a vehicle with a clock offset [s]; repeatable.
+    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Judging")]
     pub(super) offset: Vec<(String, f64)>,
-    /// How many vehicles there must be to judge: another number is wrong input.
-    #[arg(long, value_name = "N", help_heading = "Question")]
+    /// Expected number of vehicles; another number is wrong input.
+    #[arg(long, value_name = "N", help_heading = "Judging")]
     pub(super) expect_vehicles: Option<usize>,
-    /// Judge a recording of tautline from its samples, without the run's audit of every step.
-    #[arg(long, help_heading = "Question")]
+    /// Judge a tautline recording from its samples, without the run's audit of every step.
+    #[arg(long, help_heading = "Judging")]
     pub(super) independent: bool,
-    /// Leave it undecided where a vehicle is not seen over the whole window.
-    #[arg(long, help_heading = "Question")]
+    /// Report undecided if a vehicle is absent in part of the window.
+    #[arg(long, help_heading = "Judging")]
     pub(super) require_presence: bool,
-    /// Longest time between two samples that is no gap [s] [default: 1.5 of the vehicle's usual interval].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Question")]
+    /// Longest time between two samples that is not a gap [s] [default: 1.5 of the vehicle's usual interval].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) max_gap: Option<f64>,
 
-    /// Ask what this file says, in the place of the nearest tautline.toml beside the recording and above it, up to the working
-    /// folder.
-    #[arg(long, value_name = "FILE", help_heading = "Question")]
+    /// Read settings from this file instead of the nearest tautline.toml, which is searched from the folder of the
+    /// recording up to the working folder.
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) config: Option<PathBuf>,
-    /// Ignore tautline.toml: use the options of the command line alone.
-    #[arg(long, conflicts_with = "config", help_heading = "Question")]
+    /// Ignore all tautline.toml files.
+    #[arg(long, conflicts_with = "config", help_heading = "Judging")]
     pub(super) no_config: bool,
 
-    /// Print the report as JSON on standard output, and nothing else there.
-    #[arg(long, help_heading = "Answer")]
+    /// Print the report as JSON on standard output; all text goes to standard error.
+    #[arg(long, help_heading = "Output")]
     pub(super) json: bool,
-    /// Print no summary and no progress: the exit code says it.
-    #[arg(long, help_heading = "Answer")]
+    /// Print no summary and no progress.
+    #[arg(long, help_heading = "Output")]
     pub(super) quiet: bool,
     /// Write the verdict as a `JUnit` file.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) events: Option<PathBuf>,
-    /// Write a report for people, with figures.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    /// Write a report page with figures.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) html: Option<PathBuf>,
-    /// Write a proof of the verdict, which `check_proof.py` confirms by exact arithmetic without this program; for a CSV table and
-    /// --delta alone.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
+    /// CSV table with --delta.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) proof: Option<PathBuf>,
-    /// Write a summary in Markdown, as for the page of a job.
-    #[arg(long, value_name = "FILE", help_heading = "Answer")]
+    /// Write a summary in Markdown, for example for the page of a job.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) summary: Option<PathBuf>,
-    /// Print a line for each recording that marks it in the log and on the page of a job.
-    #[arg(long, value_name = "SYSTEM", help_heading = "Answer")]
+    /// Print an annotation for each recording, in the format of this CI system.
+    #[arg(long, value_name = "SYSTEM", help_heading = "Output")]
     pub(super) annotations: Option<Annotations>,
-    /// Exit with 0 where it cannot be told, too.
-    #[arg(long, help_heading = "Answer")]
+    /// Exit with 0 for undecided recordings too.
+    #[arg(long, help_heading = "Output")]
     pub(super) allow_undecided: bool,
 }
 
 fn motion() -> impl TypedValueParser<Value = Interpolation> {
     let help = |motion| match motion {
         Interpolation::Linear => "Straight lines",
-        Interpolation::Hold => "Nothing, with a jump at each sample",
+        Interpolation::Hold => "Constant positions, with a jump at each sample",
         Interpolation::Polynomial => "The recording's own curves",
-        Interpolation::Bounded => "Anything within the largest acceleration",
+        Interpolation::Bounded => "Any motion within the largest acceleration",
     };
     one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
 }
 
-/// Whose lines mark what was found.
+/// CI system whose annotations are printed.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub(super) enum Annotations {
     /// GitHub Actions
     Github,
 }
 
-/// A number, perhaps of one vehicle alone.
+/// Number, for one vehicle if it has a name.
 pub(super) type Named = (Option<String>, f64);
 
 /// Names of vehicles.
@@ -291,12 +304,12 @@ fn axes(text: &str) -> Result<Vector3<f64>, String> {
     Ok(Vector3::new(x, y, z))
 }
 
-/// A limit as it is written: `speed=5`.
+/// Parses a limit such as `speed=5`.
 fn limit(text: &str) -> Result<Limit, String> {
     let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
-    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE, of {}", names()))?;
+    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE with a limit of {}", names()))?;
     let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.name() == name.trim());
-    let quantity = quantity.ok_or_else(|| format!("`{name}` is not a limit: the limits are {}", names()))?;
+    let quantity = quantity.ok_or_else(|| format!("unknown limit `{name}`; the limits are {}", names()))?;
     match value.trim().parse::<f64>() {
         Ok(allowed) if allowed.is_finite() => Ok(Limit { quantity, allowed }),
         _ => Err(format!("`{value}` is not a number")),
@@ -304,7 +317,7 @@ fn limit(text: &str) -> Result<Limit, String> {
 }
 
 impl AuditArguments {
-    /// The request about the recording in these files, which `command` makes again, and its settings.
+    /// Returns the request for the recording in these files, and its settings. `command` repeats the request.
     pub(super) fn request(
         &self,
         paths: Vec<PathBuf>,
@@ -371,7 +384,7 @@ impl AuditArguments {
         })
     }
 
-    /// The files that are written about all recordings together, with their options.
+    /// Returns the output files that cover all recordings, with their options.
     pub(super) fn outputs(&self) -> Vec<Called<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
         outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect()
@@ -400,9 +413,9 @@ mod tests {
         assert_eq!((read.quantity, read.allowed), (Quantity::Climb, 2.5));
         assert_eq!(
             limit("speed").unwrap_err(),
-            "write LIMIT=VALUE, of speed, horizontal, climb, descent, accel, height, floor"
+            "write LIMIT=VALUE with a limit of speed, horizontal, climb, descent, accel, height, floor"
         );
-        assert!(limit("spee=3").unwrap_err().starts_with("`spee` is not a limit"));
+        assert!(limit("spee=3").unwrap_err().starts_with("unknown limit `spee`"));
         assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");
     }
 }

@@ -1,4 +1,4 @@
-//! Answers of `tautline audit` for other programs: Markdown and annotations for GitHub, CSV and `JUnit`.
+//! Machine-readable reports of `tautline audit`: Markdown and annotations for GitHub, CSV, and `JUnit`.
 
 use std::fmt::Write as _;
 
@@ -12,9 +12,8 @@ use tautline_report::request::{Audited, Failure};
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
-/// Violations, undecided times and gaps of pairs and of single vehicles, and the rest of a flight that ended early, a row each, in
-/// order of time; where several recordings are asked about `named` puts
-/// the recording in front.
+/// Returns one row for each violation, undecided time, gap and early end, in order of time. With `named`, the first
+/// column is the recording.
 pub(super) fn csv(judged: &[Audited], named: bool) -> Result<Vec<u8>, Failure> {
     let failed =
         |error: csv::Error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}"));
@@ -31,7 +30,7 @@ pub(super) fn csv(judged: &[Audited], named: bool) -> Result<Vec<u8>, Failure> {
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}")))
 }
 
-/// The rows of one recording.
+/// Returns the rows of one recording.
 fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
     let violations = report.violations.iter().map(|OfPair { who: [first, second], finding: v }| {
         let numbers = [Some(v.min_m), Some(v.min_m), Some(v.min_at_s), Some(v.limit_m), None];
@@ -59,10 +58,10 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
     })
 }
 
-/// A time, what is said of it, and its numbers.
+/// Time span, words and numbers of a row.
 type Row = ([f64; 2], Vec<String>, [Option<f64>; 5]);
 
-/// The rows of one limit on each vehicle by itself: its name stands in the place of a second vehicle.
+/// Returns the rows of a limit of single vehicles; the name of the limit is in the column of the second vehicle.
 fn beyond(limit: &OfLimit) -> impl Iterator<Item = Row> + '_ {
     let violations = limit.violations.iter().map(|of| ("violation", of));
     let undecided = limit.undecided.iter().map(|of| ("undecided", of));
@@ -73,13 +72,13 @@ fn beyond(limit: &OfLimit) -> impl Iterator<Item = Row> + '_ {
     })
 }
 
-/// Every digit of a number, in powers of ten where it is very large or small.
+/// Returns all digits of a number, with a power of ten if it is very large or small.
 fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// A suite for each recording, and an error for each that could not be judged. What is undecided fails, or is skipped where it
-/// is allowed.
+/// Returns a suite for each recording, and an error for each failure. Undecided results fail, or are skipped if
+/// allowed.
 pub(super) fn junit(judged: &[Audited], failures: &[(String, Failure)]) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
     junit.add_test_suites(judged.iter().map(suite));
@@ -97,7 +96,7 @@ pub(super) fn junit(judged: &[Audited], failures: &[(String, Failure)]) -> Resul
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the JUnit report: {error}")))
 }
 
-/// A case for the verdict and one for each thing found.
+/// Returns a case for the verdict and a case for each finding.
 fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
@@ -150,10 +149,10 @@ fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
     suite
 }
 
-/// A summary in Markdown: a row for each recording, and behind it what was found of each that is not clear.
+/// Returns a summary in Markdown: a row for each recording, then the findings of each recording that is not clear.
 pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> String {
     let mut text =
-        "## tautline audit\n\n| recording | verdict | closest | who | at |\n| --- | --- | --- | --- | --- |\n"
+        "## tautline audit\n\n| recording | verdict | closest | vehicles | at |\n| --- | --- | --- | --- | --- |\n"
             .to_owned();
     for Audited { report, .. } in judged {
         let closest = report.closest.first();
@@ -190,7 +189,7 @@ pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> St
     text
 }
 
-/// A line for each recording, in the words of GitHub Actions.
+/// Returns an annotation of GitHub Actions for each recording.
 pub(super) fn github(judged: &[Audited], failures: &[(String, Failure)]) -> String {
     let mut text = String::new();
     let mut line = |level: &str, recording: &str, title: &str, message: &str| {
@@ -212,7 +211,7 @@ pub(super) fn github(judged: &[Audited], failures: &[(String, Failure)]) -> Stri
     text
 }
 
-/// How many recordings got which verdict, in one line.
+/// Returns the numbers of recordings with each verdict in one line.
 pub(super) fn counts(judged: &[Audited], failures: usize) -> String {
     let of = |status: Status| judged.iter().filter(|of| of.report.status == status).count() as u64;
     let mut parts = vec![
@@ -255,7 +254,7 @@ fn longest_run(text: &str) -> usize {
     text.split(|c| c != '`').map(str::len).max().unwrap_or(0)
 }
 
-/// Escapes untrusted text for a line of GitHub Actions: line ends, and the marks of its older commands.
+/// Escapes untrusted text for a line of GitHub Actions: line ends, and the prefix of old-style commands.
 fn data(text: &str) -> String {
     let text = text.replace('%', "%25").replace('\r', "%0D").replace('\n', "%0A").replace("##[", "# #[");
     text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
@@ -270,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn foreign_text_means_nothing() {
+    fn untrusted_text_is_escaped() {
         assert_eq!(escape_markdown("a|b<script>`x`\n[l](u)"), "a\\|b&lt;script&gt;\\`x\\` \\[l\\](u)");
         assert_eq!(property("a,b:c%\n::error::"), "a%2Cb%3Ac%25%0A%3A%3Aerror%3A%3A");
         assert_eq!(data("\u{1b}[31m##[error]x"), "\u{fffd}[31m# #[error]x");

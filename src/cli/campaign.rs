@@ -1,4 +1,4 @@
-//! `tautline campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
+//! `tautline campaign`: many flights, merged into one answer with intervals.
 
 use std::path::PathBuf;
 
@@ -16,83 +16,83 @@ use tautline_studies::campaign::{
 /// Arguments of `tautline campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where no flight violated (missing: where nothing is missing), with 1 where one did, where that is not known of all, \
-or where it was interrupted, with 2 for wrong input, other campaigns' parts and missing shards, with 3 where the machine failed or two machines flew \
-different results. docs/campaigns.md says more.")]
+Exit codes: 0 no violation (`missing`: no missing shard); 1 violations, unknown flights, or interrupted; 2 wrong input; \
+3 failure of the machine. See docs/campaigns.md for all causes.")]
 pub(super) struct CampaignArguments {
     #[command(subcommand)]
-    what: What,
+    command: CampaignCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
-    /// Fly everything on this machine, merge it and report; started again it goes on where it was.
-    Run(RunCampaign),
-    /// Split a campaign into shards, which are then flown anywhere.
-    Plan(PlanCampaign),
-    /// Fly one shard or several.
-    Shard(ShardCampaign),
-    /// Print the shards that are missing, as --shard takes them; exits with 0 where there are none.
-    Missing(InFolder),
-    /// Put all parts together: results.parquet, campaign.json and campaign.html.
-    Merge(Answered),
-    /// Say the answer of a campaign again, and write its page anew.
-    Report(Answered),
-    /// Fly a run again, with its recording and pictures, and compare its state hash.
-    Replay(Replay),
+enum CampaignCommand {
+    /// Fly a whole campaign on this machine, merge and report it; a repeated call continues an interrupted campaign.
+    Run(RunArguments),
+    /// Split a campaign into shards that several machines can fly.
+    Plan(PlanArguments),
+    /// Fly one or several shards.
+    Shard(ShardArguments),
+    /// Print the missing shards as a list for --shard; exits with 0 if none is missing.
+    Missing(FolderArguments),
+    /// Merge all parts into results.parquet, campaign.json and campaign.html.
+    Merge(AnswerArguments),
+    /// Print the answer of a merged campaign and rewrite its page.
+    Report(AnswerArguments),
+    /// Repeat one flight with recording and pictures, and compare its state hash.
+    Replay(ReplayArguments),
 }
 
-/// A specification, and when to stop.
+/// Specification with the rule for an early stop.
 #[derive(Debug, Args)]
 struct SpecArguments {
-    /// The specification.
+    /// Specification of the campaign (TOML).
     #[arg(value_name = "SPEC.toml")]
     spec: PathBuf,
-    /// Stop as soon as the interval of each law's share of clear flights is no wider.
+    /// Stop when the interval of each law's share of clear flights is at most W wide.
     #[arg(long, value_name = "W")]
     until_width: Option<f64>,
-    /// Stop as soon as each law's share of clear flights is known to be above or below P.
+    /// Stop when the interval of each law's share of clear flights does not contain P.
     #[arg(long, value_name = "P")]
     until_decided: Option<f64>,
 }
 
 #[derive(Debug, Args)]
-struct RunCampaign {
+struct RunArguments {
     #[command(flatten)]
     spec: SpecArguments,
-    /// Folder for everything; by default out/NAME, where NAME is the specification's.
+    /// Folder of the campaign [default: out/NAME with the name of the specification].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Parts to fly it in; one that is whole is not flown again.
+    /// Number of shards [default: one for 250 runs]; finished shards are not flown again.
     #[arg(long, value_name = "N")]
     shards: Option<u64>,
-    /// Threads to use, by default one a core; the result is the same for any number.
+    /// Number of threads [default: one for each core]; the result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     #[command(flatten)]
-    says: Says,
+    answer: AnswerOptions,
 }
 
 #[derive(Debug, Args)]
-struct PlanCampaign {
+struct PlanArguments {
     #[command(flatten)]
     spec: SpecArguments,
-    /// Folder for everything.
+    /// Folder of the campaign.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Parts to fly it in, by default one for 250 runs.
+    /// Number of shards [default: one for 250 runs].
     #[arg(long, value_name = "N")]
     shards: Option<u64>,
 }
 
 #[derive(Debug, Args)]
-struct ShardCampaign {
+struct ShardArguments {
     #[command(flatten)]
-    folder: InFolder,
-    /// Which, from 0 on: 7, 3-5, 13,500-502, or env:NAME for what that variable says, such as `env:SLURM_ARRAY_TASK_ID`.
+    folder: FolderArguments,
+    /// Shards to fly, from 0: 7, 3-5, 13,500-502, or env:NAME for a list in an environment variable, such as
+    /// `env:SLURM_ARRAY_TASK_ID`.
     #[arg(long, value_name = "K|A-B|env:NAME")]
     shard: String,
-    /// Threads to use; the result is the same for any number.
+    /// Number of threads; the result is the same for any number.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: u16,
     /// Print no progress.
@@ -101,30 +101,30 @@ struct ShardCampaign {
 }
 
 #[derive(Debug, Args)]
-struct InFolder {
-    /// The folder of the campaign, or its manifest.
+struct FolderArguments {
+    /// Folder of the campaign, or its manifest.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
 }
 
 #[derive(Debug, Args)]
-struct Answered {
+struct AnswerArguments {
     #[command(flatten)]
-    folder: InFolder,
+    folder: FolderArguments,
     #[command(flatten)]
-    says: Says,
+    answer: AnswerOptions,
 }
 
-/// How an answer is said.
+/// Form of an answer.
 #[derive(Debug, Args)]
-struct Says {
-    /// Flights with the least clearance that are flown again, each with its recording, report and pictures.
+struct AnswerOptions {
+    /// Number of flights with the least clearance to repeat, each with recording, report and pictures.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
-    /// Take no pictures of them.
+    /// Take no pictures of these flights.
     #[arg(long)]
     no_snapshots: bool,
-    /// Print the answer as JSON on standard output, and nothing else there.
+    /// Print the answer as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
     /// Print no summary and no progress.
@@ -133,19 +133,19 @@ struct Says {
 }
 
 #[derive(Debug, Args)]
-struct Replay {
+struct ReplayArguments {
     #[command(flatten)]
-    folder: InFolder,
+    folder: FolderArguments,
     /// Number of the run, from 0.
     #[arg(long, value_name = "I")]
     run: u64,
-    /// The law, where several fly each run; the first unless given.
+    /// Law of the flight [default: the first].
     #[arg(long, value_name = "NAME")]
     law: Option<String>,
-    /// The flight among those that were violated in this run, from 0, where runs are estimates of rare violations.
+    /// Index in the violated flights of the run, from 0, for campaigns that estimate rare violations.
     #[arg(long, value_name = "K")]
     bad: Option<usize>,
-    /// Folder for the recording and the report; by default worst/LAW-run-I in the campaign's.
+    /// Folder for the recording and the report [default: worst/LAW-run-I in the folder of the campaign].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take no pictures.
@@ -154,18 +154,18 @@ struct Replay {
 }
 
 pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
-    match &arguments.what {
-        What::Run(run) => {
+    match &arguments.command {
+        CampaignCommand::Run(run) => {
             let request = CampaignRequest {
                 out: run.out.clone(),
                 shards: run.shards,
                 threads: run.threads.map(usize::from),
-                worst: run.says.worst.into(),
+                worst: run.answer.worst.into(),
                 ..run.spec.request()
             };
-            run.says.answer(|monitor| study::campaign(&request, &*run.says.pictures(), monitor))
+            run.answer.run(|monitor| study::campaign(&request, &*run.answer.pictures(), monitor))
         }
-        What::Plan(plan) => {
+        CampaignCommand::Plan(plan) => {
             let request = CampaignRequest { out: Some(plan.out.clone()), shards: plan.shards, ..plan.spec.request() };
             let folder = request.plan()?;
             let manifest = folder.campaign().manifest();
@@ -181,27 +181,27 @@ pub(super) fn campaign(arguments: &CampaignArguments) -> Result<Exit, Failure> {
             ));
             Ok(Exit::Good)
         }
-        What::Shard(shard) => {
+        CampaignCommand::Shard(shard) => {
             let folder = shard.folder.open()?;
             let shards = parse(&shard.shard, folder.campaign().manifest().shards)?;
             let monitor = Terminal::new(Console { data_on_stdout: false, quiet: shard.quiet })?;
             Ok(Exit::good_if(study::fly_shards(&folder, &shards, shard.threads.into(), &monitor)?))
         }
-        What::Missing(at) => {
+        CampaignCommand::Missing(at) => {
             let monitor = Terminal::without_signals(Console { data_on_stdout: true, quiet: false });
             let missing = study::missing_shards(&at.open()?, &monitor)?;
             console::data(&if missing.is_empty() { String::new() } else { listed(&missing) + "\n" })?;
             Ok(Exit::good_if(missing.is_empty()))
         }
-        What::Merge(Answered { folder, says }) => {
+        CampaignCommand::Merge(AnswerArguments { folder, answer }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::merge(&folder, says.worst.into(), &*says.pictures(), monitor))
+            answer.run(|monitor| study::merge(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
-        What::Report(Answered { folder, says }) => {
+        CampaignCommand::Report(AnswerArguments { folder, answer }) => {
             let folder = folder.open()?;
-            says.answer(|monitor| study::report(&folder, says.worst.into(), &*says.pictures(), monitor))
+            answer.run(|monitor| study::report(&folder, answer.worst.into(), &*answer.pictures(), monitor))
         }
-        What::Replay(replay) => {
+        CampaignCommand::Replay(replay) => {
             let request =
                 ReplayRequest { run: replay.run, law: replay.law.clone(), bad: replay.bad, out: replay.out.clone() };
             let folder = replay.folder.open()?;
@@ -221,22 +221,19 @@ impl SpecArguments {
     }
 }
 
-impl InFolder {
+impl FolderArguments {
     fn open(&self) -> Result<Folder, Failure> {
-        Ok(Folder::open(&self.folder, &Program::running()?)?)
+        Folder::open(&self.folder, &Program::running()?)
     }
 }
 
-impl Says {
+impl AnswerOptions {
     fn pictures(&self) -> Box<dyn Pictures> {
         pictures("best", !self.no_snapshots)
     }
 
-    /// Answers a request, and prints the answer as JSON where that is asked for.
-    fn answer(
-        &self,
-        request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>,
-    ) -> Result<Exit, Failure> {
+    /// Answers a request, and prints the answer as JSON with `--json`.
+    fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>) -> Result<Exit, Failure> {
         let monitor = Terminal::new(Console { data_on_stdout: self.json, quiet: self.quiet })?;
         let Some(CampaignAnswer { summary, .. }) = request(&monitor)? else { return Ok(Exit::Bad) };
         if self.json {

@@ -17,17 +17,17 @@ const PROGRESS_HZ: u8 = 10;
 /// Exit code of a second Ctrl-C, as shells give it.
 const INTERRUPTED_TWICE: i32 = 130;
 
-/// What the user wants to see.
+/// Output settings of a command.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Console {
-    /// Standard output carries data, so talk goes to standard error.
+    /// Whether standard output carries data; text then goes to standard error.
     pub(super) data_on_stdout: bool,
-    /// No talk at all.
+    /// Whether text is suppressed.
     pub(super) quiet: bool,
 }
 
 impl Console {
-    /// Says something to a person, and nothing to the terminal. What nobody reads any more is dropped.
+    /// Prints text without control characters. A closed stream is ignored.
     pub(super) fn say(self, text: &str) {
         if self.quiet {
             return;
@@ -40,12 +40,12 @@ impl Console {
         };
     }
 
-    /// Says something that must not stand between a reader and what was asked for: on standard error.
+    /// Prints a warning on standard error.
     pub(super) fn warn(self, text: &str) {
         Self { data_on_stdout: true, ..self }.say(text);
     }
 
-    /// A progress bar on a terminal, nothing in a pipe; a count where the end of the work is not known.
+    /// Returns a progress bar on a terminal, hidden in a pipe; a counter if the total is unknown.
     pub(super) fn progress(self, total: Option<u64>, message: String) -> ProgressBar {
         if self.quiet || !io::stderr().is_terminal() {
             return ProgressBar::hidden();
@@ -65,7 +65,8 @@ impl Console {
     }
 }
 
-/// The terminal as the monitor of a request. Ctrl-C (and a request to terminate) ends the work; the second one does not wait.
+/// Monitor of a request on the terminal. The first Ctrl-C or request to terminate interrupts the work, the second ends
+/// the process.
 pub(super) struct Terminal {
     console: Console,
     bar: Mutex<ProgressBar>,
@@ -73,7 +74,7 @@ pub(super) struct Terminal {
 }
 
 impl Terminal {
-    /// Listens to Ctrl-C from here on.
+    /// Returns a terminal that handles Ctrl-C.
     pub(super) fn new(console: Console) -> Result<Self, Failure> {
         let interruption = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interruption);
@@ -87,7 +88,7 @@ impl Terminal {
         Ok(Self::with(console, interruption))
     }
 
-    /// Leaves Ctrl-C as it is: it ends the program.
+    /// Returns a terminal that leaves Ctrl-C to the system, which ends the program.
     pub(super) fn without_signals(console: Console) -> Self {
         Self::with(console, Arc::default())
     }
@@ -143,7 +144,7 @@ pub(super) fn data(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes lines that are not for a person beside data on standard output: to standard error. What nobody reads is dropped.
+/// Writes lines of data to standard error, beside data on standard output. A closed stream is ignored.
 pub(super) fn beside(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
@@ -156,26 +157,26 @@ pub(super) fn json(answer: &impl Serialize) -> Result<(), Failure> {
     }
 }
 
-/// How the program ends.
+/// Exit code of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Exit {
-    /// Judged and good, or nothing to judge.
+    /// Good verdict, or nothing to judge.
     Good = 0,
-    /// Judged and bad: a violation, a claim not met.
+    /// Bad verdict: a violation, or a claim that is not met.
     Bad = 1,
-    /// The input is wrong: usage, scenario, recording.
+    /// Wrong input: arguments, scenario, recording.
     WrongInput = 2,
-    /// The machine failed: input and output, no adapter.
+    /// Failure of the machine: input and output, no adapter.
     MachineFailed = 3,
 }
 
 impl Exit {
-    /// The end after a failure.
+    /// Returns the exit code of a failure.
     pub(super) fn of(failure: &Failure) -> Self {
         if failure.is_machine() { Self::MachineFailed } else { Self::WrongInput }
     }
 
-    /// The end after an answer.
+    /// Returns the exit code of a verdict.
     pub(super) fn good_if(is_good: bool) -> Self {
         if is_good { Self::Good } else { Self::Bad }
     }
@@ -187,7 +188,7 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Shows a failure on standard error.
+/// Prints a failure on standard error.
 pub(super) fn show(failure: &Failure) -> Exit {
     let mut diagnostic = MietteDiagnostic::new(failure.message()).with_code(failure.code());
     diagnostic.help = failure.help().map(str::to_owned);

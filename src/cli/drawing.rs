@@ -1,4 +1,4 @@
-//! What every command that draws has in common.
+//! Helpers of the commands that draw: themes, sizes, recordings and adapters.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -10,21 +10,21 @@ use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
 use tautline_render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
 use tautline_report::request::Failure;
 
-/// Bytes of an MCAP file that hold the name of what wrote it.
+/// Number of bytes at the start of an MCAP file that contain the name of its writer.
 const FIRST_BYTES: u64 = 64;
 
-/// The names of the themes.
+/// Parses the name of a theme.
 pub(super) fn theme(name: &str) -> Result<Theme, String> {
     let known = Theme::ALL.iter().find(|(known, _)| *known == name);
     known.map(|(_, theme)| *theme).ok_or_else(|| "give dark, light or paper".to_owned())
 }
 
-/// Width and height in pixels, as in 1280x720.
+/// Parses width and height in pixels, such as 1280x720.
 pub(super) fn size(text: &str) -> Result<[u32; 2], String> {
     pair(text).ok_or_else(|| "give width and height in pixels, each at least 1, such as 1280x720".to_owned())
 }
 
-/// Columns and rows, as in 4x3.
+/// Parses columns and rows, such as 4x3.
 pub(super) fn sheet(text: &str) -> Result<[u32; 2], String> {
     pair(text).ok_or_else(|| "give columns and rows, each at least 1, such as 4x3".to_owned())
 }
@@ -35,8 +35,8 @@ fn pair(text: &str) -> Option<[u32; 2]> {
     Some([side(first)?, side(second)?])
 }
 
-/// Reads a recording to draw it, and says what a person should know about how it was read. `delta_m` is for recordings
-/// that do not say what they are judged by.
+/// Reads a recording to draw it, and prints notes on how it was read. `delta_m` is the safety distance for recordings
+/// without one.
 pub(super) fn timeline(
     recording: &Path,
     reading: &ReadOptions,
@@ -44,10 +44,10 @@ pub(super) fn timeline(
     console: Console,
 ) -> Result<Timeline, Failure> {
     if let Some(delta_m) = delta_m.filter(|delta_m| !(*delta_m > 0.0 && *delta_m <= FARTHEST_M)) {
-        let help = format!("give a positive distance in metres, at most {FARTHEST_M:e}");
-        return Err(Failure::input("render/out-of-range", format!("--delta is {delta_m:?}"), help));
+        let message = format!("--delta: must be more than 0 and at most {FARTHEST_M:e}, got {delta_m:?}");
+        return Err(Failure::input("render/out-of-range", message, "give a distance in metres"));
     }
-    // Our own recordings know formation, graph and law too.
+    // Recordings of tautline also contain formation, graph and law.
     let may_be_ours = reading.format.is_none_or(|format| format == Format::MCAP);
     let timeline = match McapRecording::open(recording) {
         Ok(ours) if may_be_ours => {
@@ -69,7 +69,7 @@ pub(super) fn timeline(
     Ok(timeline)
 }
 
-/// Reads a recording that knows nothing but positions.
+/// Reads a recording of positions only.
 fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> Result<Timeline, Failure> {
     let unreadable = |error: ReadError| {
         let help = error.help();
@@ -97,7 +97,7 @@ fn of_others(recording: &Path, reading: &ReadOptions, delta_m: Option<f64>) -> R
     })
 }
 
-/// Whether a file begins as a recording of ours and holds no channel, as when its writer was killed at once.
+/// Returns whether a file starts like a tautline recording and has no channel, because its writer was killed at once.
 fn has_nothing_yet(recording: &Path, reading: &ReadOptions) -> bool {
     let mut start = Vec::new();
     let read = File::open(recording).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut start));
@@ -107,22 +107,21 @@ fn has_nothing_yet(recording: &Path, reading: &ReadOptions) -> bool {
     read.is_ok() && ours && read::open(recording, &accept).is_err_and(|error| no_positions(&error))
 }
 
-/// Refuses what has no effect on a recording of ours.
+/// Refuses options that have no effect on a tautline recording.
 fn speaks_for_itself(ours: &McapRecording, reading: &ReadOptions, delta_m: Option<f64>) -> Result<(), Failure> {
     if delta_m.is_some() {
-        let message =
-            format!("the recording is of tautline and was judged by its own delta, {} m", ours.header().delta_m);
+        let message = format!("--delta: the recording was judged by its own delta, {} m", ours.header().delta_m);
         return Err(Failure::input(
             "render/own-recording",
             message,
-            "leave --delta out; `tautline audit` judges it by another",
+            "leave --delta out; `tautline audit` judges by another delta",
         ));
     }
     let said = ReadOptions { format: None, allow_unfinished: false, ..reading.clone() };
     if said != ReadOptions::default() {
         return Err(Failure::input(
             "render/own-recording",
-            "the recording is of tautline and says itself how it is read",
+            "options for reading: have no effect on a recording of tautline",
             "leave --time-unit, --scale, --column, --axis-order and --frame out",
         ));
     }
@@ -136,8 +135,8 @@ const NO_LAYER: &str = "NODEVICE_SELECT";
 #[cfg(target_os = "linux")]
 const CHOICE: &str = "MESA_VK_DEVICE_SELECT";
 
-/// Replaces the process by the same program without the layer, once, if there is no desktop. Without a desktop the layer writes
-/// complaints to standard error. If the program cannot be started again, this process continues.
+/// Restarts the program once without the layer if there is no desktop, where the layer writes complaints to standard
+/// error. If the program cannot be restarted, this process continues.
 #[cfg(target_os = "linux")]
 pub(super) fn silence_driver() {
     use std::env::{args_os, current_exe, var_os};

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::TypedValueParser;
 
 use super::Exit;
 use super::console::{Console, Terminal};
@@ -14,25 +15,25 @@ use tautline_report::request::{ExportRequest, Failure, export_file};
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArguments {
-    /// The file to write.
+    /// File to write.
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
-    /// Format to write [default: by the extension of the file].
-    #[arg(long, value_name = "FORMAT", value_parser = one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect()))]
+    /// Format to write [default: from the extension of the file].
+    #[arg(long, value_name = "FORMAT", value_parser = written_format())]
     format: Option<Format>,
-    /// How often curves are sampled [Hz]; what is between the samples is lost.
+    /// Sampling rate of curves [Hz]; the motion between the samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_hz: Option<f64>,
-    /// Overwrite the file if it exists.
+    /// Overwrite an existing file.
     #[arg(long)]
     force: bool,
-    /// Say nothing.
+    /// Print no text.
     #[arg(long, short)]
     quiet: bool,
-    // Last, because its heading holds for all that follows.
+    // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
+    /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
     input_format: Option<Format>,
 }
@@ -40,7 +41,7 @@ pub(super) struct ExportArguments {
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let [paths] = &arguments.reading.recordings()[..] else {
         let help = "give --join if each file holds a vehicle of one recording";
-        let message = "several recordings are given, and one is exported";
+        let message = "RECORDING: must be one recording, got several";
         return Err(Failure::input("usage/several-recordings", message, help));
     };
     let request = ExportRequest {
@@ -53,4 +54,9 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     };
     export_file(&request, &Terminal::new(Console { data_on_stdout: false, quiet: arguments.quiet })?)?;
     Ok(Exit::Good)
+}
+
+/// Returns a parser of writable formats.
+fn written_format() -> impl TypedValueParser<Value = Format> {
+    one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect())
 }

@@ -1,5 +1,4 @@
-//! Commands that print a part of the program: `list` (built-in scenarios), `schema` (of the scenario file) and
-//! `completions` (of a shell).
+//! `tautline list` (built-in scenarios), `schema` (of the scenario file) and `completions` (of a shell).
 
 use std::path::Path;
 
@@ -14,8 +13,7 @@ use tautline_sim::scenario::{self, builtin};
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]
 pub(super) struct ListArguments {
-    /// Print this built-in scenario as TOML instead, or the one that a recording of a run holds, with every default
-    /// written out.
+    /// Print this built-in scenario as TOML, or the scenario in a recording of `tautline run` with all defaults.
     #[arg(long, value_name = "NAME|RECORDING")]
     show: Option<String>,
 }
@@ -32,14 +30,15 @@ pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
     Ok(Exit::Good)
 }
 
-/// The scenario of a run's recording.
+/// Returns the scenario in a recording of `tautline run`.
 fn of_recording(name: &str) -> Result<String, Failure> {
     let path = Path::new(name);
     if !path.exists() {
-        let help = "`tautline list` shows their names; a recording is given by its path, such as out/pentagon/run.mcap";
+        let help =
+            "`tautline list` shows the built-in scenarios; give a recording by its path, such as out/pentagon/run.mcap";
         return Err(Failure::input(
             "scenario/not-found",
-            format!("there is no built-in scenario and no recording `{name}`"),
+            format!("no built-in scenario and no recording `{name}`"),
             help,
         ));
     }
@@ -65,7 +64,7 @@ pub(super) fn schema() -> Result<Exit, Failure> {
 /// Arguments of `tautline completions`.
 #[derive(Debug, Args)]
 pub(super) struct CompletionsArguments {
-    /// The shell.
+    /// Shell of the script.
     shell: Shell,
 }
 

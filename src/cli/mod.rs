@@ -1,7 +1,7 @@
-//! The command line: all commands, and a file for each command or group of commands. Only this module prints.
+//! Command line: one file for each command or group of commands. Only this module prints.
 //!
-//! Exit codes are the same for all commands: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed.
-//! Human text goes to standard output, or to standard error where standard output carries data.
+//! All commands have the same exit codes: 0 good, 1 bad, 2 wrong input, 3 failure of the machine. Text goes to standard
+//! output, or to standard error if standard output carries data.
 
 mod audit;
 mod audit_formats;
@@ -36,7 +36,7 @@ pub fn main() -> ExitCode {
     entry(&std::env::args_os().collect::<Vec<_>>()).into()
 }
 
-/// Runs the program with these arguments, the first of which is its own name, and gives its exit code.
+/// Runs the program with arguments, beginning with its own name, and returns the exit code.
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
@@ -45,7 +45,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            // A closed pipe is the reader's choice.
+            // The reader may close the pipe.
             let _ = usage.print();
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
@@ -63,13 +63,13 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     dispatch(command, &line).unwrap_or_else(|failure| console::show(&failure)) as u8
 }
 
-/// Fly a swarm into formation inside a rigid-body engine and prove that nothing touched.
+/// Fly formations of vehicles in a rigid-body engine and prove that no two come too close.
 ///
 /// Without a command, flies the built-in scenario `pentagon`.
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 judged and good, 1 judged and bad, 2 wrong input, 3 the machine failed."
+    after_help = "Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -77,35 +77,35 @@ struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one of it")]
+#[expect(clippy::large_enum_variant, reason = "one value per process")]
 enum Command {
-    /// Fly a scenario, audit every step and leave a recording and a report.
+    /// Fly a scenario, audit every step, and write a recording and a report.
     Run(run::RunArguments),
-    /// Judge a recording of any origin: clear, a violation, or undecided at its sampling.
+    /// Judge a recording of any source: clear, violation, or undecided.
     Audit(audit::AuditArguments),
-    /// Say what is known before the first step: stability, certified separation, step, traps.
+    /// Analyse a scenario without flying it: stability, certified separation, step, traps.
     Check(run::CheckArguments),
-    /// Reproduce the paper and judge every claim, ours and the paper's.
+    /// Measure every claim of tautline and of its source paper.
     Validate(validate::ValidateArguments),
-    /// Fly the same starts under several laws and set them side by side.
+    /// Compare laws on the same starts.
     Compare(studies::CompareArguments),
-    /// Find how much of one key a scenario survives: where between two values its verdict turns.
+    /// Find the two values of a key between which a verdict turns.
     Margin(studies::MarginArguments),
-    /// Fly a grid over one key or two: how shares and separations depend on them.
+    /// Fly a grid over one or two keys and show how shares and separations depend on them.
     Sweep(studies::SweepArguments),
-    /// Fly thousands of runs, here or on a cluster, and answer with an error bar.
+    /// Fly many runs, on one machine or a cluster, and report shares with confidence intervals.
     Campaign(campaign::CampaignArguments),
-    /// Search for the worst start, wind or loss within bounds, and fly it again; what it does not find is no proof.
+    /// Search for the worst start, wind or loss within bounds; a search is not a proof.
     Attack(studies::AttackArguments),
-    /// Write a recording of any format as CSV, Parquet, NPZ or MCAP, without losing a bit.
+    /// Convert a recording to CSV, Parquet, NPZ or MCAP without loss.
     Export(export::ExportArguments),
-    /// Draw a recording: pictures, films and contact sheets, without a screen.
+    /// Draw a recording without a screen: pictures, films and contact sheets.
     #[cfg(feature = "viewer")]
     Render(render::RenderArguments),
-    /// Open a window on a recording, or on a scenario that is flown while it is watched.
+    /// Show a recording, or a running flight of a scenario, in a window.
     #[cfg(feature = "viewer")]
     View(view::ViewArguments),
-    /// List the built-in scenarios, or print one as TOML to start from.
+    /// List the built-in scenarios, or print one as TOML.
     List(list::ListArguments),
     /// Print the JSON Schema of the scenario file.
     Schema,
@@ -113,7 +113,7 @@ enum Command {
     Completions(list::CompletionsArguments),
 }
 
-/// Keeps the panic hook from speaking of what becomes an error anyway.
+/// Silences the panic hook for panics that become errors.
 fn quiet_guarded_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

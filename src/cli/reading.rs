@@ -1,4 +1,4 @@
-//! Arguments that say how a recording is read, the same for all commands that read one.
+//! Options for reading a recording, shared by all commands that read one.
 
 #[cfg(feature = "viewer")]
 use std::path::Path;
@@ -14,90 +14,95 @@ use tautline_recordings::read::{
 use tautline_report::request::Failure;
 use tautline_report::request::audit::recording_in;
 
-/// How a recording is read.
+/// Options for reading a recording.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Reading")]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct ReadArguments {
-    /// The recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
+    /// Recording: a file, the folder of a run or of a ROS 2 bag, or a folder or archive with a file for each vehicle.
     #[arg(index = 1, value_name = "RECORDING", value_parser = recording())]
     recording: PathBuf,
-    /// More recordings, or with --join more files of the same one.
+    /// More recordings, or with --join more files of the same recording.
     #[arg(index = 2, value_name = "MORE", value_parser = recording())]
     more: Vec<PathBuf>,
-    /// Several files are one recording, a vehicle in each.
+    /// Read several files, one for each vehicle, as one recording.
     #[arg(long)]
     join: bool,
-    /// Unit of time of the recording [default: what it says, or its numbers suggest].
+    /// Unit of time [default: as stated in the recording, or estimated from its numbers].
     #[arg(long, value_name = "UNIT", value_parser = unit())]
     time_unit: Option<TimeUnit>,
-    /// How many units of time of the recording make a second, where they are frames.
-    #[arg(long = "fps", value_name = "HZ", conflicts_with_all = ["time_unit", "time_scale"], allow_negative_numbers = true)]
+    /// Frames per second, for times in frames.
+    #[arg(
+        long = "fps",
+        value_name = "HZ",
+        conflicts_with_all = ["time_unit", "time_scale"],
+        allow_negative_numbers = true
+    )]
     frames_per_s: Option<f64>,
-    /// How many seconds a unit of time of the recording lasts.
+    /// Seconds per unit of time.
     #[arg(long, value_name = "SECONDS", conflicts_with = "time_unit", allow_negative_numbers = true)]
     time_scale: Option<f64>,
     /// Sort rows that go back in time.
     #[arg(long)]
     sort: bool,
-    /// Which of several rows of a vehicle at one time is read [default: refuse, unless they say the same].
+    /// Row to read of several rows of a vehicle at one time [default: refuse, unless they are equal].
     #[arg(long, value_name = "WHICH", value_parser = duplicates())]
     duplicates: Option<Duplicates>,
-    /// All rows of a table are of one vehicle, whatever other columns it has.
+    /// Read all rows of a table as one vehicle, whatever its other columns.
     #[arg(long)]
     one_vehicle: bool,
-    /// Numbers of a vehicle in a table without a header: x and y, x, y and z, or those and their velocities.
+    /// Numbers of a vehicle in a table without a header: x and y, x to z, or these with their velocities.
     #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
     dimensions: Option<Dimensions>,
-    /// Metres per unit of length of the recording; three numbers, with signs, are of its x, y and z [default: 1].
+    /// Metres per unit of length; three numbers, with signs, apply to x, y and z [default: 1].
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     scale: Option<Scale>,
-    /// Directions of the axes of the recording: enu, ned, nwu and the like, or what becomes x, y and z, such as y,x,-z.
+    /// Directions of the axes: enu, ned, nwu and similar, or the source of x, y and z, such as y,x,-z.
     #[arg(long, value_name = "AXES", allow_hyphen_values = true)]
     axes: Option<Axes>,
-    /// Name of a column: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name the arrays.
+    /// Name of the column of a role: t, id, x, y, z, vx, vy, vz, radius, or lat, lon, alt. In NPZ, t and x name arrays.
     #[arg(long = "column", value_name = "ROLE=NAME", value_parser = column)]
     columns: Vec<(String, String)>,
-    /// Where the curve of a vehicle starts [m], for polynomials that are relative to it; may be given several times.
+    /// Start of a vehicle's curve [m], for relative polynomials; repeatable.
     #[arg(long = "start", value_name = "NAME=X,Y,Z", value_parser = start, allow_hyphen_values = true)]
     starts: Vec<(String, [f64; 3])>,
-    /// What the axes of the positions of an NPZ archive count, in their order, where their lengths have several meanings:
-    /// the words time, vehicle and axis (of x, y, z), such as time,vehicle,axis.
+    /// Order of the axes of the position array in an NPZ archive, if it is ambiguous: time, vehicle and axis (of x, y,
+    /// z), such as time,vehicle,axis.
     #[arg(long, value_name = "AXES", value_parser = ArrayAxis::layout_of)]
     layout: Option<ArrayLayout>,
-    /// The frame that all positions are brought into by the transforms of the recording, where messages give several.
+    /// Frame into which transforms of the recording bring all positions, if messages have several frames.
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
-    /// A topic that is read, where messages on several tell of the same vehicles; may be given several times.
+    /// Topic to read, if several topics describe the same vehicles; repeatable.
     #[arg(long = "topic", value_name = "NAME")]
     topics: Vec<String>,
-    /// What places on the Earth are measured from, in degrees and metres above the ellipsoid [default: the first place].
+    /// Origin of geographic positions: degrees, and metres above the ellipsoid [default: the first position].
     #[arg(long, value_name = "LAT,LON,HEIGHT", value_parser = origin, allow_hyphen_values = true)]
     origin: Option<[f64; 3]>,
-    /// Accept an MCAP file that was not closed, for what it holds.
+    /// Accept an MCAP file that was not closed, and read its contents.
     #[arg(long)]
     allow_unfinished: bool,
 }
 
 impl ReadArguments {
-    /// The only file or folder, of what is `done` with one.
+    /// Returns the only file or folder, for a command that is `done` with one.
     #[cfg(feature = "viewer")]
     pub(super) fn only(&self, done: &str) -> Result<&Path, Failure> {
         if self.more.is_empty() {
             return Ok(&self.recording);
         }
-        let message = format!("several recordings are given, and one is {done}");
-        let help = "put the files into a folder if each holds a vehicle of one recording, and give that";
+        let message = format!("RECORDING: must be one recording to be {done}, got several");
+        let help = "if each file holds a vehicle of one recording, give a folder with the files";
         Err(Failure::input("usage/several-recordings", message, help))
     }
 
-    /// The files of each recording: all files are one with --join.
+    /// Returns the files of each recording; with --join all files are one recording.
     pub(super) fn recordings(&self) -> Vec<Vec<PathBuf>> {
         let paths = std::iter::once(&self.recording).chain(&self.more).cloned();
         if self.join { vec![paths.collect()] } else { paths.map(|path| vec![path]).collect() }
     }
 
-    /// How each recording is read, with the format if it is given.
+    /// Returns the options for reading each recording, with its format if known.
     pub(super) fn options(&self, format: Option<Format>) -> ReadOptions {
         let mut columns = ColumnNames::default();
         for (role, name) in &self.columns {
@@ -129,7 +134,7 @@ fn duplicates() -> impl TypedValueParser<Value = Duplicates> {
     one_of(Duplicates::ALL.map(|which| (which.name().into(), which)).into())
 }
 
-/// A path; of the folder of a run, that of what was recorded.
+/// Returns a parser of paths; for the folder of a run it returns the recording in it.
 fn recording() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().map(|path| recording_in(&path))
 }
@@ -139,7 +144,7 @@ fn column(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((role, name)) if roles.contains(&role) && !name.is_empty() => Ok((role.to_owned(), name.to_owned())),
         Some((role, _)) if !roles.contains(&role) => {
-            Err(format!("`{role}` is no column: the columns are {}", roles.join(", ")))
+            Err(format!("unknown role `{role}`; the roles are {}", roles.join(", ")))
         }
         _ => Err("write ROLE=NAME, such as x=pos_east".to_owned()),
     }
@@ -153,7 +158,7 @@ fn start(text: &str) -> Result<(String, [f64; 3]), String> {
 fn origin(text: &str) -> Result<[f64; 3], String> {
     match three(text)? {
         [latitude, longitude, _] if latitude.abs() > 90.0 || longitude.abs() > 360.0 => {
-            Err("a latitude is within 90 degrees, and a longitude within 360".to_owned())
+            Err("the latitude must be within 90 degrees, the longitude within 360".to_owned())
         }
         place => Ok(place),
     }
@@ -167,14 +172,14 @@ fn three(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-/// A parser of these names, each with what it stands for.
+/// Returns a parser of names with their values.
 pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
     choices: Vec<(PossibleValue, T)>,
 ) -> impl TypedValueParser<Value = T> {
     let names = choices.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     PossibleValuesParser::new(names).try_map(move |given| {
         let chosen = choices.iter().find(|(name, _)| name.get_name() == given);
-        chosen.map(|(_, value)| value.clone()).ok_or("it is none of the possible values")
+        chosen.map(|(_, value)| value.clone()).ok_or("not one of the possible values")
     })
 }
 
@@ -186,7 +191,7 @@ fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
     one_of(Dimensions::ALL.map(|dimensions| (dimensions.name().into(), dimensions)).into())
 }
 
-/// A format that is read.
+/// Returns a parser of readable formats.
 pub(super) fn format() -> impl TypedValueParser<Value = Format> {
     one_of(
         Format::all()

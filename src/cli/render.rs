@@ -1,4 +1,4 @@
-//! `tautline render`: pictures and films of a recording.
+//! `tautline render`: pictures, films and contact sheets of a recording.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -19,79 +19,79 @@ use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::outputs::{self, Called};
 use tautline_report::request::{Failure, try_to_write_in};
 
-/// Most pictures of one command.
+/// Largest number of pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
-/// Pictures a second of a film, unless another number is asked for.
+/// Default frame rate of a film.
 const FPS: u32 = 30;
-/// A film at the default speed is not longer than this \[s\].
+/// Longest duration of a film at the default speed \[s\].
 const LONGEST_FILM_S: f64 = 20.0;
-/// Bytes of pictures that wait for their encoder at a time.
+/// Largest memory of pictures that wait for their encoder.
 const WAITING_BYTES: usize = 256 << 20;
 
 /// Arguments of `tautline render`.
 #[derive(Debug, Args)]
-// `--fps` is that of the film here.
+// `--fps` is the frame rate of the film here.
 #[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
 pub(super) struct RenderArguments {
-    #[command(flatten)]
-    reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
-    input_format: Option<tautline_recordings::read::Format>,
-    /// Safety distance for a recording that has none: shells of half of it, and violations of straight lines
-    /// between samples [m].
+    /// Safety distance for a recording without one [m]: vehicles get shells of half of it, and violations are those of
+    /// straight lines between samples.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
-    /// Times to picture: start, closest, end, or seconds; several with commas. By default start,closest,end, unless
-    /// something else is asked for.
+    /// Times of pictures: start, closest, end, or seconds, separated by commas [default: start,closest,end, unless
+    /// another output is given].
     #[arg(long, value_name = "TIMES", value_delimiter = ',', allow_negative_numbers = true)]
     at: Vec<String>,
-    /// A picture every so many seconds of the flight.
+    /// Take a picture every S seconds of the flight.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     every: Option<f64>,
-    /// A film: .mp4 (H.264; needs ffmpeg, or a build with --features film) or .gif.
+    /// Write a film: .mp4 (H.264; needs ffmpeg, or a build with --features film) or .gif.
     #[arg(long, value_name = "FILE")]
     film: Option<PathBuf>,
-    /// A contact sheet of so many columns and rows.
+    /// Write a contact sheet with C columns and R rows.
     #[arg(long, value_name = "CxR", value_parser = drawing::sheet)]
     sheet: Option<[u32; 2]>,
-    /// Folder for the pictures, by default `snapshots` beside the recording.
+    /// Folder for the pictures [default: `snapshots` beside the recording].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Width and height of a picture, or of the whole sheet, in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = drawing::size)]
     size: [u32; 2],
-    /// Pictures a second of the film [default: 30].
+    /// Frames per second of the film [default: 30].
     #[arg(long, value_name = "N", requires = "film")]
     fps: Option<u32>,
-    /// Seconds of the flight in a second of the film; by default 1, or more where the film would be longer than 20 s.
+    /// Seconds of flight per second of film [default: 1, or more to keep the film below 20 s].
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
-    /// Where to look from: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and
-    /// metres.
+    /// Camera: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres.
     #[arg(long, default_value = "iso", allow_hyphen_values = true)]
     camera: String,
-    /// Trails of the last so many seconds alone [default: from the start].
+    /// Length of trails [s] [default: from the start].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     trail: Option<f64>,
-    /// Colours: dark, light, or paper (white, for print).
+    /// Theme: dark, light, or paper (white, for print).
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
-    /// What draws: best, hardware, software, or a part of an adapter's name.
+    /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
+    // Last, because its help heading also applies to all later arguments.
+    #[command(flatten)]
+    reading: ReadArguments,
+    /// Format of the recording [default: detected from its content].
+    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
+    input_format: Option<tautline_recordings::read::Format>,
 }
 
-/// A picture to be taken.
+/// Picture to take.
 struct Still {
     time_s: f64,
     path: PathBuf,
 }
 
-/// Draws a flight as it is asked for.
+/// Renderer of the pictures of a flight.
 struct Batch<'a> {
     timeline: &'a Timeline,
     extent: Extent,
@@ -123,8 +123,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
     if let Some((path, format)) = film {
         if path.is_dir() {
-            let message = format!("{} is a folder, not a film", path.display());
-            return Err(Failure::input("files/is-directory", message, "name a file with --film"));
+            let message = format!("--film: {} is a folder", path.display());
+            return Err(Failure::input("files/is-directory", message, "give the path of a file"));
         }
         format.check(view.size_px, fps)?;
         format.check_encoder()?;
@@ -134,7 +134,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let extent = Extent::of(&timeline);
     let start = timeline.log.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
     extent.camera(&timeline, &start, &view)?;
-    // Targets are tried before the work.
+    // Outputs are checked before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
     }
@@ -178,8 +178,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
 }
 
 impl Batch<'_> {
-    /// Takes pictures at these times and hands them on in order, some at a time; while those are worked on, the next
-    /// ones are drawn.
+    /// Takes pictures at these times and passes them on in order, in chunks; the next chunk is drawn meanwhile.
     fn shoot(
         &mut self,
         times_s: &[f64],
@@ -200,7 +199,7 @@ impl Batch<'_> {
         take(first, &waiting)
     }
 
-    /// Writes a film of pictures at these times.
+    /// Writes a film with pictures at these times.
     fn film(&mut self, file: &mut File, format: FilmFormat, fps: u32, times_s: &[f64]) -> Result<(), Failure> {
         let mut out = BufWriter::new(file);
         let pictures = u32::try_from(times_s.len()).unwrap_or(u32::MAX);
@@ -223,7 +222,7 @@ fn write(path: &Path, picture: &Picture) -> Result<(), Failure> {
     Ok(write_atomically(path, &picture.to_png()?)?)
 }
 
-/// Whether a folder can be written to, before the work.
+/// Checks before the work that a folder can be written to.
 fn writable(folder: &Path) -> Result<(), Failure> {
     try_to_write_in(folder).map_err(|error| {
         Failure::machine("files/cannot-write", format!("cannot write to {}: {error}", folder.display()))
@@ -231,13 +230,13 @@ fn writable(folder: &Path) -> Result<(), Failure> {
     })
 }
 
-/// The pictures asked for, each with its file.
+/// Returns the requested pictures, each with its file.
 fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Result<Vec<Still>, Failure> {
     let [start_s, end_s] = timeline.log.range_s();
     let nothing_else = arguments.every.is_none() && arguments.film.is_none() && arguments.sheet.is_none();
     let mut wanted: Vec<&str> = arguments.at.iter().map(|text| text.trim()).collect();
     if wanted.is_empty() && nothing_else {
-        // One vehicle alone has no closest approach.
+        // A single vehicle has no closest approach.
         wanted = if timeline.log.closest().is_some() { vec!["start", "closest", "end"] } else { vec!["start", "end"] };
     }
     let mut stills = Vec::new();
@@ -246,7 +245,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             "start" => (start_s, "start".to_owned()),
             "end" => (end_s, "end".to_owned()),
             "closest" => {
-                let none = "the recording has no closest approach: it has fewer than two vehicles at a time";
+                let none = "--at: `closest` needs two vehicles at a time";
                 let closest = timeline
                     .log
                     .closest()
@@ -256,20 +255,20 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
             seconds => {
                 let help = "give start, closest, end or seconds, such as --at start,12.5,end";
                 let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
-                let time_s =
-                    time_s.ok_or_else(|| Failure::input("render/time", format!("`{text}` is not a time"), help))?;
+                let time_s = time_s
+                    .ok_or_else(|| Failure::input("render/time", format!("--at: `{text}` is not a time"), help))?;
                 (time_s, format!("at-{time_s:.3}s"))
             }
         };
         if !(start_s..=end_s).contains(&time_s) {
             return Err(Failure::input(
                 "render/out-of-range",
-                format!("{time_s} s is outside the recording, which goes from {start_s} s to {end_s} s"),
+                format!("--at: must be from {start_s} s to {end_s} s, got {time_s} s"),
                 "give a time within the recording with --at",
             ));
         }
         let path = folder.join(format!("{name}.png"));
-        // One asked for twice is taken once.
+        // A repeated time gives one picture.
         if stills.iter().all(|still: &Still| still.path != path) {
             stills.push(Still { time_s, path });
         }
@@ -282,7 +281,7 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
     Ok(stills)
 }
 
-/// Times from the start of a flight to its end, so far apart \[s\].
+/// Returns times from the start of a flight to its end, `apart_s` apart \[s\].
 fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
     let [start_s, end_s] = timeline.log.range_s();
     positive(apart_s, option)?;
@@ -290,8 +289,8 @@ fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64
     if count > MOST_PICTURES {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("these would be {count:.0} pictures, more than {MOST_PICTURES:.0}"),
-            format!("give a larger number with {option}"),
+            format!("{option}: must give at most {MOST_PICTURES:.0} pictures, got {count:.0}"),
+            "give a larger number",
         ));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded above")]
@@ -303,7 +302,7 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
     if number > 0.0 && number.is_finite() {
         return Ok(number);
     }
-    let message = format!("{option}: {number} is not a positive number");
+    let message = format!("{option}: must be more than 0, got {number}");
     Err(Failure::input("render/out-of-range", message, format!("give a positive number with {option}")))
 }
 
@@ -312,13 +311,13 @@ fn film_times(fps: u32, speed: Option<f64>, timeline: &Timeline) -> Result<Vec<f
     let fps = f64::from(fps.max(1));
     let speed = match speed {
         Some(speed) => positive(speed, "--speed")?,
-        // The last picture lasts as long as the others.
+        // The last picture is shown for one frame.
         None => ((end_s - start_s) / (LONGEST_FILM_S - 1.0 / fps)).max(1.0),
     };
     even_times(timeline, speed / fps, "--speed")
 }
 
-/// The times of a sheet's pictures and their size.
+/// Returns the times of the pictures of a sheet, and their size.
 fn sheet_plan(
     [columns, rows]: [u32; 2],
     [width, height]: [u32; 2],
@@ -328,7 +327,7 @@ fn sheet_plan(
     if size_px.contains(&0) {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("a sheet of {columns} x {rows} pictures does not fit into {width} x {height} pixels"),
+            format!("--sheet: {columns} x {rows} pictures do not fit into {width} x {height} pixels"),
             "give fewer pictures with --sheet, or a larger --size",
         ));
     }
@@ -337,7 +336,7 @@ fn sheet_plan(
     if last > MOST_PICTURES {
         return Err(Failure::input(
             "render/out-of-range",
-            format!("{columns} x {rows} pictures are more than {MOST_PICTURES:.0}"),
+            format!("--sheet: must have at most {MOST_PICTURES:.0} pictures, got {columns} x {rows}"),
             "give fewer pictures with --sheet",
         ));
     }

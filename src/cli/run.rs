@@ -1,4 +1,4 @@
-//! `tautline run` and `tautline check`, and what all commands on a scenario share.
+//! `tautline run` and `tautline check`, and the arguments of all commands with a scenario.
 
 use std::path::PathBuf;
 
@@ -9,13 +9,13 @@ use super::console::{self, Console, Terminal};
 use tautline_report::request::{Failure, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
 use tautline_sim::preflight::Preflight;
 
-/// A scenario and its overrides.
+/// Scenario with its overrides.
 #[derive(Debug, Args)]
 pub(super) struct ScenarioArguments {
-    /// A scenario file, the name of a built-in scenario, or - for standard input.
+    /// Scenario file, name of a built-in scenario, or - for standard input.
     #[arg(default_value = "pentagon")]
     pub(super) scenario: String,
-    /// Set any key of the scenario; may be given several times.
+    /// Set a key of the scenario; repeatable.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub(super) overrides: Vec<String>,
 }
@@ -45,14 +45,13 @@ pub(super) fn pictures(_adapter: &str, _takes_snapshots: bool) -> Box<dyn Pictur
 pub(super) struct RunArguments {
     #[command(flatten)]
     what: ScenarioArguments,
-    /// What moves the vehicles: rigid bodies, or the equation of motion solved in continuous time. Short for
-    /// `--set plant.kind=...`.
+    /// Plant: rigid bodies, or the equation of motion in continuous time; short for `--set plant.kind=...`.
     #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
     plant: Option<String>,
-    /// Folder for the recording and the report; by default out/NAME, where NAME is the scenario's.
+    /// Folder for the recording and the report [default: out/NAME with the name of the scenario].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Overwrite a folder that holds a finished run.
+    /// Overwrite a folder with a finished run.
     #[arg(long)]
     force: bool,
     /// Draw no figures.
@@ -61,25 +60,25 @@ pub(super) struct RunArguments {
     /// Take no pictures.
     #[arg(long)]
     no_snapshots: bool,
-    /// What draws pictures: best, hardware, software, or a part of an adapter's name.
+    /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
-    /// Fly again at half the step, and say what that changed.
+    /// Repeat the flight at half the step, and report the differences.
     #[arg(long)]
     verify: bool,
-    /// Print the report as JSON on standard output, and nothing else there.
+    /// Print the report as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use, of which two are of use, by default one a core; the recording has the same bits for any number.
+    /// Number of threads, at most 2 in use [default: one for each core]; the recording is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
 
 impl RunArguments {
-    /// Whether pictures are taken.
+    /// Returns whether pictures are taken.
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     pub(super) fn draws(&self) -> bool {
         !self.no_snapshots
@@ -90,7 +89,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
     let what = arguments.what.request()?;
-    // `--plant` is short for the last override, and stays as it was written in the command that flies the same again.
+    // `--plant` is short for the last override; the command that repeats the flight keeps it as written.
     let flown = ScenarioRequest { overrides: what.overrides.iter().cloned().chain(plant).collect(), ..what.clone() };
     let scenario = flown.read()?;
     let plant = arguments.plant.iter().flat_map(|kind| ["--plant", kind]);
@@ -115,15 +114,16 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 1 where the flight cannot do what it is for: relative-velocity-unstable, start-on-line, start-in-plane, \
-step-too-long, drift-unresolved. Other warnings leave 0; a scenario that is wrong, such as a desired distance of not more than delta, is 2.")]
+Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed (relative-velocity-unstable, \
+start-on-line, start-in-plane, step-too-long, drift-unresolved); 2 wrong input, such as a desired distance of at most \
+delta.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,
-    /// Print what was found as JSON on standard output, and nothing else there.
+    /// Print the findings as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
-    /// Print no summary: the exit code says it.
+    /// Print no summary.
     #[arg(long)]
     quiet: bool,
 }

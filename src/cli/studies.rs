@@ -1,4 +1,4 @@
-//! Commands that fly many flights of one scenario: `compare`, `margin`, `sweep` and `attack`.
+//! `tautline compare`, `margin`, `sweep` and `attack`: studies of many flights of one scenario.
 
 use std::path::PathBuf;
 
@@ -18,15 +18,15 @@ use tautline_studies::{
     sweep,
 };
 
-/// The scenario, files and threads of a study.
+/// Scenario, files and threads of a study.
 #[derive(Debug, Args)]
 pub(super) struct StudyArguments {
     #[command(flatten)]
     what: ScenarioArguments,
-    /// Write every number as JSON; - is standard output, for this and the next three.
+    /// Write all numbers as JSON; - is standard output, also for the next three options.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a table as CSV: a row a law, a value, a point, or a candidate that was worse than all before it.
+    /// Write a table as CSV, with a row for each law, value, point, or new worst candidate.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write the tables as LaTeX.
@@ -35,16 +35,16 @@ pub(super) struct StudyArguments {
     /// Write a page with tables and figures.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Overwrite files that exist, and a folder that holds a finished run.
+    /// Overwrite existing files, and a folder with a finished run.
     #[arg(long)]
     force: bool,
-    /// What draws pictures: best, hardware, software, or a part of an adapter's name.
+    /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no table and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use, by default one a core; the result is the same for any number.
+    /// Number of threads [default: one for each core]; the result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
@@ -67,13 +67,14 @@ impl StudyArguments {
     }
 }
 
-/// Number of runs and seed of the first.
+/// Number of runs, and seed of the first.
 #[derive(Debug, Args)]
 struct RunArguments {
     /// Runs of each law [default: 20], or of each value or point [default: 1].
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u64).range(1..=MOST_RUNS))]
     runs: Option<u64>,
-    /// Run k, from 0, has `start.seed` and `noise.seed` of S + k; a single run of a value or point keeps those of the scenario.
+    /// Seed: run k, from 0, has `start.seed` and `noise.seed` S + k; a single run of a value or point keeps those of
+    /// the scenario.
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(SEEDS))]
     seed: u64,
 }
@@ -81,21 +82,21 @@ struct RunArguments {
 /// Arguments of `tautline compare`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 once the comparison is made, whatever the laws did; with 1 where it was interrupted. A law's keys stand in \
-[laws.NAME] of the scenario; NAME is its kind, or any name with a `kind` inside. docs/compare.md says what each number means.")]
+Exit codes: 0 complete, for any result; 1 interrupted. The keys of a law are in [laws.NAME] of the scenario. NAME is \
+the kind of the law, or any name if the table has a `kind`. See docs/compare.md.")]
 pub(super) struct CompareArguments {
     #[command(flatten)]
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// Laws to compare, by their kind or by the NAME of a table [laws.NAME]: edge-tension,laplacian. Those of all such
-    /// tables unless given, and where there are none, every kind.
+    /// Laws to compare: kinds, or names of tables [laws.NAME] [default: all such tables, or all kinds if there is no
+    /// table].
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     laws: Option<Vec<String>>,
 }
 
 impl CompareArguments {
-    /// Whether pictures are taken.
+    /// Returns whether pictures are taken.
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     pub(super) fn draws(&self) -> bool {
         self.study.html.is_some()
@@ -111,30 +112,30 @@ impl CompareArguments {
 /// Arguments of `tautline margin`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where the verdict turns or holds everywhere, with 1 where it holds nowhere or the search was interrupted. Flown \
-once (--runs 1) everything but the key is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and \
-where nothing is random the start is moved a little. docs/margins.md says more.")]
+Exit codes: 0 the verdict turns or holds everywhere; 1 it holds nowhere, or the search was interrupted. A single run \
+(--runs 1) changes only the key. With more runs, run k has start.seed and noise.seed = S + k, and a scenario without \
+randomness gets a small jitter of the start. See docs/margins.md.")]
 pub(super) struct MarginArguments {
     #[command(flatten)]
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// The key that is changed, such as `time.control_hz`.
+    /// Key to vary, such as `time.control_hz`.
     #[arg(long, value_name = "KEY.PATH")]
     key: String,
-    /// Its first value.
+    /// First value of the key.
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     from: f64,
-    /// Its last value.
+    /// Last value of the key.
     #[arg(long, value_name = "B", allow_negative_numbers = true)]
     to: f64,
-    /// What every run has to show.
+    /// Verdict that every run must show.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
     verdict: Question,
-    /// Values, evenly spaced with both ends, that are scanned first.
+    /// Number of evenly spaced values, with both ends, that are flown first.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
     scan: u16,
-    /// Times that the interval in which the verdict turns is halved.
+    /// Number of halvings of the interval in which the verdict turns.
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=50))]
     halvings: u32,
     /// Space and halve values by their ratio.
@@ -144,8 +145,8 @@ pub(super) struct MarginArguments {
 
 fn verdict() -> impl TypedValueParser<Value = Question> {
     let help = |question| match question {
-        Question::Pass => "It passes: clear, and its formation reached as far as asked",
-        Question::Clear => "No two vehicles come closer than delta, to the end of the flight",
+        Question::Pass => "Clear, and the formation is reached as far as the scenario requires",
+        Question::Clear => "No two vehicles come closer than delta up to the end",
         Question::Reached => "The formation is reached and kept to the end",
     };
     one_of(Question::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
@@ -167,18 +168,19 @@ impl MarginArguments {
 /// Arguments of `tautline sweep`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 once the sweep is made, whatever the flights did; with 1 where it was interrupted. Flown once (--runs 1) everything \
-but the keys is as the scenario says; with more runs, run k has start.seed and noise.seed = S + k, and where nothing is random the \
-start is moved a little. docs/sweeps.md says more.")]
+Exit codes: 0 complete, for any result; 1 interrupted. A single run (--runs 1) changes only the keys. With more runs, \
+run k has start.seed and noise.seed = S + k, and a scenario without randomness gets a small jitter of the start. \
+See docs/sweeps.md.")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// A key and its values, evenly spaced or listed: `network.loss=0:0.5:11`, `law.alpha=0.5,1,2`; given twice, the grid of both.
+    /// Key with evenly spaced or listed values: `network.loss=0:0.5:11` or `law.alpha=0.5,1,2`; give it twice for a
+    /// grid.
     #[arg(long = "key", value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...", required = true)]
     keys: Vec<String>,
-    /// What a run has to show to count in the share.
+    /// Verdict whose share is counted.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
     verdict: Question,
 }
@@ -197,39 +199,44 @@ impl SweepArguments {
 /// Arguments of `tautline attack`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exits with 0 where the search found no violation, with 1 where it found one or was interrupted. What it did not find may be \
-there all the same: it is a search, not a proof. docs/attack.md says more.")]
+Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may \
+exist within the bounds. See docs/attack.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
-    /// A key that is a number, and the values between which it may be: `network.loss=0..0.3`; may be given several times.
+    /// Numeric key with its bounds, such as `network.loss=0..0.3`; repeatable.
     #[arg(long, value_name = "KEY=LOW..HIGH")]
     vary: Vec<String>,
-    /// Every start may be up to R metres from that of the scenario, along each axis.
+    /// Move each start by up to R metres along each axis.
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     start: Option<f64>,
-    /// Every velocity at the start may be up to V m/s from that of the scenario, along each axis.
+    /// Change each initial velocity by up to V m/s along each axis.
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     velocity: Option<f64>,
-    /// No two start nearer than this many metres to each other, more than delta; without it any start that can be flown will do.
+    /// Smallest separation of two starts [m], more than delta [default: any start that can be flown].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     apart: Option<f64>,
     /// Flights of the whole search.
     #[arg(long, value_name = "F", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(FLIGHTS))]
     flights: u64,
-    /// Fly each candidate with K seeds of noise, that of the scenario and those that follow; the worst counts.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u64).range(SEEDS_OF_A_CANDIDATE))]
+    /// Fly each candidate with K seeds of noise, from that of the scenario on; the worst one counts.
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u64).range(SEEDS_OF_A_CANDIDATE)
+    )]
     seeds: u64,
-    /// Seed of the search; noise has that of the scenario.
+    /// Seed of the search; noise has the seed of the scenario.
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
-    /// Fly the worst again and leave its recording, report and pictures in this folder, as `tautline run` does.
+    /// Repeat the worst flight, and write its recording, report and pictures into this folder, as `tautline run` does.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
 impl AttackArguments {
-    /// Whether pictures are taken.
+    /// Returns whether pictures are taken.
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     pub(super) fn draws(&self) -> bool {
         self.out.is_some()

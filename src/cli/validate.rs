@@ -1,4 +1,4 @@
-//! `tautline validate`: judge every claim of ours and of the paper.
+//! `tautline validate`: measure every claim of tautline and of its source paper.
 
 use std::path::PathBuf;
 
@@ -13,22 +13,22 @@ use tautline_validate::{ValidateRequest, validate_into};
 #[derive(Debug, Args)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ValidateArguments {
-    /// Folder for `validate.json` and the rest.
+    /// Folder for `validate.json`, the page and figures.
     #[arg(long, value_name = "DIR", default_value = "out/validate")]
     out: PathBuf,
-    /// Overwrite a folder that holds a finished validation.
+    /// Overwrite a folder with a finished validation.
     #[arg(long)]
     force: bool,
-    /// Print the result as JSON on standard output, and nothing else there.
+    /// Print the result as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
-    /// Print the generated part of docs/validation.md on standard output, and nothing else there.
+    /// Print the generated part of docs/validation.md on standard output; all text goes to standard error.
     #[arg(long, conflicts_with = "json")]
     markdown: bool,
     /// Print no summary and no progress.
     #[arg(long)]
     quiet: bool,
-    /// Threads to use, by default one a core; the result is the same for any number.
+    /// Number of threads [default: one for each core]; the result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }

@@ -1,4 +1,4 @@
-//! `tautline view`: a window on a recording, or on a scenario that is flown while it is watched.
+//! `tautline view`: a window on a recording, or on a running flight of a scenario.
 
 use std::io;
 use std::ops::ControlFlow;
@@ -17,32 +17,32 @@ use tautline_report::request::{Failure, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Parts};
 
-/// Samples of a flight in the air that wait for the window.
+/// Samples of a running flight that wait for the window.
 const WAITING: usize = 256;
 
 /// Arguments of `tautline view`.
 #[derive(Debug, Args)]
 #[command(mut_arg("recording", |what| {
-    let help = "A recording, a scenario file, or the name of a built-in scenario";
+    let help = "Recording, scenario file, or name of a built-in scenario";
     what.required(false).default_value("pentagon").value_name("RECORDING|SCENARIO").help(help)
 }))]
 pub(super) struct ViewArguments {
-    /// Set any key of the scenario; may be given several times.
+    /// Set a key of the scenario; repeatable.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     overrides: Vec<String>,
-    /// Safety distance for a recording that has none [m].
+    /// Safety distance for a recording without one [m].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
-    /// Colours: dark, light, or paper.
+    /// Theme: dark, light, or paper.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
-    /// What draws: best, hardware, software, or a part of an adapter's name.
+    /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
-    // Last, because its heading holds for all that follows.
+    // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: recognised by its content].
+    /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
     input_format: Option<Format>,
 }
@@ -52,21 +52,20 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let reading = arguments.reading.options(arguments.input_format);
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
-    let no_effect =
-        |what: &str, help: &str| Err(Failure::input("usage/no-effect", format!("{what} has no effect on it"), help));
+    let no_effect = |message: &str, help: &str| Err(Failure::input("usage/no-effect", message, help));
     let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
-            return no_effect("a recording has been flown: --set", "leave --set out, or give a scenario");
+            return no_effect("--set: has no effect on a recording", "leave --set out, or give a scenario");
         }
         (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
         if arguments.delta.is_some() {
-            let help = "leave --delta out, or give --set with the scenario's own key";
-            return no_effect("a scenario has its own safety distance: --delta", help);
+            let help = "leave --delta out, or set the key with --set law.delta_m=METRES";
+            return no_effect("--delta: has no effect on a scenario, which has its own safety distance", help);
         }
         if reading != ReadOptions::default() {
-            let help = "leave the options of reading out, or give a recording";
-            return no_effect("a scenario is flown: the way in which a recording is read", help);
+            let help = "leave these options out, or give a recording";
+            return no_effect("options for reading: have no effect on a scenario", help);
         }
         let scenario = ScenarioRequest::named(&path.to_string_lossy(), &arguments.overrides)?.read()?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
@@ -75,8 +74,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     Ok(Exit::Good)
 }
 
-/// Starts a flight in a thread of its own. It waits for the window where that is slower, and ends when the window is
-/// closed.
+/// Starts a flight in its own thread. The thread waits for a slower window, and ends when the window is closed.
 fn take_off(scenario: Scenario) -> Result<Receiver<LiveUpdate>, Failure> {
     let parts = Parts::of(&scenario)?;
     let (sender, receiver) = sync_channel(WAITING);
@@ -92,17 +90,17 @@ fn take_off(scenario: Scenario) -> Result<Receiver<LiveUpdate>, Failure> {
             },
             Err(error) => Some(format!("the flight ended: {error}")),
         };
-        // Nobody is left to tell where the window is closed.
+        // A closed window receives no message.
         let _ = sink.send(LiveUpdate::Ended(said));
     });
     Ok(receiver)
 }
 
-/// Sends a flight to the window.
+/// Sink that sends a flight to the window.
 struct LiveSink(SyncSender<LiveUpdate>);
 
 impl LiveSink {
-    /// Sends what was flown; a window that is closed ends the flight.
+    /// Sends an update; a closed window ends the flight.
     fn send(&self, update: LiveUpdate) -> Result<(), RecordError> {
         let closed = |_| io::Error::from(io::ErrorKind::BrokenPipe);
         let sent = self.0.send(update).map_err(closed);
@@ -120,9 +118,9 @@ impl Sink for LiveSink {
     }
 }
 
-/// Says that the display is gone. Nothing that belongs to it can be put away any more: the program is to end at once.
+/// Reports that the display is gone. Its resources cannot be released any more, so the program must end at once.
 pub(super) fn lose_display() -> Exit {
-    let help = "open it again on a display that stays, or draw without one: tautline render RECORDING";
+    let help = "open the window again, or draw without a display: tautline render RECORDING";
     let message = "the display is gone, and the window with it";
     console::show(&Failure::machine("render/no-display", message).with_help(help))
 }

@@ -1,4 +1,4 @@
-//! Folders and archives of several files, judged by the program: what is read is read whole, and the rest is named.
+//! Audits of folders and archives with several files.
 
 use std::fs;
 use std::io::{Cursor, Write as _};
@@ -12,7 +12,7 @@ use crate::program::{Ran, TAUTLINE, ran_by};
 /// Two vehicles, 2 m apart.
 const A: &str = "t,x,y,z\n0,0,0,0\n0.5,0,1,0\n1,0,2,0\n";
 const B: &str = "t,x,y,z\n0,2,0,0\n0.5,2,1,0\n1,2,2,0\n";
-/// The same on curves.
+/// The same as curves.
 const CURVES: [&str; 2] = ["duration,x^0,y^0,z^0\n1,0,0,0\n", "duration,x^0,y^0,z^0\n1,2,0,0\n"];
 const README: &str = "Columns: t, x, y, z (time in s, metres)\n0.5 1 2 3\n";
 
@@ -39,12 +39,12 @@ fn audit(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, &[&["audit", "--delta", "1.9"], arguments].concat())
 }
 
-/// What was said on standard error, without the frame of an error and where its lines end.
+/// Returns standard error without the frame of an error and its line breaks.
 fn words(ran: &Ran) -> String {
     ran.err.split_whitespace().filter(|word| !word.starts_with(['│', '×', '╰', '├', '─'])).collect::<Vec<_>>().join(" ")
 }
 
-/// The same files in a folder and in an archive.
+/// Writes the same files into a folder and into an archive.
 fn both(files: &[(&str, &[u8])]) -> TempDir {
     let inside: Vec<_> = files.iter().map(|(name, content)| (format!("flight/{name}"), *content)).collect();
     let inside: Vec<_> = inside.iter().map(|(name, content)| (name.as_str(), *content)).collect();
@@ -62,17 +62,17 @@ fn refused(folder: &Path, arguments: &[&str], said: &str, remedy: &str) {
 }
 
 #[test]
-fn tables_in_folders_of_a_folder_or_archive_are_named_with_the_way_to_give_them() {
+fn nested_folders_are_named_with_a_remedy() {
     let both = both(&[("day1/a.csv", A.as_bytes()), ("day1/b.csv", B.as_bytes()), ("day2/a.csv", A.as_bytes())]);
     let said = "its tables lie in folders: day1/ (2 tables), day2/ (1 table)";
     refused(both.path(), &["flight.zip"], said, "unpack it, and give a folder of it: day1");
     refused(both.path(), &["flight"], said, "give one of them: flight/day1");
     let one = audit(both.path(), &["flight/day1"]);
     assert_eq!(one.exit, Some(0), "{one:?}");
-    // Beside another file none of them is left away in silence.
+    // Beside another file, nested tables are named too.
     fs::write(both.path().join("c.csv"), A).expect("written");
     refused(both.path(), &["--join", "c.csv", "flight"], "some of its tables lie in folders: day1/", "flight/day1");
-    // Curves in folders follow each other, as ever; and in an archive files at the top go before folders.
+    // Curves in folders are read in order; in an archive, files at the top come before folders.
     let curves = self::both(&[("a/1.csv", CURVES[0].as_bytes()), ("b/1.csv", CURVES[1].as_bytes())]);
     for path in ["flight", "flight.zip"] {
         assert_eq!(audit(curves.path(), &[path]).exit, Some(0), "{path}");
@@ -86,7 +86,7 @@ fn tables_in_folders_of_a_folder_or_archive_are_named_with_the_way_to_give_them(
 }
 
 #[test]
-fn an_archive_in_an_archive_and_a_recording_in_a_folder_are_pointed_at() {
+fn nested_archives_and_recordings_are_named() {
     let inner = zipped(&[("a.csv", A.as_bytes()), ("b.csv", B.as_bytes())]);
     let folder = folder(&[
         ("outer.zip", &zipped(&[("inner.zip", &inner), ("readme.md", b"")])),
@@ -104,7 +104,7 @@ fn an_archive_in_an_archive_and_a_recording_in_a_folder_are_pointed_at() {
 }
 
 #[test]
-fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
+fn notes_beside_tables_are_named_and_not_read() {
     let (readme, a, b) = (("readme.txt", README.as_bytes()), ("a.csv", A.as_bytes()), ("b.csv", B.as_bytes()));
     let site = ("site.dat", "Flown on 12 May 2024, 8 m/s of wind.\nSee www.example.org for more.\n".as_bytes());
     let curves = [("a.csv", CURVES[0].as_bytes()), ("b.csv", CURVES[1].as_bytes()), readme, site];
@@ -116,7 +116,7 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
             assert!(words(&ran).contains("not read, as they are not tables: readme.txt, site.dat"), "{path}: {ran:?}");
         }
     }
-    // What is packed is unpacked, whichever comes first.
+    // Compressed tables are read, in any order.
     let packed = |table: &str| {
         let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
         gzip.write_all(table.as_bytes()).expect("written");
@@ -127,7 +127,7 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
         let ran = audit(packed.path(), &[path]);
         assert_eq!(ran.exit, Some(0), "{path}: {ran:?}");
     }
-    // Tables that are wrong, or hold nothing, may be of a vehicle.
+    // Wrong or empty tables may belong to a vehicle.
     for (name, content, said) in [
         ("c.txt", "t x y z\n", "c.txt: it has a header and no rows"),
         ("c.txt", "", "c.txt: it is empty"),
@@ -146,7 +146,7 @@ fn notes_beside_tables_are_named_and_not_read_and_no_table_is_taken_for_one() {
 }
 
 #[test]
-fn two_entries_of_one_name_are_refused_by_it() {
+fn two_entries_of_one_name_are_refused() {
     let mut bytes = zipped(&[("one/x.csv", A.as_bytes()), ("one/y.csv", B.as_bytes()), ("one/z.csv", B.as_bytes())]);
     let at: Vec<_> = memchr::memmem::find_iter(&bytes, b"one/y.csv").collect();
     assert_eq!(at.len(), 2, "beside the file and in the directory");
@@ -158,7 +158,7 @@ fn two_entries_of_one_name_are_refused_by_it() {
 }
 
 #[test]
-fn files_that_are_joined_are_blamed_each_for_its_own() {
+fn errors_in_joined_files_name_their_file() {
     let late = "t,x,y,z\n1700000000.5,2,0,0\n1700000001,2,1,0\n";
     let folder = folder(&[
         ("a.csv", A.as_bytes()),

@@ -1,4 +1,4 @@
-//! `tautline attack`: what is found is what `run` flies, and what is wrong is said first.
+//! `tautline attack`: the worst flight is that of `run`, and wrong input is refused first.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// A law that avoids nothing, for as long as two take to meet.
+/// A law without avoidance, until two vehicles meet.
 const SHORT: [&str; 4] = ["--set", "law.kind=laplacian", "--set", "time.duration_s=3"];
 
 fn ran(folder: &Path, arguments: &[&str]) -> Ran {
@@ -14,7 +14,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn the_worst_is_flown_again_by_the_command_that_is_printed_and_by_the_recording_that_is_left() {
+fn the_printed_command_and_the_recording_repeat_the_worst_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     let search = ["attack", "pentagon", "--start", "0.4", "--flights", "24", "--out", "worst", "--json", "-"];
     let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &SHORT].concat());
@@ -39,7 +39,7 @@ fn the_worst_is_flown_again_by_the_command_that_is_printed_and_by_the_recording_
     for file in ["run.mcap", "report.html"] {
         assert!(folder.path().join("worst").join(file).is_file(), "{file}");
     }
-    // The printed command is that one too.
+    // The printed command flies the same bits.
     let printed = err.lines().find(|line| line.trim().starts_with("tautline run pentagon")).expect("a command");
     assert!(printed.contains("start={positions_m=[["), "{printed}");
 
@@ -49,7 +49,7 @@ fn the_worst_is_flown_again_by_the_command_that_is_printed_and_by_the_recording_
 }
 
 #[test]
-fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
+fn a_search_without_a_violation_exits_with_0_and_is_no_proof() {
     let folder = tempfile::tempdir().expect("a folder");
     let search = ["attack", "pentagon", "--vary", "law.alpha=0.5..2", "--flights", "9", "--set", "time.duration_s=3"];
     let files = |name: &str, threads: &str| {
@@ -57,7 +57,7 @@ fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
         let more = ["--threads", threads, "--csv", &csv, "--html", &html, "--json", &json];
         let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &more].concat());
         assert_eq!(exit, Some(0), "{err}");
-        assert!(out.starts_with("no violation found in 9 flights: the worst came to "), "{out}");
+        assert!(out.starts_with("no violation found in 9 flights: smallest separation "), "{out}");
         assert!(out.contains("a search, not a proof"), "{out}");
         [csv, html, json].map(|file| std::fs::read_to_string(folder.path().join(file)).expect("written"))
     };
@@ -68,7 +68,7 @@ fn a_search_that_finds_nothing_is_exit_0_and_says_that_it_is_no_proof() {
 }
 
 #[test]
-fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
+fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("there.json"), "").expect("a file");
     for (arguments, code) in [
@@ -89,13 +89,13 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {}", ran.err);
         assert!(ran.err.contains("help:"), "{arguments:?}: {}", ran.err);
     }
-    // Values that the command line itself refuses have no code.
+    // Values that clap refuses have no code.
     let none = ran(folder.path(), &["attack", "pentagon", "--start", "1", "--flights", "0"]);
     assert_eq!((none.exit, none.code()), (Some(2), ""), "{}", none.err);
 }
 
 #[test]
-fn a_scenario_that_is_violated_as_it_is_is_no_good_news() {
+fn a_violation_of_the_unchanged_scenario_exits_with_1() {
     let folder = tempfile::tempdir().expect("a folder");
     let ran = ran_by(
         TAUTLINE,

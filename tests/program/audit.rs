@@ -1,4 +1,4 @@
-//! `tautline audit`, run as a user runs it.
+//! `tautline audit` as a process.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -26,7 +26,7 @@ fn audit(folder: &Path, arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn the_first_line_says_it_and_so_does_the_exit_code() {
+fn the_first_line_and_the_exit_code_have_the_verdict() {
     let folder = folder(&[("pass.csv", PASS)]);
     let clear = audit(folder.path(), &["pass.csv", "--delta", "0.5"]);
     assert_eq!(clear.exit, Some(0), "{clear:?}");
@@ -51,7 +51,7 @@ fn the_first_line_says_it_and_so_does_the_exit_code() {
 }
 
 #[test]
-fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
+fn options_in_seconds_need_a_known_unit_of_time() {
     let every_two = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5,0,0\n2,a,0,0,0\n2,b,1.5,0,0\n4,a,0,0,0\n4,b,1.5,0,0\n";
     let folder = folder(&[("log.csv", every_two)]);
     let bounded = ["log.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "1"];
@@ -68,7 +68,7 @@ fn what_is_asked_in_seconds_does_not_rest_on_a_guessed_unit() {
 }
 
 #[test]
-fn a_recording_of_ours_is_judged_by_its_own_delta_unless_another_is_given() {
+fn a_tautline_recording_has_a_default_delta() {
     let folder = folder(&[("pass.csv", PASS)]);
     let fly = ["run", "circle", "--out", "out", "--set", "time.duration_s=1", "--no-snapshots", "--no-figures"];
     ran_by(TAUTLINE, folder.path(), &fly);
@@ -84,7 +84,7 @@ fn a_recording_of_ours_is_judged_by_its_own_delta_unless_another_is_given() {
 }
 
 #[test]
-fn json_is_alone_on_standard_output_and_has_the_keys_of_a_report() {
+fn json_goes_to_standard_output_with_the_keys_of_a_report() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON alone");
@@ -120,7 +120,7 @@ fn junit_events_and_page_are_written() {
 }
 
 #[test]
-fn every_question_can_be_asked() {
+fn every_option_of_judging_works() {
     let tower = "[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\nat_m = [0.0, -2.0, 0.0]\n";
     let folder = folder(&[("pass.csv", PASS), ("tower.toml", tower)]);
     for (arguments, exit) in [
@@ -143,13 +143,13 @@ fn every_question_can_be_asked() {
         (&["--delta", "1", "--radius", "alpha=1.1", "--radius", "bravo=0", "--obstacles", "tower.toml"], 1),
     ] {
         let ran = audit(folder.path(), &[&["pass.csv"][..], arguments].concat());
-        // A gap of the whole recording leaves two single samples, far apart.
+        // A gap over the whole recording leaves two single samples, far apart.
         assert_eq!(ran.exit, Some(exit), "{arguments:?}: {ran:?}");
     }
 }
 
 #[test]
-fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
+fn wrong_input_exits_with_2_and_a_remedy() {
     let bad = "[[obstacle]]\nname = \"tower\"\nbal = { radius_m = 1.0 }\n";
     let alone = "t,id,x,y,z\n0,a,0,0,0\n1,a,1,0,0\n";
     let files =
@@ -191,14 +191,14 @@ fn wrong_input_is_named_with_its_remedy_and_exits_with_2() {
         (&["alone.csv", "--delta", "0.5", "--expect-vehicles", "2"], "audit/vehicle-count"),
     ] {
         let ran = audit(folder.path(), arguments);
-        // Values that the command line itself refuses have no code.
+        // Values that clap refuses have no code.
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {ran:?}");
         assert_eq!(ran.out, "", "{arguments:?}");
     }
 }
 
 #[test]
-fn a_file_that_cannot_be_written_is_the_machines_failure() {
+fn an_unwritable_file_exits_with_3() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", "none/a.html"]);
     assert_eq!(ran.exit, Some(3), "{ran:?}");
@@ -206,8 +206,8 @@ fn a_file_that_cannot_be_written_is_the_machines_failure() {
 }
 
 #[test]
-fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
-    // Twelve pairs of radii 0.1 m; in the last two they overlap, or nearly do.
+fn the_text_has_the_closest_pair_and_every_limit() {
+    // Twelve pairs with radii of 0.1 m; the last two overlap, or nearly overlap.
     let mut rows = "t_s,id,x,y,z,radius\n".to_owned();
     for k in 0..12 {
         let x = 100.0 * f64::from(k);
@@ -223,7 +223,7 @@ fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
     assert_eq!(json["violations"][0]["limit_m"], 10.0);
     let events = fs::read_to_string(folder.path().join("lim.ev.csv")).expect("events");
     assert!(events.contains("violation,big,too,0.0,0.0,9.0,9.0,0.0,10.0,"), "{events}");
-    // The mast is closer than the two ever are to each other, and may be touched.
+    // The mast is closer to a vehicle than the vehicles ever are to each other, and contact with it is allowed.
     let mast = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--obstacles", "mast.toml", "--html", "a.html"]);
     let said = "CLEAR if straight between samples: never closer than 0.500000 m, alpha and mast at 0.00 s";
     assert!(mast.out.starts_with(said), "{mast:?}");
@@ -236,7 +236,7 @@ fn what_is_said_names_the_closest_and_every_limit_as_it_is() {
 }
 
 #[test]
-fn the_page_says_what_the_verdict_says() {
+fn the_page_has_the_verdict() {
     let mut gap = "t,id,x,y,z\n".to_owned();
     for t in [0, 1, 2, 3, 8, 9, 10] {
         let _ = write!(gap, "{t},alpha,0,0,0\n{t},bravo,{},0,0\n", t + 1);
@@ -258,9 +258,9 @@ fn the_page_says_what_the_verdict_says() {
 }
 
 #[test]
-fn what_is_proved_and_what_is_assumed_is_said_in_the_headline_and_in_the_keys() {
-    let head = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,\
-                yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
+fn headline_and_keys_distinguish_proof_and_assumption() {
+    let columns = |axis: &str| (0..8).map(|power| format!("{axis}^{power}")).collect::<Vec<_>>().join(",");
+    let head = format!("duration,{}", ["x", "y", "z", "yaw"].map(columns).join(","));
     let curve =
         |x: &str, z: &str| format!("{head}\n1,{x},0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,{z},0,0,0,0,0,0,0,0,0,0,0,0,0,0\n");
     let folder = folder(&[("pass.csv", PASS)]);
@@ -285,21 +285,21 @@ fn what_is_proved_and_what_is_assumed_is_said_in_the_headline_and_in_the_keys() 
     assert_eq!((curves.0, curves.2, curves.3), (Some(0), true.into(), serde_json::Value::Null));
     let violation = said(&["pass.csv", "--delta", "2"]);
     assert_eq!((violation.0, violation.2), (Some(1), false.into()));
-    // A limit is said with every digit that it has.
+    // A limit is printed with all its digits.
     let digits = audit(folder.path(), &["pass.csv", "--delta", "0.9999996"]);
     assert!(
         digits.out.contains("never closer than 1.000000 m") && digits.out.contains("delta 0.9999996 m"),
         "{digits:?}"
     );
-    // Risen by less than rounding shows: nobody knows whether both are on the ground, and the search ends.
+    // A rise below rounding: whether both vehicles are on the ground is unknown, and the search ends.
     let hidden = audit(folder.path(), &["curves", "--delta", "2", "--above", "0.5"]);
     assert_eq!(hidden.exit, Some(1), "{hidden:?}");
     assert!(hidden.out.starts_with("UNDECIDED: "), "{hidden:?}");
 }
 
 #[test]
-fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
-    // Charlie is alone when it is not seen; bravo has left by then.
+fn a_gap_with_effect_has_a_remedy_and_others_change_nothing() {
+    // During its gap, vehicle charlie has no other vehicle beside it: bravo has left.
     let mut rows = "t,id,x,y,z\n".to_owned();
     for t in 0..20 {
         let seen = [t < 8, t < 7, t > 9 && t != 14].into_iter().zip(["alpha", "bravo", "charlie"]).zip([0, 9, 18]);
@@ -323,8 +323,8 @@ fn a_gap_that_matters_names_its_remedy_and_one_that_does_not_fails_nothing() {
 }
 
 #[test]
-fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
-    // Two change places on a wide arc, and are recorded where they begin and where they end.
+fn the_verdict_on_a_recording_is_never_better_than_that_of_its_run() {
+    // Two vehicles exchange places on a wide arc, recorded at start and end only.
     let swap = r#"
         start = { positions_m = [[-3, 0], [3, 0]], velocities_m_s = [[0, -4], [0, 4]] }
         formation = { shape = "points", points_m = [[3, 0], [-3, 0]] }
@@ -345,7 +345,7 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
         let ran = audit(folder.path(), &[&recording, "--json"]);
         let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
         assert_eq!(json["separation"]["min_m"], report["separation"]["min_m"], "{out}: {ran:?}");
-        // Samples of every step are judged again: of two pairs at one distance another one may be the first.
+        // With samples of every step, another of two pairs at the same distance may come first.
         let is_repeated = out != "every";
         assert!(!is_repeated || json["separation"]["min_pair"] == report["separation"]["min_pair"], "{out}");
         assert_eq!(json["status"], report["audit"]["status"], "{out}");
@@ -358,11 +358,11 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
         }
         (ran.exit, json)
     };
-    // Stiff, so that vehicles pass each other between two samples a second apart.
+    // A stiff law, so that vehicles pass each other between two samples 1 s apart.
     let stiff = ["law.f1_per_s2=30", "law.f2_per_s=1", "time.record_hz=1", "time.duration_s=20"];
     let (exit, coarse) = fly("pentagon-laplacian", "coarse", &stiff);
     assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
-    // What straight lines say of it is a violation, and the run knows better.
+    // Straight lines between the samples give a violation, but the run is clear.
     let (exit, apart) = fly("swap.toml", "apart", &[]);
     assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &true.into()), "{apart}");
     assert_eq!(
@@ -379,7 +379,7 @@ fn a_run_is_never_better_by_its_recording_than_by_its_own_judge() {
 }
 
 #[test]
-fn no_output_replaces_an_input_even_where_the_question_is_wrong() {
+fn no_output_replaces_an_input_even_with_wrong_options() {
     for (settings, asked) in [
         ("", &["--config", "missing.toml", "--junit", "in.csv"][..]),
         ("[audit]\ndelta = 1", &["--events", "tautline.toml"]),
@@ -401,7 +401,7 @@ fn no_output_replaces_an_input_even_where_the_question_is_wrong() {
 }
 
 #[test]
-fn a_question_that_is_wrong_is_in_the_files_for_machines() {
+fn wrong_options_are_in_the_machine_readable_files() {
     let folder = folder(&[("in.csv", PASS)]);
     let ran = audit(folder.path(), &["in.csv", "--radius", "1", "--radius", "2", "--junit", "j.xml"]);
     assert_eq!(ran.exit, Some(2), "{ran:?}");

@@ -1,4 +1,4 @@
-//! `tautline campaign`: one answer, whatever it was split into, on however many threads and after however many kills.
+//! `tautline campaign`: the same answer for any shards, threads and interruptions.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Five vehicles from random starts, under two laws, for a second.
+/// Five vehicles from random starts, under two laws, for 1 s.
 const SPEC: &str = r#"
     scenario = "pentagon"
     runs = 60
@@ -22,7 +22,7 @@ const SPEC: &str = r#"
     "law.delta_m" = { list = [1.5, 2.0] }
 "#;
 
-/// A folder with a specification.
+/// Folder with a specification.
 struct Place(tempfile::TempDir);
 
 impl Place {
@@ -40,7 +40,7 @@ impl Place {
         ran_by(TAUTLINE, self.0.path(), &[&["campaign"], arguments].concat())
     }
 
-    /// Flies everything into a folder, and gives the bytes of table and answer.
+    /// Flies the whole campaign into a folder and returns the bytes of table and answer.
     fn run(&self, out: &str, more: &[&str]) -> [Vec<u8>; 2] {
         let fixed = ["run", "spec.toml", "--out", out, "--worst", "0", "--quiet"];
         let ran = self.campaign(&[&fixed[..], more].concat());
@@ -72,7 +72,7 @@ fn the_answer_is_the_same_for_any_shards_threads_and_order() {
     assert_eq!(place.run("seven", &["--shards", "7", "--threads", "2"]), whole);
     let planned = place.campaign(&["plan", "spec.toml", "--shards", "60", "--out", "many"]);
     assert_eq!(planned.exit, Some(0), "{}", planned.err);
-    // In an order of its own, some of them twice, from the folder and from the manifest.
+    // Shards in another order, some of them twice, from the folder and from the manifest.
     for shards in ["59", "0-20", "30-58", "10-35"] {
         let folder = if shards == "59" { "many/manifest.json" } else { "many" };
         let flown = place.campaign(&["shard", folder, "--shard", shards, "--threads", "2", "--quiet"]);
@@ -86,13 +86,13 @@ fn the_answer_is_the_same_for_any_shards_threads_and_order() {
     let answer = json(&whole[1]);
     assert_eq!((&answer["runs"], answer["laws"][0]["violated"]["of"].as_u64()), (&Value::from(60), Some(60)));
     assert_eq!(answer["pairs"].as_array().map(Vec::len), Some(1));
-    // Another seed draws other flights.
+    // Another seed gives other flights.
     fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
     assert_ne!(place.run("other", &[])[0], whole[0]);
 }
 
 #[test]
-fn a_campaign_that_is_killed_again_and_again_ends_as_one_that_is_not() {
+fn a_campaign_killed_repeatedly_has_the_same_answer() {
     let place = Place::of(SPEC);
     let whole = place.run("whole", &[]);
     let kills = if std::env::var_os("TAUTLINE_LONG").is_some() { 20 } else { 5 };
@@ -112,7 +112,7 @@ fn a_campaign_that_is_killed_again_and_again_ends_as_one_that_is_not() {
 }
 
 #[test]
-fn a_torn_part_is_flown_again_and_a_foreign_one_refused() {
+fn a_torn_part_is_flown_again_and_that_of_another_campaign_refused() {
     let place = Place::of(SPEC);
     let whole = place.run("camp", &["--shards", "3"]);
     let part = place.parts("camp")[1].clone();
@@ -129,7 +129,7 @@ fn a_torn_part_is_flown_again_and_a_foreign_one_refused() {
     fs::write(&part, changed).expect("changed");
     assert_eq!(place.campaign(&["missing", "camp"]).exit, Some(1), "a part that was changed is no part");
     assert_eq!(place.run("camp", &[]), whole);
-    // The part of another campaign.
+    // A part of another campaign.
     fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
     place.run("other", &["--shards", "3"]);
     fs::copy(&place.parts("other")[1], &part).expect("copied");
@@ -146,7 +146,7 @@ fn a_torn_part_is_flown_again_and_a_foreign_one_refused() {
 }
 
 #[test]
-fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes() {
+fn a_manifest_of_another_program_or_an_edited_one_is_refused_with_both_hashes() {
     let place = Place::of(SPEC);
     assert_eq!(place.campaign(&["plan", "spec.toml", "--shards", "2", "--out", "camp"]).exit, Some(0));
     let path = place.path("camp/manifest.json");
@@ -158,12 +158,12 @@ fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes(
     let campaign = manifest["campaign"].as_str().expect("a hash");
     assert!(changed.err.contains(&campaign[..32]) && changed.err.contains("its contents are"), "{}", changed.err);
     fs::write(&path, &text).expect("written");
-    // The same folder for another specification.
+    // The same folder with another specification.
     fs::write(place.path("spec.toml"), SPEC.replace("runs = 60", "runs = 61")).expect("written");
     let other = place.campaign(&["run", "spec.toml", "--out", "camp"]);
     assert_eq!(other.exit, Some(2));
     assert!(other.err.contains(&campaign[..32]) && other.err.contains("and this is"), "{}", other.err);
-    // A copy of the program with one byte more is another program.
+    // A copy of the program with one more byte is another program.
     let copy = place.path("tautline-copy");
     let mut bytes = fs::read(TAUTLINE).expect("the program");
     bytes.push(0);
@@ -176,7 +176,7 @@ fn a_manifest_of_another_program_or_changed_by_hand_is_refused_with_both_hashes(
 }
 
 #[test]
-fn enough_is_enough_and_later_rows_are_left_out_however_much_was_flown() {
+fn an_early_stop_leaves_later_rows_out() {
     let spec = SPEC.replace("runs = 60", "runs = 400").replace("laws = [\"edge-tension\", \"displacement\"]", "");
     let place = Place::of(&spec.replace("duration_s = 1.0", "duration_s = 0.2\n    arrival.hold_s = 0.1"));
     let early = place.run("early", &["--until-width", "0.2", "--shards", "8"]);
@@ -185,7 +185,7 @@ fn enough_is_enough_and_later_rows_are_left_out_however_much_was_flown() {
     assert!(runs < 400 && answer["stopped_early"] == Value::Bool(true), "{answer}");
     assert_eq!(answer["intervals"], "confidence-sequence");
     assert!(place.parts("early").len() < 8, "shards beyond are not flown");
-    // Flown whole elsewhere, the same rows count.
+    // A complete campaign in another folder has the same rows.
     let planned = ["plan", "spec.toml", "--until-width", "0.2", "--shards", "5", "--out", "all"];
     assert_eq!(place.campaign(&planned).exit, Some(0));
     assert_eq!(place.campaign(&["shard", "all", "--shard", "0-4", "--threads", "2", "--quiet"]).exit, Some(0));
@@ -196,12 +196,13 @@ fn enough_is_enough_and_later_rows_are_left_out_however_much_was_flown() {
 }
 
 #[test]
-fn a_full_disk_is_the_machines_fault_and_loses_nothing() {
+fn a_full_disk_exits_with_3_and_keeps_finished_flights() {
     let place = Place::of(SPEC);
     let whole = place.run("whole", &[]);
     let limited = |blocks: u32| {
         let shell = format!(
-            "trap '' XFSZ; ulimit -f {blocks}; exec {TAUTLINE} campaign run spec.toml --out full --shards 2 --worst 0 --quiet"
+            "trap '' XFSZ; ulimit -f {blocks}; \
+             exec {TAUTLINE} campaign run spec.toml --out full --shards 2 --worst 0 --quiet"
         );
         Command::new("sh").args(["-c", &shell]).current_dir(place.0.path()).output().expect("it runs")
     };
@@ -212,7 +213,7 @@ fn a_full_disk_is_the_machines_fault_and_loses_nothing() {
 }
 
 #[test]
-fn a_run_is_flown_again_to_the_same_hash_and_the_worst_have_their_recordings() {
+fn a_replay_has_the_same_hash_and_the_worst_flights_have_recordings() {
     let place = Place::of(&SPEC.replace("runs = 60", "runs = 6"));
     let ran = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "2", "--no-snapshots"]);
     assert!(ran.out.contains("an hour") && ran.out.contains("displacement"), "{}{}", ran.out, ran.err);
@@ -237,7 +238,7 @@ fn a_run_is_flown_again_to_the_same_hash_and_the_worst_have_their_recordings() {
 }
 
 #[test]
-fn what_is_wrong_is_said_with_its_key_and_remedy() {
+fn wrong_input_is_refused_with_key_and_remedy() {
     let refused = |spec: &str, code: &str| {
         let place = Place::of(spec);
         let ran = place.campaign(&["run", "spec.toml", "--out", "camp"]);
@@ -285,7 +286,7 @@ fn what_is_wrong_is_said_with_its_key_and_remedy() {
 }
 
 #[test]
-fn a_journal_of_another_campaign_or_with_a_changed_row_is_no_part_of_this_one() {
+fn journals_of_other_campaigns_and_changed_rows_are_ignored() {
     let place = Place::of(SPEC);
     let whole = place.run("whole", &["--shards", "1"]);
     let killed = |out: &str| {
@@ -309,7 +310,7 @@ fn a_journal_of_another_campaign_or_with_a_changed_row_is_no_part_of_this_one() 
         child.wait().expect("it ends");
         journal().expect("what it flew")
     };
-    // Rows of this campaign of which one is changed, beside those of another seed.
+    // Rows of this campaign, one of them changed, beside rows of another seed.
     let changed = killed("changed");
     let text = fs::read_to_string(&changed).expect("rows");
     fs::write(&changed, text.replacen("\"outcome\":\"clear\"", "\"outcome\":\"violated\"", 1)).expect("written");
@@ -321,7 +322,7 @@ fn a_journal_of_another_campaign_or_with_a_changed_row_is_no_part_of_this_one() 
 }
 
 #[test]
-fn the_command_of_a_file_named_like_a_built_in_scenario_flies_the_file() {
+fn a_file_named_like_a_built_in_scenario_is_repeated_by_its_path() {
     let place =
         Place::of("scenario = \"cases/pentagon\"\nruns = 2\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.1] }\n");
     fs::create_dir(place.path("cases")).expect("a folder");
@@ -331,7 +332,7 @@ fn the_command_of_a_file_named_like_a_built_in_scenario_flies_the_file() {
     assert_eq!(ran.exit, Some(0), "{}", ran.err);
     let page = fs::read_to_string(place.path("camp/campaign.html")).expect("a page");
     assert!(page.contains("cases/pentagon --set") && !page.contains("tautline run pentagon"), "{page}");
-    // Nobody's results are overwritten.
+    // Existing results are not overwritten.
     fs::create_dir(place.path("mine")).expect("a folder");
     fs::write(place.path("mine/results.parquet"), "mine").expect("written");
     let refused = place.campaign(&["run", "spec.toml", "--out", "mine"]);
@@ -340,7 +341,7 @@ fn the_command_of_a_file_named_like_a_built_in_scenario_flies_the_file() {
 }
 
 #[test]
-fn points_of_a_grid_are_no_sample_and_have_no_interval() {
+fn points_of_a_grid_have_no_interval() {
     let place = Place::of(
         "scenario = \"pentagon\"\n[set]\ntime.duration_s = 1.0\n[vary]\nlaw.alpha = { grid = [0.5, 1.0, 2.0] }\n",
     );
@@ -351,7 +352,8 @@ fn points_of_a_grid_are_no_sample_and_have_no_interval() {
     assert!(said.contains("all points of the grid") && !said.contains("95 % confidence"), "{said}");
 }
 
-/// Two vehicles close up to 1.3 m and swing to where errors of measurement decide whether they come below 1 m: of 20,000 flights 43 % do.
+/// Two vehicles approach each other up to 1.3 m and oscillate. Errors of measurement decide whether they come below 1
+/// m: 43 % of 20,000 flights do.
 const RARE: &str = r#"
     scenario = "pair.toml"
     runs = 4
@@ -372,7 +374,7 @@ const PAIR: &str = r#"
 "#;
 
 #[test]
-fn rare_violations_are_estimated_and_bad_flights_flown_again_to_the_same_state() {
+fn rare_violations_are_estimated_and_replayed_with_the_same_state() {
     let place = Place::of(RARE);
     fs::write(place.path("pair.toml"), PAIR).expect("written");
     let whole = place.run("one", &["--shards", "1", "--threads", "1"]);
@@ -386,23 +388,24 @@ fn rare_violations_are_estimated_and_bad_flights_flown_again_to_the_same_state()
     let again = place.campaign(&["replay", "one", "--run", &run, "--bad", &number, "--out", "again"]);
     assert_eq!(again.exit, Some(1), "{}", again.err);
     assert!(again.out.contains(bad["state_hash"].as_str().expect("a hash")), "{}", again.out);
-    // The judge of recordings finds what the run saw.
+    // The audit of the recording finds the violation of the run.
     let audit = ran_by(TAUTLINE, place.0.path(), &["audit", "again/run.mcap"]);
     assert_eq!(audit.exit, Some(1), "{}{}", audit.out, audit.err);
     let page = place.campaign(&["report", "one", "--worst", "1"]);
-    assert_eq!(page.exit, Some(1), "an estimate of violations is no good news");
-    assert!(page.out.contains("a flight is violated with a probability of"), "{}", page.out);
+    assert_eq!(page.exit, Some(1), "estimates exit with 1");
+    assert!(page.out.contains("probability of a violation "), "{}", page.out);
     let none = place.campaign(&["replay", "one", "--run", "0", "--bad", "7"]);
-    assert!(none.exit == Some(2) && none.err.contains("no bad flight 7"), "{}", none.err);
-    // Nothing random from step to step: two flights from one state are one flight.
+    assert!(none.exit == Some(2) && none.err.contains("no violated flight 7"), "{}", none.err);
+    // Without randomness from step to step, two flights from one state are the same.
     fs::write(place.path("pair.toml"), PAIR.replace("position_noise_m = 0.12, ", "")).expect("written");
     let still = place.campaign(&["run", "spec.toml", "--out", "still"]);
     assert!(still.exit == Some(2) && still.err.contains("random from step to step"), "{}{}", still.out, still.err);
 }
 
 #[test]
-fn starts_in_a_random_order_are_all_orders() {
-    let spec = "scenario = \"pentagon\"\nruns = 40\n[set]\ntime.duration_s = 0.05\narrival.hold_s = 0.02\nstart.shuffle = true\n";
+fn random_orders_of_starts_include_all_orders() {
+    let spec = "scenario = \"pentagon\"\nruns = 40\n[set]\ntime.duration_s = 0.05\narrival.hold_s = 0.02\n\
+                start.shuffle = true\n";
     let place = Place::of(spec);
     let answer = json(&place.run("camp", &[])[1]);
     assert_eq!(answer["laws"][0]["violated"]["of"], Value::from(40), "{answer}");

@@ -1,4 +1,4 @@
-//! What a campaign leaves and says: the same bytes whatever flew it, damage by its file, a mistake by its line, a bound by its kind.
+//! Files and messages of a campaign: reproducible bytes, damaged parts, places of errors, kinds of bounds.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Five vehicles from random starts, for a second.
+/// Five vehicles from random starts, for 1 s.
 const SPEC: &str = "scenario = \"pentagon\"\nruns = 12\nseed = 5\n[set]\ntime.duration_s = 1.0\n[vary]\n\
                     \"start.jitter_m\" = { uniform = [0.0, 0.3] }\n";
 
@@ -22,7 +22,7 @@ fn campaign(place: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, place, &[&["campaign"], arguments].concat())
 }
 
-/// Every file below a folder but those of shards, with its bytes.
+/// Returns every file below a folder except those of shards, with its bytes.
 fn left(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -62,7 +62,7 @@ fn every_file_of_the_answer_has_the_same_bytes_for_any_shards_threads_and_folder
     for ((name, one), (_, other)) in std::iter::zip(&whole, &split) {
         assert!(one == other, "{} differs", name.display());
     }
-    // Another campaign leaves other bytes, and a run by itself has its wall-clock times.
+    // Another campaign has other bytes, and a single run has wall-clock times.
     fs::write(place.path().join("spec.toml"), SPEC.replace("seed = 5", "seed = 6")).expect("written");
     assert_ne!(run("other", &[]), whole);
     let flown = ran_by(
@@ -74,7 +74,7 @@ fn every_file_of_the_answer_has_the_same_bytes_for_any_shards_threads_and_folder
 }
 
 #[test]
-fn a_damaged_part_is_named_with_its_damage_and_flown_again() {
+fn a_damaged_part_is_reported_and_flown_again() {
     let place = place(SPEC);
     let run = || campaign(place.path(), &["run", "spec.toml", "--out", "camp", "--shards", "3", "--worst", "0"]);
     assert!(matches!(run().exit, Some(0 | 1)));
@@ -103,7 +103,7 @@ fn a_damaged_part_is_named_with_its_damage_and_flown_again() {
         let again = run();
         assert!(again.err.contains("is damaged") && fs::read(&path).expect("a part") == whole, "{}", again.err);
     }
-    // What is missing is not damaged.
+    // A missing part is not damaged.
     fs::remove_file(&path).expect("removed");
     let missing = campaign(place.path(), &["merge", "camp", "--worst", "0"]);
     assert!(missing.err.contains("shards 1 of 3 are missing") && !missing.err.contains("damaged"), "{}", missing.err);
@@ -111,7 +111,7 @@ fn a_damaged_part_is_named_with_its_damage_and_flown_again() {
 }
 
 #[test]
-fn a_mistake_is_shown_at_its_line_and_column_of_the_specification() {
+fn errors_have_line_and_column_of_the_specification() {
     for (from, to, says, at) in [
         ("start.jitter_m", "start.jiter_m", "jiter_m", "spec.toml:7:1"),
         ("{ uniform", "{ unifrom", "unifrom", "spec.toml:7:22"),
@@ -131,7 +131,7 @@ fn a_mistake_is_shown_at_its_line_and_column_of_the_specification() {
         assert!(ran.err.contains(says) && ran.err.contains(at), "{to}: {at}: {}", ran.err);
         assert!(!ran.err.contains("--set:"), "{to}: {}", ran.err);
     }
-    // A mistake in the scenario's own file is shown there.
+    // An error in the scenario's own file has its place there.
     let place = place(&SPEC.replace("\"pentagon\"", "\"own.toml\""));
     fs::write(place.path().join("own.toml"), "[law]\nkind = \"edge-tension\"\ndelta_n = 2.0\n").expect("written");
     let ran = campaign(place.path(), &["run", "spec.toml", "--out", "camp"]);
@@ -139,7 +139,7 @@ fn a_mistake_is_shown_at_its_line_and_column_of_the_specification() {
 }
 
 #[test]
-fn a_bound_is_said_with_its_kind_in_words_in_json_and_on_the_page() {
+fn a_bound_has_its_kind_in_text_json_and_page() {
     let place = place(
         &SPEC.replace("runs = 12", "runs = 20").replace("duration_s = 1.0", "duration_s = 0.1\narrival.hold_s = 0.1"),
     );
@@ -159,7 +159,7 @@ fn a_bound_is_said_with_its_kind_in_words_in_json_and_on_the_page() {
     let stopped =
         campaign(place.path(), &["run", "spec.toml", "--out", "stop", "--worst", "0", "--until-width", "0.01"]);
     assert!(stopped.out.contains("% with 95 % confidence (confidence sequence)"), "{}", stopped.out);
-    // All of all have no upper bound below 1.
+    // If all flights are violated, the upper bound is 1 and is not printed.
     let spec = "scenario = \"pentagon-laplacian\"\nruns = 3\n[set]\ntime.duration_s = 5.0\n[vary]\n\
                 start.jitter_m = { uniform = [0.0, 0.01] }\n";
     fs::write(place.path().join("spec.toml"), spec).expect("written");

@@ -1,4 +1,4 @@
-//! `tautline check` and the warnings of `tautline run`, through the program.
+//! `tautline check`, and the warnings of `tautline run`.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ fn codes(found: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn the_pentagon_is_ready_with_the_known_numbers() {
+fn the_pentagon_has_the_known_numbers() {
     let (code, found) = json(&["pentagon"]);
     assert_eq!((code, found["algebraic_connectivity"].as_f64()), (0, Some(5.0)));
     let number = |key: &str| found[key].as_f64().expect("a number");
@@ -55,7 +55,7 @@ fn a_star_of_twelve_is_refused() {
 }
 
 #[test]
-fn a_circle_in_space_is_warned_of_and_a_line_is_refused() {
+fn a_circle_in_space_is_a_warning_and_a_line_is_refused() {
     let (code, found) = json(&["circle", "--set", "swarm.dimensions=3"]);
     assert!(code == 0 && codes(&found).contains(&"flat-formation-in-space"), "{found}");
     let (_, out, _) = tautline(&["check", "circle", "--set", "swarm.dimensions=3"]);
@@ -65,7 +65,7 @@ fn a_circle_in_space_is_warned_of_and_a_line_is_refused() {
 }
 
 #[test]
-fn wrong_input_is_told_apart_from_a_bad_flight() {
+fn wrong_input_and_a_bad_flight_have_different_exit_codes() {
     for arguments in [
         &["check", "no-such-scenario"][..],
         &["check", "pentagon", "--set", "law.delta_m=3.0"],
@@ -79,7 +79,7 @@ fn wrong_input_is_told_apart_from_a_bad_flight() {
 }
 
 #[test]
-fn a_drift_that_numbers_do_not_follow_is_refused() {
+fn an_unresolved_drift_is_refused() {
     let check = |sets: &[&str]| json(&sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
     let (code, found) = check(&["swarm.a22_per_s=0.5"]);
     assert_eq!((code, codes(&found)[0]), (1, "drift-unresolved"), "{found}");
@@ -93,7 +93,7 @@ fn a_drift_that_numbers_do_not_follow_is_refused() {
 }
 
 #[test]
-fn words_go_to_standard_output_and_quiet_says_nothing() {
+fn text_goes_to_standard_output_unless_quiet() {
     let (code, out, err) = tautline(&["check"]);
     assert!(
         code == 0 && out.starts_with("READY: ") && out.contains("warning [common-mode-unstable]: ") && err.is_empty()

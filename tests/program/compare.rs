@@ -1,4 +1,4 @@
-//! `tautline compare`: its numbers are those of `run`, the same for any number of threads; what is wrong is said first.
+//! `tautline compare`: numbers of `run` for any number of threads, and refusals before the first flight.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use tautline::mcap::McapRecording;
 use tautline::record::OwnedSample;
 use tautline::swarm::row;
 
-/// A start that draws nothing, and is right.
+/// A valid start without randomness.
 const PAIR: &str = r#"[start]
 positions_m = [[0.0, 0.0], [4.0, 0.0]]
 [formation]
@@ -22,9 +22,9 @@ alpha = 0.5
 [time]
 duration_s = 1.5
 "#;
-/// A pentagon that is flown for long enough to cross.
+/// A pentagon, flown until the vehicles have crossed.
 const CROSSING: [&str; 3] = ["pentagon", "--set", "time.duration_s=6"];
-/// Sums of some thousand rounded lengths.
+/// Error of sums of thousands of rounded lengths.
 const ROUNDING: f64 = 1e-9;
 
 fn ran(folder: &Path, arguments: &[&str]) -> Ran {
@@ -35,7 +35,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).expect(text)
 }
 
-/// The comparison of these laws, by its JSON, and what was said beside it.
+/// Returns the comparison of laws as JSON, and standard error.
 fn compared(folder: &Path, what: &[&str], more: &[&str]) -> (Value, String) {
     let Ran { exit, out, err } = ran(folder, &[&["compare"], what, more, &["--json", "-"]].concat());
     assert_eq!(exit, Some(0), "{err}");
@@ -54,7 +54,7 @@ fn file(folder: &Path, name: &str, text: &str) {
     fs::write(folder.join(name), text).expect("a file");
 }
 
-/// The report of the flight of a law from a start, flown by `run`, and every step of it.
+/// Returns the report of the flight of a law from a start, flown by `run`, and every step.
 fn flown(folder: &Path, law: &Value, flight: &Value, jitter_m: &Value) -> (Value, Vec<OwnedSample>) {
     let sets = list(&law["overrides"]).iter().map(|set| set.as_str().expect("text").to_owned());
     let start = [format!("start.seed={}", flight["seed"]), format!("start.jitter_m={jitter_m}")];
@@ -69,7 +69,7 @@ fn flown(folder: &Path, law: &Value, flight: &Value, jitter_m: &Value) -> (Value
 }
 
 #[test]
-fn each_flight_has_the_bits_and_the_numbers_of_the_same_flight_by_run() {
+fn each_flight_has_the_bits_and_numbers_of_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let (found, err) = compared(folder.path(), &CROSSING, &["--laws=laplacian,edge-tension", "--runs=2", "--seed=5"]);
     assert!(
@@ -130,12 +130,12 @@ fn on_a_crossing_start_the_baseline_violates_and_the_edge_tension_does_not() {
     assert!((number(&tension["clear"]["low"]) - 0.540_7).abs() < 1e-3 && number(&tension["clear"]["high"]) == 1.0);
     assert!((number(&laplacian["clear"]["high"]) - 0.459_3).abs() < 1e-3 && number(&laplacian["clear"]["low"]) == 0.0);
     assert!(number(&tension["min_smallest_m"]) > 2.0 && number(&laplacian["min_smallest_m"]) < 1.6);
-    // Nobody is there after 6 s: that has no time.
+    // No formation is reached after 6 s, so there is no time to reach it.
     assert_eq!((&tension["reached"]["count"], &tension["reached_median_s"]["value"]), (&0.into(), &Value::Null));
     assert!(list(&laplacian["flights"]).iter().all(|flight| flight["outcome"] == "violated"));
 }
 
-/// The four files of a comparison by so many threads.
+/// Returns the four files of a comparison with a number of threads.
 fn files(folder: &Path, variable: &str, more: &[&str]) -> [String; 4] {
     let names = ["c.json", "c.csv", "c.tex", "c.html"];
     let mut command = Command::new(TAUTLINE);
@@ -148,7 +148,7 @@ fn files(folder: &Path, variable: &str, more: &[&str]) -> [String; 4] {
     names.map(|name| fs::read_to_string(folder.join(name)).expect(name))
 }
 
-/// Without wall-clock times.
+/// Removes wall-clock times.
 fn timeless([report, csv, latex, html]: [String; 4]) -> (Value, String, String, String) {
     let mut report = json(&report);
     let performance = report.as_object_mut().and_then(|report| report.remove("performance")).expect("a performance");
@@ -158,7 +158,7 @@ fn timeless([report, csv, latex, html]: [String; 4]) -> (Value, String, String, 
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_files_but_for_the_performance() {
+fn files_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let one = timeless(files(folder.path(), "1", &[]));
     assert!(one == timeless(files(folder.path(), "2", &[])), "RAYON_NUM_THREADS=2");
@@ -171,7 +171,7 @@ fn any_number_of_threads_gives_the_same_files_but_for_the_performance() {
 }
 
 #[test]
-fn csv_latex_and_page_say_what_the_json_says() {
+fn csv_latex_and_page_agree_with_json() {
     let folder = tempfile::tempdir().expect("a folder");
     let [report, csv, latex, html] = files(folder.path(), "2", &[]);
     let (report, names) = (json(&report), ["potential", "edge-tension", "laplacian"]);
@@ -190,7 +190,7 @@ fn csv_latex_and_page_say_what_the_json_says() {
         ] {
             assert_eq!(cell(column).parse().ok(), law.pointer(key).and_then(Value::as_f64), "{column}");
         }
-        assert_eq!(cell("reached_median_s"), "", "nobody reached it");
+        assert_eq!(cell("reached_median_s"), "", "no flight reached the formation");
         assert!(latex.contains(&format!("\n{name} & ")) && html.contains(&format!("<th scope=\"row\">{name}</th>")));
     }
 
@@ -208,7 +208,7 @@ fn csv_latex_and_page_say_what_the_json_says() {
         }
     }
 
-    assert!(html.contains("no pictures were taken: ") && !html.contains("<img"), "no adapter, no pictures");
+    assert!(html.contains("no pictures: ") && !html.contains("<img"), "no adapter, no pictures");
     assert!(html.contains("tautline compare pentagon --laws 'potential,edge-tension,laplacian' --runs 3 --seed 0"));
     assert_eq!(html.matches("tautline run pentagon").count(), 3, "the worst flight of each law");
     for part in ["</html>", "Clopper and Pearson", "the start has no randomness"] {
@@ -217,7 +217,7 @@ fn csv_latex_and_page_say_what_the_json_says() {
 }
 
 #[test]
-fn laws_of_the_file_have_names_and_keys_and_change_nothing_of_what_run_flies() {
+fn tables_of_laws_have_names_and_do_not_affect_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let named =
         format!("{PAIR}[laws.stiff]\nkind = \"edge-tension\"\nalpha = 4.0\n[laws.laplacian]\nf1_per_s2 = 2.0\n");
@@ -231,7 +231,7 @@ fn laws_of_the_file_have_names_and_keys_and_change_nothing_of_what_run_flies() {
         settings(&["--laws", "stiff,edge-tension,potential"]),
         [
             r#""stiff": ["law.kind=edge-tension","law.alpha=4.0"]"#,
-            // That of [law].
+            // The law of [law].
             r#""edge-tension": ["law.kind=edge-tension","law.alpha=0.5"]"#,
             r#""potential": ["law.kind=potential","law.k_per_s2=1.0","law.c_per_s=2.0","law.eta_m4_per_s2=1.0"]"#,
         ]
@@ -250,7 +250,7 @@ fn laws_of_the_file_have_names_and_keys_and_change_nothing_of_what_run_flies() {
 }
 
 #[test]
-fn files_that_a_scenario_names_are_found_from_its_folder_under_every_law() {
+fn paths_in_a_scenario_are_relative_to_its_folder_under_every_law() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("below")).expect("a folder");
     file(folder.path(), "below/slots.csv", "0,0\n3,0\n");
@@ -262,7 +262,7 @@ fn files_that_a_scenario_names_are_found_from_its_folder_under_every_law() {
 }
 
 #[test]
-fn a_random_start_is_drawn_by_the_seed_and_a_jitter_of_its_own_is_kept() {
+fn a_random_start_depends_on_the_seed_and_keeps_its_jitter() {
     let folder = tempfile::tempdir().expect("a folder");
     let random = ["pentagon", "--set", "start={shape=\"random\", half_extent_m=6.0}", "--set", "time.duration_s=1.5"];
     let (found, err) = compared(folder.path(), &random, &["--laws=edge-tension,laplacian", "--runs=3", "--seed=7"]);
@@ -279,7 +279,7 @@ fn a_random_start_is_drawn_by_the_seed_and_a_jitter_of_its_own_is_kept() {
 }
 
 #[test]
-fn what_is_refused_and_who_did_not_arrive_is_said() {
+fn refusals_and_unreached_formations_have_notes() {
     let folder = tempfile::tempdir().expect("a folder");
     file(folder.path(), "pair.toml", &PAIR.replace("alpha = 0.5\n", "[laws.laplacian]\nf2_per_s = 0.1\n"));
     let weak = ["pair.toml", "--set", "swarm.a22_per_s=0.5", "--set", "arrival.edge_error_m=0.97"];
@@ -292,20 +292,20 @@ fn what_is_refused_and_who_did_not_arrive_is_said() {
     let [laplacian, tension] = &list(&found["laws"])[..] else { panic!("two laws") };
     assert_eq!((&laplacian["refused"], &tension["refused"]), (&6.into(), &0.into()));
     assert_eq!(laplacian["flights"][0]["refused"][0], "relative-velocity-unstable");
-    assert_eq!(laplacian["clear"]["count"], 6, "flown all the same");
+    assert_eq!(laplacian["clear"]["count"], 6, "flown anyway");
 
-    // So short that some starts are within the tolerance to the end and some are not.
+    // A duration for which some starts are within the tolerance to the end and some are not.
     let short = ["pair.toml", "--runs", "12", "--laws", "edge-tension", "--set", "time.duration_s=0.1"];
     let tight =
         ["--set", "arrival.edge_error_m=1.0", "--set", "arrival.disagreement_m_s=9", "--set", "arrival.hold_s=0.1"];
     let (found, err) = compared(folder.path(), &[&short[..], &tight].concat(), &[]);
     let reached = found["laws"][0]["reached"]["count"].as_u64().expect("a count");
     assert!((1..12).contains(&reached), "{reached}");
-    assert!(err.contains(&format!("are over the {reached} of 12 flights that reached the formation, alone")), "{err}");
+    assert!(err.contains(&format!("are over the {reached} of 12 flights that reached the formation")), "{err}");
 }
 
 #[test]
-fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
+fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     file(at, "pair.toml", PAIR);
@@ -347,12 +347,12 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
     ];
     for (arguments, code, shown) in cases {
         let ran = ran(at, &[&["compare"], *arguments].concat());
-        // Values that the command line itself refuses have no code.
+        // Values that clap refuses have no code.
         assert_eq!((ran.exit, ran.out.as_str(), ran.code()), (Some(2), "", *code), "{arguments:?}: {}", ran.err);
         let err = ran.err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");
         assert!(err.contains(shown), "{arguments:?}: {err}");
     }
-    // Such tables are looked at by every command.
+    // Every command checks these tables.
     assert_eq!(ran(at, &["check", "value.toml"]).exit, Some(2));
     let nowhere = ran(at, &["compare", "pair.toml", "--json", "pair.toml/deep/c.json"]);
     assert_eq!((nowhere.exit, nowhere.out.as_str()), (Some(3), ""), "{}", nowhere.err);
@@ -366,7 +366,7 @@ fn wrong_input_is_refused_with_its_remedy_before_anything_is_flown() {
 }
 
 #[test]
-fn a_person_reads_a_table_and_a_quiet_program_says_nothing() {
+fn a_table_is_printed_unless_quiet() {
     let folder = tempfile::tempdir().expect("a folder");
     file(folder.path(), "pair.toml", PAIR);
     let what = ["compare", "pair.toml", "--laws", "edge-tension,laplacian", "--runs", "6"];
@@ -383,7 +383,7 @@ fn a_person_reads_a_table_and_a_quiet_program_says_nothing() {
 }
 
 #[test]
-fn each_start_has_a_noise_of_its_own_that_run_flies_again() {
+fn each_start_has_its_own_noise_which_run_repeats() {
     let folder = tempfile::tempdir().expect("a folder");
     let noisy = ["--set", "sensing.position_noise_m=0.01", "--set", "sensing.rate_hz=50"];
     let flown_once = [&CROSSING[..], &noisy, &["--laws", "edge-tension", "--runs", "2"]].concat();

@@ -1,4 +1,5 @@
-//! Same scenario, same bits: over runs, thread counts and ways to talk. Over builds: `crates/sim/tests/bits.rs`.
+//! Equal bits for equal scenarios, over runs, numbers of threads and output options. Over builds:
+//! `crates/sim/tests/bits.rs`.
 
 use std::fs;
 
@@ -6,16 +7,18 @@ use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// `state_hash` of built-in scenarios; that of `pentagon` is in `crates/sim/tests/bits.rs`. They may change with the engine's version, with what a built-in says, with
-/// the law's arithmetic, and with what [`tautline::record::StateHash`] covers: each time for a reason that the changelog
-/// gives. They may not change with the machine, the build, the time or the number of threads.
+/// `state_hash` of built-in scenarios; that of `pentagon` is in `crates/sim/tests/bits.rs`.
+///
+/// The hashes may change with the version of the engine, the built-in scenarios, the arithmetic of the law, and the
+/// coverage of [`tautline::record::StateHash`]; the changelog gives the reason. They may not change with the machine,
+/// the build, the time or the number of threads.
 const GOLDEN: [(&str, &str); 3] = [
     ("circle", "7c996884f60a7c94d0282adaf8ab57a7a999fca017b5c76aac033b7687045a96"),
     ("pentagon-laplacian", "d119c0b8f6301a5a56b0466c6b04bfdd9155c0979d3f37768febca5c68b40dbd"),
     ("pentagon-collinear", "153897ed935659071f997f590ec2f84e2fbaef17be8299cdfadaa78a84462762"),
 ];
 
-/// As many vehicles as it takes for law and audit to run side by side where there are two threads.
+/// Enough vehicles for law and audit to run in parallel on two threads.
 const MANY: &str = r#"name = "many"
 [swarm]
 count = 520
@@ -37,7 +40,7 @@ duration_s = 0.1
 hold_s = 0.1
 "#;
 
-/// A run by one build of the program, into a folder of its own.
+/// Runs of one build of the program, each into its own folder.
 struct Runs {
     folder: TempDir,
     count: usize,
@@ -50,7 +53,7 @@ impl Runs {
         Self { folder, count: 0 }
     }
 
-    /// The hash of the states and the whole recording.
+    /// Returns the hash of the states and the whole recording.
     fn run(&mut self, program: &str, scenario: &str, more: &[&str]) -> (String, Vec<u8>) {
         self.count += 1;
         let out = format!("out-{}", self.count);
@@ -65,7 +68,7 @@ impl Runs {
 }
 
 #[test]
-fn three_runs_any_thread_count_and_any_talk_give_the_same_recording_byte_for_byte() {
+fn recordings_are_equal_for_any_number_of_threads_and_any_output() {
     let mut runs = Runs::new();
     for scenario in ["pentagon", "many.toml"] {
         let (hash, recording) = runs.run(TAUTLINE, scenario, &["--threads", "2"]);
@@ -80,7 +83,7 @@ fn three_runs_any_thread_count_and_any_talk_give_the_same_recording_byte_for_byt
 }
 
 #[test]
-fn another_start_by_one_bit_gives_another_hash() {
+fn a_start_that_differs_by_one_bit_has_another_hash() {
     let mut runs = Runs::new();
     let [plain, nudged] = ["duration_s=1", "dt_s=0.00416666666666666755"]
         .map(|set| runs.run(TAUTLINE, "pentagon", &["--set", "time.duration_s=1", "--set", &format!("time.{set}")]).0);

@@ -1,4 +1,4 @@
-//! What comes in by the door: several files, units, frames and guesses, judged by the program.
+//! Audits of several files, with units, frames and guessed settings.
 
 use std::fs;
 use std::path::Path;
@@ -21,13 +21,13 @@ fn audit(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, &[&["audit"], arguments].concat())
 }
 
-/// 2 m apart, in the unit and with the time that the header says.
+/// Two vehicles 2 m apart, in the unit and with the time column of the header.
 fn two(header: &str, metre: f64) -> String {
     format!("{header}\n0,0,0,{},0\n1,0,1,{},1\n", 2.0 * metre, 2.0 * metre)
 }
 
 #[test]
-fn millimetres_do_not_pass_as_metres() {
+fn millimetres_are_not_read_as_metres() {
     let folder = folder(&[
         ("mm.csv", &two("t_s,a.x [mm],a.y [mm],b.x [mm],b.y [mm]", 1000.0)),
         ("feet.csv", &two("t_s,a.x (furlong),a.y (furlong),b.x (furlong),b.y (furlong)", 1.0)),
@@ -57,7 +57,7 @@ fn millimetres_do_not_pass_as_metres() {
 }
 
 #[test]
-fn what_was_guessed_is_said() {
+fn guessed_settings_are_reported() {
     let folder = folder(&[
         ("wide.csv", "t,cf1_x,cf1_y,cf2_x,cf2_y,gyro_x,gyro_y\n0,0,0,2,0,2,0.1\n1,0,1,2,1,2,0.2\n"),
         ("plain.txt", "0 0 0 0 2 0 0\n1 0 1 0 2 1 0\n"),
@@ -75,7 +75,7 @@ fn what_was_guessed_is_said() {
 }
 
 #[test]
-fn files_of_a_vehicle_each_are_judged_as_one_recording() {
+fn files_of_one_vehicle_each_are_one_recording() {
     let (a, b) = ("t,x,y,z\n0,0,0,0\n1,0,1,0\n", "t,x,y,z\n0,2,0,0\n1,2,1,0\n");
     let folder = folder(&[("flight/a.csv", a), ("flight/b.csv", b), ("pair.csv", &two("t,x1,y1,x2,y2", 1.0))]);
     for (delta, exit) in [("1.9", 0), ("2.1", 1)] {
@@ -103,7 +103,7 @@ fn files_of_a_vehicle_each_are_judged_as_one_recording() {
     assert!(events.lines().any(|line| line.starts_with("flight,violation,a,b,")), "{events}");
     let page = audit(folder.path(), &["flight", "pair.csv", "--delta", "1.9", "--html", "a.html"]);
     assert!(page.exit == Some(2) && page.err.contains("--join"), "{}", page.err);
-    // One that cannot be read is an error, and the others are judged all the same.
+    // An unreadable file is an error; the other files are judged.
     let lost = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "1.9"]);
     assert!(lost.exit == Some(2) && lost.err.contains("nowhere.csv"), "{}", lost.err);
     assert!(lost.out.contains("pair.csv:\n") && lost.out.contains("CLEAR"), "{}", lost.out);
@@ -137,5 +137,5 @@ fn a_show_is_judged_by_its_own_smallest_distance() {
     let folder = folder(&[("near.json", &near), ("far.json", &far), ("silent.json", &show(""))]);
     let exits = ["near.json", "far.json", "silent.json"].map(|show| audit(folder.path(), &[show]).exit);
     assert_eq!(exits, [Some(0), Some(1), Some(2)]);
-    assert_eq!(audit(folder.path(), &["far.json", "--delta", "1.5"]).exit, Some(0), "what is asked goes first");
+    assert_eq!(audit(folder.path(), &["far.json", "--delta", "1.5"]).exit, Some(0), "--delta overrides the recording");
 }

@@ -1,4 +1,4 @@
-//! Ellipsoids of a scenario, through the program: flown, reported, and audited from the recording.
+//! Scenarios with ellipsoids: flight, report, and audit of the recording.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::program::{TAUTLINE, ran_by};
 
-/// Two that change sides, the second 0.5 m above the first; what follows is their safety.
+/// Two vehicles that exchange places, the second 0.5 m above the first; the ellipsoid follows below.
 const SCENARIO: &str = r#"[start]
 positions_m = [[-2.0, 0.1, 0.0], [2.0, 0.0, 0.5]]
 [formation]
@@ -27,7 +27,7 @@ fn json(text: &str) -> Value {
 }
 
 #[test]
-fn a_flight_of_ellipsoids_is_reported_in_both_lengths_and_its_recording_judged_by_its_own_shape() {
+fn ellipsoids_are_reported_in_both_metrics_and_their_recording_is_judged_with_them() {
     let folder = tempfile::tempdir().expect("a folder");
     let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), arguments);
     for (name, safety) in [("ellipsoids", ELLIPSOID), ("balls", "delta_m = 0.4\n")] {
@@ -42,7 +42,7 @@ fn a_flight_of_ellipsoids_is_reported_in_both_lengths_and_its_recording_judged_b
     assert!(number(&separation["certified_m"]) < scaled && scaled <= metres);
     assert_eq!(json(&ran(&["check", "ellipsoids.toml", "--json"]).out)["half_axes_m"], json("[0.2, 0.2, 0.6]"));
 
-    // Lengths over half axes, of which 2 touch: 0.4 m of the report are 2.
+    // The audit measures in half axes, where two touch at 2: 0.4 m of the report are 2.
     let audited = ran(&["audit", "out/ellipsoids/run.mcap", "--json"]);
     let judged = json(&audited.out);
     assert_eq!((audited.exit, &judged["measure"]), (Some(0), &json("\"ellipsoids\"")), "{}", audited.err);
@@ -57,7 +57,7 @@ fn a_flight_of_ellipsoids_is_reported_in_both_lengths_and_its_recording_judged_b
 }
 
 #[test]
-fn the_audit_of_a_run_with_ellipsoids_is_repeated_in_lengths_over_their_half_axes() {
+fn the_audit_of_a_run_with_ellipsoids_is_in_half_axes() {
     let folder = tempfile::tempdir().expect("a folder");
     let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), arguments);
     fs::write(folder.path().join("ellipsoids.toml"), format!("{SCENARIO}{ELLIPSOID}")).expect("a file");

@@ -1,4 +1,4 @@
-//! `tautline export`, run as a user runs it.
+//! `tautline export` as a process.
 
 use std::fs;
 use std::path::Path;
@@ -21,14 +21,14 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// Everything that the program said, without the line breaks that depend on the width of the terminal.
+/// Returns the output without the line breaks that depend on the width of the terminal.
 fn said(ran: &Ran) -> String {
     let words = |text: &str| text.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
     words(&ran.out) + " " + &words(&ran.err)
 }
 
 #[test]
-fn a_recording_goes_through_every_format_and_comes_back() {
+fn a_recording_survives_every_format() {
     let folder = folder();
     for (from, to) in [
         ("flight.csv", "1.npz"),
@@ -65,7 +65,7 @@ fn a_file_that_exists_is_overwritten_only_by_force() {
 /// `/dev/full` refuses every write.
 #[cfg(target_os = "linux")]
 #[test]
-fn what_cannot_be_written_is_said_once_and_by_us_alone() {
+fn a_write_error_is_reported_once() {
     let folder = folder();
     for format in ["csv", "parquet", "npz", "mcap"] {
         let failed = ran(folder.path(), &["export", "flight.csv", "-o", "/dev/full", "--format", format, "--force"]);
@@ -96,7 +96,7 @@ fn wrong_input_ends_with_2_and_leaves_no_file() {
         (vec!["missing.csv", "-o", "out.npz"], ["missing.csv", "spelling"]),
         (vec!["flight.csv", "-o", "out"], ["has no extension of a known format", "--format"]),
         (vec!["flight.csv", "-o", "out.npz", "--scale", "-1"], ["--scale", "positive"]),
-        (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["`w` is no column", "radius"]),
+        (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["unknown role `w`", "radius"]),
         (vec!["flight.csv", "-o", "out.npz", "--input-format", "mcap"], ["not an MCAP file", "--format"]),
     ] {
         let refused = ran(folder.path(), &[vec!["export"], arguments.clone()].concat());
@@ -113,7 +113,7 @@ fn wrong_input_ends_with_2_and_leaves_no_file() {
 #[test]
 #[cfg(unix)]
 fn an_export_that_is_interrupted_leaves_no_file() {
-    /// Rows that take some seconds to export.
+    /// Number of rows that take seconds to export.
     const ROWS: u32 = 400_000;
     let folder = folder();
     let rows: Vec<_> = (0..ROWS).map(|k| format!("{k},a,{k}.25,2,3\n")).collect();
@@ -141,19 +141,19 @@ fn an_export_that_is_interrupted_leaves_no_file() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_the_machine() {
+fn an_unwritable_folder_exits_with_3() {
     let folder = folder();
     let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
     assert_eq!(failed.exit, Some(3), "{}", said(&failed));
 }
 
 #[test]
-fn a_table_whose_pages_contradict_each_other_is_said_once_and_without_a_panic() {
+fn a_table_with_contradictory_pages_is_an_error_without_a_panic() {
     let folder = folder();
     let path = folder.path().join("flight.parquet");
     assert_eq!(ran(folder.path(), &["export", "flight.csv", "-o", "flight.parquet"]).exit, Some(0));
     let mut bytes = fs::read(&path).expect("read");
-    // The first page is a dictionary: called an index, it is passed over, and the pages that need it are not.
+    // The first page is a dictionary. Labelled as an index it is skipped, and the pages that need it are invalid.
     assert_eq!(bytes[4..6], [0x15, 0x04]);
     bytes[5] = 0x02;
     fs::write(&path, bytes).expect("written");
@@ -164,7 +164,7 @@ fn a_table_whose_pages_contradict_each_other_is_said_once_and_without_a_panic() 
 }
 
 #[test]
-fn attitudes_are_exported_and_what_is_judged_of_the_file_is_what_was_of_the_run() {
+fn attitudes_are_exported_and_the_file_has_the_verdict_of_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = ["run", "crazyflies", "--set", "time.duration_s=2.5", "--no-snapshots", "--no-figures", "--out", "flown"];
     assert_eq!(ran(folder.path(), &run).exit, Some(1), "it is not in formation yet");

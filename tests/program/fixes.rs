@@ -1,4 +1,4 @@
-//! A receiver without a fix is nowhere.
+//! Positions of a receiver without a fix are gaps.
 
 use std::fs;
 

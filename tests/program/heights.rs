@@ -1,4 +1,4 @@
-//! No verdict is given on heights that a recording does not have.
+//! Audits of recordings without heights.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ fn audit(folder: &Path, words: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, &[&["audit"], words].concat())
 }
 
-/// Two vehicles 5 m apart, without a height, with one, and on the Earth.
+/// Two vehicles 5 m apart: without a height, with one, and on the Earth.
 fn recordings() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, text: String| {
@@ -35,7 +35,7 @@ fn recordings() -> tempfile::TempDir {
 }
 
 #[test]
-fn a_question_about_heights_needs_them() {
+fn limits_of_height_need_heights() {
     let folder = recordings();
     for recording in ["flat.csv", "earth.csv", "mixed"] {
         for question in [
@@ -67,7 +67,7 @@ fn a_question_about_heights_needs_them() {
 }
 
 #[test]
-fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
+fn without_heights_the_plane_is_judged_with_a_note() {
     let folder = recordings();
     let in_plane = "in the plane of x and y: no heights are known";
     for question in [
@@ -83,7 +83,7 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
         let high = audit(folder.path(), &[&["high.csv"], question].concat());
         assert!(!high.out.contains(in_plane), "{high:?}");
     }
-    // 300 m below each other would be no distance: what is not known keeps nothing apart.
+    // The height difference of 300 m is unknown for one vehicle, so it does not separate the two.
     let mixed = audit(folder.path(), &["mixed", "--delta", "1"]);
     assert!(mixed.exit == Some(1) && mixed.out.contains("came to 0.500 m"), "{mixed:?}");
     let json = audit(folder.path(), &["flat.csv", "--delta", "1", "--json"]).out;
@@ -92,7 +92,7 @@ fn what_needs_no_height_is_judged_in_the_plane_and_the_verdict_says_so() {
 }
 
 #[test]
-fn heights_above_a_first_place_that_nobody_named_are_none() {
+fn heights_above_an_unnamed_origin_are_not_judged() {
     let folder = recordings();
     let rows: Vec<_> = (0..10).map(|t| format!("{t},a,47,8,11826\n{t},b,47.001,8,11826\n")).collect();
     let rows = rows.concat();
@@ -113,11 +113,11 @@ fn heights_above_a_first_place_that_nobody_named_are_none() {
     }
     let high = audit(folder.path(), &["adsb.csv", "--origin", "47,8,0", "--limit", "height=120"]);
     assert!(high.exit == Some(1) && high.out.contains("height of a was 11826.000 m"), "{high:?}");
-    // Far from the origin z is no height: level ground is below its level plane.
+    // Far from the origin z is not the height: level ground is below the tangent plane.
     let far = audit(folder.path(), &["adsb.csv", "--origin", "47.1,8,0", "--limit", "height=120"]);
     assert!(far.exit == Some(2) && far.err.contains("km from --origin"), "{far:?}");
     assert_eq!(audit(folder.path(), &["adsb.csv", "--origin", "47.1,8,0", "--delta", "1"]).exit, Some(0));
-    // Differences depend on no origin.
+    // Differences do not depend on the origin.
     let relative = audit(folder.path(), &["adsb.csv", "--delta", "1", "--limit", "climb=2,speed=1"]);
     assert_eq!(relative.exit, Some(0), "{relative:?}");
 }

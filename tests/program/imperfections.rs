@@ -1,4 +1,4 @@
-//! Sensing, network, actuation and failures: what is wrong is refused at its place, and the built-in leader shows what it says.
+//! Sensing, network, actuation and failures: refusals with their place, and the built-in leader.
 
 use serde_json::Value;
 
@@ -13,7 +13,7 @@ fn a_wrong_imperfection_is_refused_with_place_value_and_remedy() {
 }
 
 #[test]
-fn what_is_lost_does_no_harm_where_it_is_carried_along_and_does_where_it_is_held() {
+fn extrapolation_of_lost_messages_is_harmless_and_holding_is_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let fly = |more: &[&str]| {
         let ran =
@@ -25,7 +25,7 @@ fn what_is_lost_does_no_harm_where_it_is_carried_along_and_does_where_it_is_held
     assert_eq!((exit, &report["formation"]["reached"]), (Some(0), &Value::Bool(true)), "{report:#}");
     let network = &report["network"];
     let count = |key: &str| network[key].as_f64().expect(key);
-    // 40 s at 50 Hz on eight links one way, the first message at once.
+    // 40 s at 50 Hz on eight one-way links, the first message at the start.
     assert_eq!(count("sent"), 2001.0 * 8.0);
     assert!((0.08..0.13).contains(&(count("lost") / count("sent"))), "{network}");
     assert!(count("age_p95_s") > 0.03, "{network}");
@@ -34,7 +34,7 @@ fn what_is_lost_does_no_harm_where_it_is_carried_along_and_does_where_it_is_held
     assert_eq!((exit, &report["formation"]["reached"]), (Some(1), &Value::Bool(false)));
 }
 
-/// Three on their slots around a place, in a wind that does not change.
+/// Three vehicles in formation around a point, in a constant wind.
 const LEANING: &str = r#"[start]
 positions_m = [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]
 [formation]
@@ -54,7 +54,7 @@ duration_s = 40.0
 "#;
 
 #[test]
-fn a_swarm_that_leans_into_a_wind_spreads_no_slots_and_is_promised_no_arrival() {
+fn a_constant_wind_spreads_no_slots_and_certifies_no_arrival() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("leaning.toml"), LEANING).expect("a file");
     let ran = ran_by(TAUTLINE, folder.path(), &["run", "leaning.toml", "--json", "--no-snapshots"]);
@@ -67,7 +67,7 @@ fn a_swarm_that_leans_into_a_wind_spreads_no_slots_and_is_promised_no_arrival() 
 }
 
 #[test]
-fn a_vehicle_that_failed_is_named_where_it_matters() {
+fn a_failed_vehicle_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let dead = ["--set", "failure=[{vehicle=3, at_s=1, kind=\"dead\"}]"];
     let quick = ["--set", "time.duration_s=6", "--json", "--no-snapshots"];

@@ -1,5 +1,5 @@
-//! A run that is stopped keeps what it recorded: up to the last flushed chunk when it is killed, all of it and a report
-//! when it is asked to stop.
+//! Interrupted runs: a killed run keeps its recording up to the last flushed chunk. A run that is asked to stop keeps
+//! its whole recording and writes a report.
 #![cfg(unix)]
 
 use std::fs;
@@ -13,22 +13,22 @@ use tautline::mcap::McapRecording;
 use tautline::record::{Event, OwnedSample};
 use tempfile::TempDir;
 
-/// A swarm at rest stays where it is: with a22 > 0 rounding would drive it away in some hundred seconds.
+/// With negative a22 a swarm at rest stays at rest; with a22 > 0 rounding would move it within hundreds of seconds.
 const DRAG: &str = "swarm.a22_per_s=-0.1";
 /// Longer than any test: 240 million steps.
 const FOREVER: &str = "time.duration_s=1e6";
-/// Some tens of chunks.
+/// Size of tens of chunks.
 const GROWN_BYTES: u64 = 1 << 20;
 const PATIENCE: Duration = Duration::from_mins(2);
 
-/// A run that is under way. Killed when dropped, so that a test that fails leaves none behind.
+/// Running process, killed when dropped, so that a failed test leaves none behind.
 struct Underway {
     child: Option<Child>,
     folder: TempDir,
 }
 
 impl Underway {
-    /// Starts a run that will not end by itself and waits until its recording has grown.
+    /// Starts a run that does not end and waits until its recording has grown.
     fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder for the run");
         let child = Command::new(TAUTLINE)
@@ -92,7 +92,7 @@ fn flown(folder: &Path, out: &str, duration_s: u32) -> Ran {
     ran_by(TAUTLINE, folder, &["run", "--quiet", "--out", out, "--set", DRAG, "--set", &duration])
 }
 
-/// The first 10 s of a run that nobody stops.
+/// Returns the first 10 s of an uninterrupted run.
 fn undisturbed(folder: &Path) -> Vec<OwnedSample> {
     flown(folder, "undisturbed", 10);
     let recording = McapRecording::open(&folder.join("undisturbed/run.mcap")).expect("a recording");
@@ -116,7 +116,7 @@ fn a_killed_run_can_be_read_up_to_the_last_chunk() {
     assert!(samples.iter().enumerate().all(|(k, sample)| sample.step == 4 * k as u64), "without a gap");
 }
 
-/// Judges the recording of a run that was interrupted, in every form.
+/// Judges the recording of an interrupted run with every output.
 fn assert_the_audit_agrees(folder: &Path, last_s: f64) {
     let audit = |more: &[&str]| ran_by(TAUTLINE, folder, &[&["audit", "out/run.mcap"], more].concat());
     let judged = audit(&["--junit", "found.xml", "--events", "found.csv", "--summary", "found.md"]);
@@ -131,7 +131,7 @@ fn assert_the_audit_agrees(folder: &Path, last_s: f64) {
     assert!(rows.contains(&format!("ended-early,,,{last_s:?},1000000.0")), "{rows}");
     assert!(fs::read_to_string(folder.join("found.md")).expect("a summary").contains("UNDECIDED"));
     assert_eq!(audit(&["--allow-undecided"]).exit, Some(0));
-    // A window that was flown is judged whole.
+    // A window that was flown completely is judged normally.
     let part = audit(&["--to", "1", "--json"]);
     let report: Value = serde_json::from_str(&part.out).expect("JSON");
     assert_eq!((part.exit, &report["status"], &report["ended_early"]), (Some(0), &Value::from("clear"), &Value::Null));
@@ -143,7 +143,7 @@ fn assert_the_audit_agrees(folder: &Path, last_s: f64) {
 }
 
 #[test]
-fn a_killed_run_is_flown_again_without_force() {
+fn a_killed_run_is_repeated_without_force() {
     let mut underway = Underway::new();
     underway.end_by("KILL");
     let again = flown(underway.folder.path(), "out", 60);
@@ -153,7 +153,7 @@ fn a_killed_run_is_flown_again_without_force() {
 }
 
 #[test]
-fn a_run_that_was_asked_to_stop_is_flown_again_without_force_and_one_that_ended_is_not() {
+fn a_stopped_run_is_repeated_without_force_and_a_finished_one_is_not() {
     let mut underway = Underway::new();
     underway.end_by("INT");
     assert!(underway.report().exists(), "it left a report");
@@ -165,7 +165,7 @@ fn a_run_that_was_asked_to_stop_is_flown_again_without_force_and_one_that_ended_
 }
 
 #[test]
-fn a_run_that_is_asked_to_stop_ends_with_a_report_on_what_it_flew() {
+fn a_stopped_run_writes_a_report_on_its_flight() {
     for signal in ["INT", "TERM"] {
         let mut underway = Underway::new();
         let ended = underway.end_by(signal);

@@ -16,7 +16,7 @@ const KINDS: [&[&str]; 3] = [
     &["only_first", "only_second", "of", "p_value", "first_of_discordant", "difference", "low", "high", "confidence"],
 ];
 
-/// The keys of a section of a page, each with what stands beside it: its unit.
+/// Returns the keys of a section of a page, each with its unit.
 fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'static str> {
     let text = page.split("\n## ").find(|text| text.starts_with(section)).expect("a section");
     let row = |line: &'static str| {
@@ -26,7 +26,7 @@ fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'sta
     text.lines().map(|line| line.replace("| |", "| - |")).map(|line| &*line.leak()).filter_map(row).collect()
 }
 
-/// Every key of a JSON value by its path.
+/// Collects the paths of all keys of a JSON value.
 fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(table) => {
@@ -40,7 +40,7 @@ fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
                 keys(value, &format!("{path}[]"), found);
             }
         }
-        // What its entries would have is told by another command, or it is a list of plain values.
+        // An empty list: another command prints its entries, or they are plain values.
         Value::Array(list) if list.is_empty() => {
             found.insert(format!("{path}[]"));
         }
@@ -50,7 +50,7 @@ fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     }
 }
 
-/// What commands print, all their keys together.
+/// Returns the keys that commands print.
 fn printed(commands: &[&[&str]]) -> BTreeSet<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let mut found = BTreeSet::new();
@@ -65,7 +65,7 @@ fn printed(commands: &[&[&str]]) -> BTreeSet<String> {
     found
 }
 
-/// Keys; a list of plain values is one.
+/// Returns the documented keys without list marks.
 fn plain(documented: &BTreeMap<&str, &str>) -> BTreeSet<String> {
     documented.keys().map(|key| key.trim_end_matches("[]").to_owned()).collect()
 }
@@ -95,7 +95,7 @@ fn every_key_of_the_report_is_on_its_page() {
     let tilting = [&["run", "crazyflies", "--plant", "ideal"], &quick[..], &["--set", "time.duration_s=1.5"]].concat();
     let into_a_pillar = "reference={kind=\"velocity\",velocity_m_s=[3,2.0,0],leader=1}";
     let among = [&["run", "obstacles", "--set", into_a_pillar, "--set", ELLIPSOID], &quick[..]].concat();
-    // Two who are in each other's way, head-on.
+    // Two vehicles head on.
     let swap = [
         "--set",
         "start={positions_m=[[0, 0], [4, 0]]}",
@@ -137,7 +137,7 @@ fn every_key_of_an_attack_is_on_its_page() {
     assert_eq!(plain(&documented(STUDIES, "attack --json")), printed(&[&quick]));
 }
 
-/// The same value with a word for each table that stands in many places.
+/// Replaces each table of `KINDS` by a word.
 fn by_kind(value: Value) -> Value {
     match value {
         Value::Object(table) => {
@@ -154,12 +154,15 @@ fn by_kind(value: Value) -> Value {
 
 #[test]
 fn every_key_of_a_campaign_is_on_its_page() {
-    const PAIR: &str = "formation = { shape = \"points\", points_m = [[0.0, 0.0], [1.3, 0.0]] }\nstart = { positions_m = [[0.0, 0.0], [3.0, \
-                        0.0]] }\nlaw = { kind = \"displacement\", delta_m = 1.0 }\ntime = { duration_s = 12.0, dt_s = 0.02 }\n";
+    const PAIR: &str = "formation = { shape = \"points\", points_m = [[0.0, 0.0], [1.3, 0.0]] }\n\
+                        start = { positions_m = [[0.0, 0.0], [3.0, 0.0]] }\n\
+                        law = { kind = \"displacement\", delta_m = 1.0 }\n\
+                        time = { duration_s = 12.0, dt_s = 0.02 }\n";
     const FLIGHTS: &str = "scenario = \"pair.toml\"\nruns = 8\nlaws = [\"displacement\", \"edge-tension\"]\n[vary]\n\
                            \"start.jitter_m\" = { uniform = [0.0, 0.1] }\n";
-    const RARE: &str = "scenario = \"pair.toml\"\nruns = 2\nmethod = \"splitting\"\n[set]\nlaw = { kind = \"laplacian\" }\nsensing = { \
-                        position_noise_m = 0.3, rate_hz = 10.0 }\n[splitting]\nflights = 10\n";
+    const RARE: &str = "scenario = \"pair.toml\"\nruns = 2\nmethod = \"splitting\"\n[set]\n\
+                        law = { kind = \"laplacian\" }\nsensing = { position_noise_m = 0.3, rate_hz = 10.0 }\n\
+                        [splitting]\nflights = 10\n";
     let folder = tempfile::tempdir().expect("a folder");
     let mut found = BTreeSet::new();
     for (name, text) in [("pair.toml", PAIR), ("flights.toml", FLIGHTS), ("rare.toml", RARE)] {
@@ -169,7 +172,7 @@ fn every_key_of_a_campaign_is_on_its_page() {
         let ran = ran_by(TAUTLINE, folder.path(), &["campaign", "run", name, "--worst", "0", "--json", "--quiet"]);
         keys(&by_kind(serde_json::from_str(&ran.out).expect(&ran.err)), "", &mut found);
     }
-    // Null in one campaign, and a table or a list in the other.
+    // Null in one campaign, a table or a list in the other.
     let named: BTreeSet<_> = found.iter().map(|key| key.trim_end_matches("[]").to_owned()).collect();
     let is_whole = |key: &String| {
         !named.iter().any(|other| other.starts_with(&format!("{key}.")) || other.starts_with(&format!("{key}[]")))

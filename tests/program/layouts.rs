@@ -1,11 +1,11 @@
-//! The layout of arrays is asked for where their shape has several meanings.
+//! Layouts of arrays whose shape is ambiguous.
 
 use std::fs;
 use std::io::Write as _;
 
 use crate::program::{TAUTLINE, ran_by};
 
-/// An array of doubles as `NumPy` writes it.
+/// Returns an array of doubles in the format of `NumPy`.
 fn array(shape: &str, numbers: &[f64]) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -18,7 +18,7 @@ fn array(shape: &str, numbers: &[f64]) -> Vec<u8> {
 #[test]
 fn a_layout_is_named_on_the_command_line_or_in_the_settings() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Two vehicles in space at four times, x, y, z before the vehicles: they meet at the third.
+    // Two vehicles in space at four times, with axes before vehicles; they meet at the third time.
     let at = |time: f64| [time, 4.0 - time, 0.0, 0.0, 9.0, 9.0];
     let positions: Vec<_> = (0..4).flat_map(|time| at(f64::from(time))).collect();
     let file = fs::File::create(folder.path().join("flight.npz")).expect("a file");
@@ -49,7 +49,7 @@ fn a_layout_is_named_on_the_command_line_or_in_the_settings() {
     let needless = audit(&["flight.csv", "--layout", "time,vehicle,axis"]);
     assert!(needless.exit == Some(2) && needless.err.contains("omit --layout"), "{needless:?}");
 
-    // Settings are for all recordings beside them, of any format.
+    // Settings apply to all recordings beside them, of any format.
     fs::write(folder.path().join("tautline.toml"), "[audit]\nlayout = \"time,axis,vehicle\"\n").expect("written");
     assert_eq!((audit(&["flight.npz"]).exit, audit(&["flight.csv"]).exit), (Some(1), Some(0)));
     assert_eq!(audit(&["flight.npz", "--layout", "vehicle,time,axis"]).exit, Some(2));

@@ -1,11 +1,11 @@
-//! Limits on single vehicles and fences, through the program: every answer has them, and wrong ones are refused.
+//! Limits of single vehicles and fences: results in every output, and refusals.
 
 use std::fmt::Write as _;
 use std::fs;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// A vehicle that flies along x with 5 m/s, and rises with 1 m/s from 2 s on; another that stands.
+/// A vehicle that moves along x with 5 m/s and rises with 1 m/s from 2 s on, and a static one.
 fn recording() -> String {
     (0..=40).fold("t,id,x,y,z\n".to_owned(), |mut text, k| {
         let t = f64::from(k) / 10.0;
@@ -55,7 +55,7 @@ fn limits_are_in_every_answer() {
 }
 
 #[test]
-fn nothing_is_said_of_distances_that_were_not_asked_about() {
+fn without_delta_no_separation_is_judged() {
     let (ran, _) = audit(&["--limit", "speed=6"]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
     assert_eq!(
@@ -83,7 +83,7 @@ fn one_file_holds_fence_and_obstacles() {
 }
 
 #[test]
-fn what_is_no_limit_is_refused() {
+fn wrong_limits_are_refused() {
     for (words, code) in [
         (&["--limit", "speed=fast"][..], ""),
         (&["--limit", "sped=5"], ""),
@@ -95,15 +95,15 @@ fn what_is_no_limit_is_refused() {
         (&["--limit", "speed=5", "--events", "flight.csv"], "files/overwrites-input"),
     ] {
         let (ran, _) = audit(words);
-        // Values that the command line itself refuses have no code.
+        // Values that clap refuses have no code.
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{words:?}: {ran:?}");
     }
 }
 
-/// A Skybrush-like way of straight segments: polynomials with a corner each second.
+/// Straight segments as in Skybrush: polynomials with a corner each second.
 fn corners() -> tempfile::TempDir {
-    let head = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,\
-                yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
+    let columns = |axis: &str| (0..8).map(|power| format!("{axis}^{power}")).collect::<Vec<_>>().join(",");
+    let head = format!("duration,{}", ["x", "y", "z", "yaw"].map(columns).join(","));
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("show")).expect("a folder");
     for (name, y) in [("cf1.csv", 0), ("cf2.csv", 9)] {
@@ -118,7 +118,7 @@ fn corners() -> tempfile::TempDir {
 }
 
 #[test]
-fn corners_of_a_show_are_one_sentence_and_a_window_holds_them_against_the_limit() {
+fn corners_of_a_show_are_one_note_and_a_window_judges_them() {
     let folder = corners();
     let audit = |words: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["audit", "show"], words].concat());
     let plain = audit(&["--limit", "accel=4", "--delta", "1"]);

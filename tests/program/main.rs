@@ -1,4 +1,4 @@
-//! The program, run as a user runs it.
+//! Tests of the program as a process.
 
 #[path = "../support/program.rs"]
 mod program;

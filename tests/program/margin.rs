@@ -1,4 +1,4 @@
-//! `tautline margin`: the bracket is that of single flights, and what is wrong is said first.
+//! `tautline margin`: brackets agree with single flights, and wrong input is refused first.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// A search that turns: the pentagon is left alone until it has had time to arrive.
+/// A range with a turn: the pentagon reaches its formation only with enough time.
 const SEARCH: [&str; 8] = ["pentagon", "--key", "time.duration_s", "--from", "30", "--to", "40", "--quiet"];
 
 fn ran(folder: &Path, arguments: &[&str]) -> Ran {
@@ -24,7 +24,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn both_sides_of_the_bracket_are_what_run_says_of_them() {
+fn both_sides_of_the_bracket_agree_with_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let found = margin(folder.path(), &["--scan", "3", "--halvings", "3"]);
     assert_eq!(found["turn"]["holds_below"], Value::Bool(false), "{found}");
@@ -43,7 +43,7 @@ fn both_sides_of_the_bracket_are_what_run_says_of_them() {
 }
 
 #[test]
-fn a_page_and_a_table_are_left_and_the_same_whatever_the_threads() {
+fn page_and_table_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let files = |name: &str, threads: &str| {
         let [csv, html] = ["csv", "html"].map(|kind| format!("{name}.{kind}"));
@@ -63,7 +63,7 @@ fn a_page_and_a_table_are_left_and_the_same_whatever_the_threads() {
 }
 
 #[test]
-fn a_verdict_that_holds_nowhere_is_exit_1_and_everywhere_exit_0() {
+fn a_verdict_that_never_holds_exits_with_1_and_one_that_always_holds_with_0() {
     let folder = tempfile::tempdir().expect("a folder");
     let asked = |from: &str, to: &str| {
         let key = ["margin", "pentagon", "--key", "time.duration_s", "--from", from, "--to", to, "--scan", "2"];
@@ -78,7 +78,7 @@ fn a_verdict_that_holds_nowhere_is_exit_1_and_everywhere_exit_0() {
 }
 
 #[test]
-fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
+fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("there.json"), "").expect("a file");
     let key = |key: &'static str, from: &'static str, to: &'static str| {
@@ -92,7 +92,7 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
         (key("law..alpha", "1", "2"), "scenario/override"),
         (with(&["--json", "there.json"]), "files/exists"),
         (with(&["--json", "-", "--csv", "-"]), "files/one-standard-output"),
-        // Values that the command line itself refuses have no code.
+        // Values that clap refuses have no code.
         (with(&["--log", "--from", "-1"]), ""),
         (with(&["--runs", "0"]), ""),
         (with(&["--scan", "1"]), ""),
@@ -103,7 +103,7 @@ fn what_is_wrong_is_said_with_its_remedy_before_anything_is_flown() {
 }
 
 #[test]
-fn keys_of_whole_numbers_and_the_control_rate_of_quadrotors_are_keys_too() {
+fn integer_keys_and_the_control_rate_of_quadrotors_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["--set", "time.duration_s=1.5", "--scan", "2", "--halvings", "0", "--verdict", "clear"];
     for (scenario, key, from, to) in

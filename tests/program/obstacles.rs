@@ -1,4 +1,4 @@
-//! Obstacles of a scenario, through the program.
+//! Scenarios with obstacles.
 
 use std::fs;
 
@@ -31,7 +31,7 @@ delta_m = 1.0
 duration_s = 25
 "#;
 
-/// A vehicle flies into the tower under a law that knows no obstacles.
+/// A vehicle flies into the tower under a law without obstacle avoidance.
 const HIT: &str = r#"[swarm]
 count = 2
 [start]
@@ -66,7 +66,7 @@ fn json(ran: &Ran) -> Value {
 }
 
 #[test]
-fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
+fn obstacles_are_in_check_run_report_and_audit() {
     let folder = folder(SCENARIO);
     let checked = json(&ran(&folder, &["check", "among.toml", "--json"]));
     let promised_m = checked["certified_room_m"].as_f64().expect("a promise");
@@ -102,7 +102,7 @@ fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
     let none = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "none.toml"]);
     assert!(none.exit == Some(2) && none.err.contains("the file has no [[obstacle]]"), "{}", none.err);
 
-    // What the recording holds is the scenario, obstacles to the last bit.
+    // The recording contains the scenario with exact obstacles.
     let held = ran(&folder, &["list", "--show", "out/among/run.mcap"]).out;
     fs::write(folder.path().join("held.toml"), held).expect("a file");
     let again =
@@ -114,7 +114,7 @@ fn a_flight_among_obstacles_is_checked_flown_reported_and_audited_with_them() {
 }
 
 #[test]
-fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_between_samples() {
+fn a_collision_with_an_obstacle_fails_in_every_output_and_between_samples() {
     let folder = folder(HIT);
     let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
     let report = json(&flown);
@@ -129,7 +129,7 @@ fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_
     assert_eq!(audited.exit, Some(1), "{}", audited.out);
     assert!(audited.out.starts_with("VIOLATION: 1 and tower"), "{}", audited.out);
 
-    // One vehicle and an obstacle are two, also beside a question about single vehicles.
+    // One vehicle and an obstacle have a separation, also with limits of single vehicles.
     for (vehicle, exit, status) in [("1", 1, "violation"), ("2", 0, "clear")] {
         let words = ["audit", "out/among/run.mcap", "--ids", vehicle, "--limit", "speed=50", "--json"];
         let audited = ran(&folder, &words);
@@ -141,7 +141,7 @@ fn a_vehicle_that_is_flown_into_an_obstacle_fails_in_every_word_and_in_an_audit_
 }
 
 #[test]
-fn what_is_wrong_with_an_obstacle_is_said_with_its_place_and_remedy() {
+fn wrong_obstacles_are_refused_with_place_and_remedy() {
     let folder = folder(&SCENARIO.replace("[0.0, 0.3, 0.0]", "[-6.0, 1.2, 0.0]"));
     for command in ["check", "run"] {
         let ran = ran(&folder, &[command, "among.toml"]);
@@ -152,7 +152,7 @@ fn what_is_wrong_with_an_obstacle_is_said_with_its_place_and_remedy() {
 }
 
 #[test]
-fn a_law_that_knows_no_obstacles_certifies_nothing_among_them_and_says_why() {
+fn a_law_without_obstacle_avoidance_has_no_certificate_among_obstacles() {
     let folder =
         folder(&SCENARIO.replace("[reference]\nkind = \"rest\"\n", "").replace("\"displacement\"", "\"edge-tension\""));
     let checked = ran(&folder, &["check", "among.toml"]);

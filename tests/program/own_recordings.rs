@@ -1,4 +1,4 @@
-//! The audit of a recording of `tautline run` repeats the run's own audit, as long as the file is what the run wrote.
+//! Audits of recordings of `tautline run`: they repeat the run's own audit if the file is unchanged.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Every built-in scenario, and for how long it is flown where tests are short \[s\].
+/// Built-in scenarios with the duration of their flights in short tests \[s\].
 const BUILT_IN: [(&str, &str); 12] = [
     ("pentagon", "4"),
     ("circle", "2"),
@@ -49,12 +49,12 @@ fn pentagon() -> TempDir {
 }
 
 #[test]
-fn the_recordings_of_all_built_in_scenarios_have_the_verdicts_of_their_runs() {
+fn recordings_of_built_in_scenarios_have_the_verdicts_of_their_runs() {
     let is_long = std::env::var_os("TAUTLINE_LONG").is_some();
     for (scenario, duration_s) in BUILT_IN {
         let folder = tempfile::tempdir().expect("a folder");
         let short = ["time.duration_s", "arrival.hold_s"].map(|key| format!("{key}={duration_s}"));
-        // A debug build flies all of `thousand` for longer than a test may take.
+        // The whole flight of `thousand` takes too long in a debug build.
         let is_whole = is_long && scenario != "thousand";
         let sets: Vec<&str> = short.iter().filter(|_| !is_whole).map(String::as_str).collect();
         fly(folder.path(), scenario, &sets);
@@ -63,7 +63,7 @@ fn the_recordings_of_all_built_in_scenarios_have_the_verdicts_of_their_runs() {
         let found = json(&judged.out);
         assert_eq!(found["status"], report["audit"]["status"], "{scenario}: {judged:?}");
         for key in ["delta_m", "min_m", "min_pair", "min_at_s"] {
-            // Around ellipsoids the run counts in its delta, and the audit in half axes.
+            // With ellipsoids the run measures in its delta, the audit in half axes.
             if report["separation"]["ellipsoid"].is_null() {
                 assert_eq!(found["separation"][key], report["separation"][key], "{scenario}: {key}");
             }
@@ -76,7 +76,7 @@ fn the_recordings_of_all_built_in_scenarios_have_the_verdicts_of_their_runs() {
 }
 
 #[test]
-fn a_recording_is_clear_as_its_run_judged_and_says_so() {
+fn a_recording_has_the_verdict_of_its_run() {
     let folder = pentagon();
     let judged = audit(folder.path(), &["flown"]);
     assert_eq!(judged.exit, Some(0), "{judged:?}");
@@ -94,7 +94,7 @@ fn a_recording_is_clear_as_its_run_judged_and_says_so() {
 }
 
 #[test]
-fn another_question_is_judged_from_the_samples_and_a_note_says_so() {
+fn other_options_are_judged_from_the_samples_with_a_note() {
     let folder = pentagon();
     for more in [
         &["--from", "1", "--to", "3"][..],
@@ -120,7 +120,7 @@ fn another_question_is_judged_from_the_samples_and_a_note_says_so() {
     }
     let independent = audit(folder.path(), &["flown", "--independent"]);
     assert!(independent.out.starts_with("CLEAR if straight between samples: "), "{independent:?}");
-    // More than the run kept.
+    // A larger delta than the run kept.
     let more = audit(folder.path(), &["flown", "--delta", "2.5"]);
     assert!(more.exit == Some(1) && more.out.starts_with("VIOLATION: 2 and 3 came to 2.460 m"), "{more:?}");
 }
@@ -130,7 +130,7 @@ fn stored(recording: &McapRecording) -> RunAudit {
     *audit
 }
 
-/// Writes the recording of the folder again with changed entries, and closes it with a changed audit.
+/// Writes the recording of the folder again with changed entries and a changed audit.
 fn rewritten(folder: &Path, to: &str, change: impl Fn(&mut Entry), change_audit: impl Fn(&mut RunAudit)) {
     let mut recording = McapRecording::open(&folder.join("flown/run.mcap")).expect("a recording");
     let mut recorder = McapRecorder::create(&folder.join(to), recording.header()).expect("made");
@@ -153,7 +153,7 @@ fn altered(folder: &Path, to: &str, change: impl Fn(&mut Vec<u8>)) {
     fs::write(folder.join(to), bytes).expect("written");
 }
 
-/// Sets the checksums of all chunks to 0, which stands for none.
+/// Sets the checksums of all chunks to 0, which means absent.
 fn remove_checksums(bytes: &mut [u8]) {
     let (mut at, chunk, data_end) = (8, 6, 15);
     while bytes[at] != data_end {
@@ -165,7 +165,7 @@ fn remove_checksums(bytes: &mut [u8]) {
     }
 }
 
-/// Replaces a number wherever it is in the file.
+/// Replaces a number at all its places in the file.
 fn replace(bytes: &mut [u8], value: f64, by: f64) {
     let places: Vec<_> = (0..bytes.len() - 8).filter(|&at| bytes[at..at + 8] == value.to_le_bytes()).collect();
     for at in places {
@@ -174,7 +174,7 @@ fn replace(bytes: &mut [u8], value: f64, by: f64) {
 }
 
 #[test]
-fn a_recording_that_was_changed_or_cut_is_judged_from_its_samples() {
+fn a_changed_or_truncated_recording_is_judged_from_its_samples() {
     let folder = pentagon();
     let said = |arguments: &[&str]| audit(folder.path(), arguments);
     rewritten(folder.path(), "same.mcap", |_| {}, |_| {});
@@ -196,7 +196,7 @@ fn a_recording_that_was_changed_or_cut_is_judged_from_its_samples() {
         );
         assert!(changed.err.contains("was changed after the run"), "{changed:?}");
     }
-    // Closed without an audit, as by a run that failed.
+    // Closed without an audit, as by a failed run.
     let mut recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
     let mut recorder = McapRecorder::create(&folder.path().join("open.mcap"), recording.header()).expect("made");
     for entry in recording.by_ref() {
@@ -208,7 +208,7 @@ fn a_recording_that_was_changed_or_cut_is_judged_from_its_samples() {
     let open = said(&["open.mcap"]);
     assert!(open.out.starts_with("CLEAR if straight between samples: "), "{open:?}");
     assert!(open.err.contains("holds no audit of its run"), "{open:?}");
-    // Cut off.
+    // Truncated.
     altered(folder.path(), "cut.mcap", |bytes| bytes.truncate(bytes.len() - 200));
     assert_eq!(said(&["cut.mcap"]).exit, Some(2));
     let cut = said(&["cut.mcap", "--allow-unfinished"]);
@@ -216,7 +216,7 @@ fn a_recording_that_was_changed_or_cut_is_judged_from_its_samples() {
 }
 
 #[test]
-fn an_audit_that_the_samples_contradict_is_not_used() {
+fn an_audit_that_contradicts_the_samples_is_not_used() {
     let folder = pentagon();
     let with_closest = |to: &str, change: fn(f64) -> f64| {
         rewritten(folder.path(), to, |_| {}, |audit| audit.closest[0].min_m = change(audit.closest[0].min_m));
@@ -240,7 +240,7 @@ fn an_audit_that_the_samples_contradict_is_not_used() {
 }
 
 #[test]
-fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
+fn sparse_samples_are_no_gap_in_a_recording_of_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
     fly(folder.path(), "pentagon", &["time.duration_s=6", "arrival.hold_s=6", "time.record_hz=0.2"]);
     let judged = audit(folder.path(), &["flown"]);
@@ -248,7 +248,7 @@ fn samples_far_apart_leave_no_gap_in_a_recording_of_a_run() {
         judged.exit == Some(0) && judged.out.starts_with("PROVED CLEAR by the run's audit of every step"),
         "{judged:?}"
     );
-    // A `--max-gap` of the user still applies.
+    // The user's `--max-gap` still applies.
     let short = audit(folder.path(), &["flown", "--max-gap", "2"]);
     assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED"), "{short:?}");
 }
@@ -292,7 +292,7 @@ dt_s = 0.02
 ";
 
 #[test]
-fn straight_lines_past_an_obstacle_do_not_overrule_a_run_that_judged_every_step() {
+fn straight_lines_do_not_overrule_the_run_for_obstacles() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("past.toml"), PAST_A_CRATE).expect("written");
     fly(folder.path(), "past.toml", &[]);
@@ -305,7 +305,7 @@ fn straight_lines_past_an_obstacle_do_not_overrule_a_run_that_judged_every_step(
 }
 
 #[test]
-fn a_run_that_ended_early_does_not_answer_for_the_whole_flight() {
+fn a_run_that_ended_early_is_not_clear() {
     let folder = pentagon();
     rewritten(folder.path(), "early.mcap", |_| {}, |audit| audit.ended_early = "interrupted".to_owned());
     let early = audit(folder.path(), &["early.mcap"]);
@@ -313,7 +313,7 @@ fn a_run_that_ended_early_does_not_answer_for_the_whole_flight() {
 }
 
 #[test]
-fn a_run_that_is_undecided_leaves_its_recording_undecided() {
+fn the_recording_of_an_undecided_run_is_undecided() {
     let folder = pentagon();
     rewritten(folder.path(), "open.mcap", |_| {}, |audit| audit.status = "undecided".to_owned());
     let open = audit(folder.path(), &["open.mcap"]);
@@ -321,13 +321,13 @@ fn a_run_that_is_undecided_leaves_its_recording_undecided() {
 }
 
 #[test]
-fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
+fn violations_between_samples_are_in_the_audit_of_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
-    // The classical law, stiff, so that vehicles pass each other between two samples a second apart.
+    // The classical law, stiff, so that vehicles pass each other between two samples 1 s apart.
     let times = ["time.record_hz=1", "time.duration_s=20", "arrival.hold_s=20"];
     fly(folder.path(), "pentagon-laplacian", &[&["law.f1_per_s2=30", "law.f2_per_s=1"], &times[..]].concat());
     let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
-    // The folder of a run is its recording.
+    // The folder of a run stands for its recording.
     let judged = audit(folder.path(), &["flown", "--json"]);
     let whole = json(&judged.out);
     assert_eq!((judged.exit, &whole["recording"]), (Some(1), &"flown/run.mcap".into()));
@@ -335,13 +335,13 @@ fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
         assert_eq!(whole["separation"][key], report["separation"][key]);
     }
     assert_eq!(whole["audit"]["violations"], report["audit"]["violations"]);
-    // A limit of single vehicles does not hide them.
+    // Limits of single vehicles do not hide the violations.
     assert!(audit(folder.path(), &["flown", "--limit", "speed=100"]).out.starts_with("VIOLATION: "));
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flown", "-o", "drawn.csv"]);
     assert!(exported.exit == Some(0) && exported.err.contains("the run's audit of every step is not in drawn.csv"));
     let drawn = ran_by(TAUTLINE, folder.path(), &["audit", "drawn.csv", "--delta", "2"]);
     assert_eq!(drawn.exit, Some(0), "straight lines show the opposite: {drawn:?}");
-    // Another question is not clear either where the run found two closer between the samples.
+    // Other options are not clear either if the run found a smaller separation between the samples.
     let found = &report["audit"]["violations"][0];
     let ids = format!("{},{}", found["pair"][0], found["pair"][1]);
     for more in [&["--from", "0"][..], &["--ids", &ids], &["--delta", "1.99"], &["--motion", "linear"]] {
@@ -362,11 +362,12 @@ fn the_violations_of_a_run_between_its_samples_are_those_of_its_recording() {
 }
 
 #[test]
-fn the_violations_of_an_obstacle_between_samples_are_those_of_the_recording() {
+fn violations_of_obstacles_between_samples_are_in_the_audit_of_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenario = "start.positions_m = [[0, 0], [0, 40]]\nformation = { shape = \"line\", spacing_m = 6.0 }\n\
                     law = { kind = \"laplacian\", delta_m = 1.0 }\ntime = { duration_s = 12.0, record_hz = 1.0 }\n\
-                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\nclearance_m = 1.9\n";
+                    [[obstacle]]\nname = \"ball\"\nball = { radius_m = 1.0 }\nat_m = [-3.9, 26.0, 0.0]\n\
+                    clearance_m = 1.9\n";
     fs::write(folder.path().join("past.toml"), scenario).expect("a file");
     fly(folder.path(), "past.toml", &[]);
     let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
@@ -381,7 +382,7 @@ fn the_violations_of_an_obstacle_between_samples_are_those_of_the_recording() {
 }
 
 #[test]
-fn a_run_whose_scenario_cannot_be_read_is_not_judged() {
+fn a_run_with_an_unreadable_scenario_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let header = Header::new("newer", "name = \"newer\"\n[law]\ndelta_n = 1.0\n", 2, 1.0);
     let mut recorder = McapRecorder::create(&folder.path().join("newer.mcap"), &header).expect("made");

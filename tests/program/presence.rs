@@ -1,11 +1,11 @@
-//! Who was seen from when to when is said in every answer, and can be asked for.
+//! Presence of vehicles: reported in every output, and required by an option.
 
 use std::fmt::Write as _;
 use std::fs;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Vehicles in a row, each seen every second up to a time of its own \[s\].
+/// Vehicles in a row, each with a sample every second up to its own time \[s\].
 fn recording(until_s: &[u32]) -> String {
     let mut text = "t,id,x,y,z\n".to_owned();
     for t in 0..=until_s.iter().copied().max().unwrap_or(0) {
@@ -26,7 +26,7 @@ fn audit(until_s: &[u32], words: &[&str]) -> (Ran, tempfile::TempDir) {
 }
 
 #[test]
-fn the_headline_says_who_was_not_seen_throughout_and_when() {
+fn the_headline_names_absent_vehicles_with_their_times() {
     let (ran, folder) = audit(&[60, 60, 55], &["--delta", "1", "--html", "p.html"]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
     let headline = ran.out.lines().next().expect("a headline");
@@ -40,7 +40,7 @@ fn the_headline_says_who_was_not_seen_throughout_and_when() {
 }
 
 #[test]
-fn presence_that_is_required_and_missing_is_undecided_with_the_names() {
+fn missing_required_presence_is_undecided_with_names() {
     for words in [&["--delta", "1", "--require-presence"][..], &["--config", "strict.toml"]] {
         let (ran, _) = audit(&[60, 60, 55], words);
         assert_eq!(ran.exit, Some(1), "{ran:?}");
@@ -61,7 +61,7 @@ fn presence_that_is_required_and_missing_is_undecided_with_the_names() {
 }
 
 #[test]
-fn the_keys_tell_it_and_thousands_of_vehicles_keep_the_words_short() {
+fn presence_is_in_the_keys_and_the_text_stays_short_for_thousands() {
     let until_s: Vec<u32> = (0..2000).map(|k| if k % 2 == 0 { 4 } else { 3 }).collect();
     let (ran, _) = audit(&until_s, &["--delta", "1", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");

@@ -1,4 +1,4 @@
-//! `tautline audit --proof`, and the checker that shares no code with it.
+//! `tautline audit --proof`, and its independent checker.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -7,16 +7,16 @@ use std::process::{Command, Output};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Recordings that are proved, and with `TAUTLINE_LONG=1`.
+/// Number of recordings; more with `TAUTLINE_LONG=1`.
 const CASES: u64 = 60;
 const LONG_CASES: u64 = 1000;
 
 const PASS: &str = "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n";
 
-/// More than any two of them are apart at their first instant [m]: 46 sqrt(3), and what clocks shift.
+/// Above the separation of any two vehicles at their first instant [m]: 46 sqrt(3), and the shift of clocks.
 const FARTHEST_M: &str = "90";
 
-/// `SplitMix64` (Steele, Lea, Flood 2014): the same recordings everywhere.
+/// `SplitMix64` (Steele, Lea, Flood 2014): the same recordings on every machine.
 struct Random(u64);
 
 impl Random {
@@ -33,7 +33,7 @@ impl Random {
     }
 }
 
-/// Vehicles on random ways, by one clock or by clocks of their own; numbers of all digits or of three decimals.
+/// Vehicles on random paths, with a common clock or their own; numbers with all digits or three decimals.
 fn recording(number: u64) -> String {
     let mut random = Random(number);
     let (vehicles, instants) = (2 + random.below(5), 2 + random.below(30));
@@ -73,7 +73,7 @@ fn smallest_m(folder: &Path, arguments: &[&str]) -> f64 {
 }
 
 #[test]
-fn the_limit_that_is_printed_is_kept_and_the_next_number_is_not() {
+fn the_printed_limit_is_kept_and_the_next_number_is_not() {
     let folder = tempfile::tempdir().expect("a folder");
     for number in 1000..1012 {
         fs::write(folder.path().join("a.csv"), recording(number)).expect("a file");
@@ -86,13 +86,13 @@ fn the_limit_that_is_printed_is_kept_and_the_next_number_is_not() {
 }
 
 #[test]
-fn the_checker_confirms_what_is_proved_and_denies_what_is_altered() {
+fn the_checker_confirms_proofs_and_denies_altered_ones() {
     let folder = tempfile::tempdir().expect("a folder");
     let cases = if std::env::var_os("TAUTLINE_LONG").is_some() { LONG_CASES } else { CASES };
     for number in 0..cases {
         let (data, proof) = (format!("{number}.csv"), format!("{number}.json"));
         fs::write(folder.path().join(&data), recording(number)).expect("a file");
-        // A limit that is met exactly, one that is kept, and one that is not.
+        // A limit that is exactly met, one that is kept, and one that is not.
         let delta = match number % 3 {
             0 => format!("{:?}", smallest_m(folder.path(), &[&data, "--delta", "0.01", "--json"])),
             1 => "0.01".to_owned(),
@@ -108,7 +108,7 @@ fn the_checker_confirms_what_is_proved_and_denies_what_is_altered() {
 }
 
 #[test]
-fn the_checker_says_it_by_its_exit_code() {
+fn the_checker_has_exit_codes() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
     fs::write(at("pass.csv"), PASS).expect("a file");
@@ -133,7 +133,7 @@ fn the_checker_says_it_by_its_exit_code() {
 }
 
 #[test]
-fn what_cannot_be_proved_is_refused_with_a_remedy() {
+fn recordings_without_a_proof_are_refused_with_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("pass.csv"), PASS).expect("a file");
     fs::write(folder.path().join("wide.csv"), "t,x1,y1,z1,x2,y2,z2\n0,0,0,0,5,0,0\n1,0,0,0,5,0,0\n").expect("a file");

@@ -1,4 +1,4 @@
-//! Options that say how a recording is read, through the program: a verdict rests on no guess.
+//! Options for reading a recording: no verdict depends on a guess.
 
 use std::fs;
 
@@ -14,20 +14,20 @@ fn audit(files: &[(&str, &str)], words: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder.path(), &[&["audit"], words].concat())
 }
 
-/// Exit code, and what was said in one line.
+/// Returns the exit code, and standard error in one line.
 fn said(ran: &Ran) -> (Option<i32>, String) {
     let said = format!("{} {}", ran.out, ran.err);
     (ran.exit, said.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", ""))
 }
 
-/// Two vehicles that move this far in each of some steps of time.
+/// Two vehicles that move by `step` in each interval of time.
 fn moving(step: f64, times: [&str; 3]) -> String {
     let row = |(k, t): (usize, &&str)| format!("{t},a,{},0,1\n{t},b,{},5,1\n", k as f64 * step, k as f64 * step);
     format!("t,id,x,y,z\n{}", times.iter().enumerate().map(row).collect::<String>())
 }
 
 #[test]
-fn a_speed_is_not_judged_by_a_guessed_unit_of_time() {
+fn a_speed_needs_a_known_unit_of_time() {
     for times in [["0", "1", "2"], ["0.0", "10.0", "20.0"], ["0", "10", "20"]] {
         let slow = moving(0.01, times);
         for words in [&["--limit", "speed=1"][..], &["--from", "1"], &["--max-gap", "3"]] {
@@ -35,14 +35,14 @@ fn a_speed_is_not_judged_by_a_guessed_unit_of_time() {
             let (exit, text) = said(&ran);
             assert!(exit == Some(2) && text.contains("--time-unit s"), "{times:?} {words:?}: {text}");
         }
-        // A distance does not depend on it.
+        // A separation does not depend on the unit of time.
         assert_eq!(audit(&[("f.csv", &slow)], &["f.csv", "--delta", "1"]).exit, Some(0), "{times:?}");
         let speeds = ["f.csv", "--limit", "speed=1", "--time-unit"];
         assert_eq!(audit(&[("f.csv", &slow)], &[&speeds[..], &["s"]].concat()).exit, Some(0), "{times:?}");
         let ms = audit(&[("f.csv", &slow)], &[&speeds[..], &["ms"]].concat()).exit;
         assert_eq!(ms, Some(i32::from(times[1] == "1")), "{times:?}: 10 m/s in steps of 1 ms, 1 m/s in steps of 10");
     }
-    // Vehicles that would fly faster than sound say that these are seconds; so do decimals and a name.
+    // Supersonic vehicles, decimals and the name of the column show that the unit is seconds.
     for (text, exit) in [
         (moving(1.0, ["0", "1", "2"]), 0),
         (moving(0.01, ["0", "0.5", "1"]), 0),
@@ -53,11 +53,11 @@ fn a_speed_is_not_judged_by_a_guessed_unit_of_time() {
     }
 }
 
-/// A vehicle that rises by 2 m, with z down, and one that stands.
+/// A vehicle that rises by 2 m, with z down, and a static one.
 const NED: &str = "t_s,id,x,y,z\n0,a,0,0,0\n0,b,5,0,0\n1,a,0,0,-2\n1,b,5,0,0\n";
 
 #[test]
-fn heights_are_along_the_axis_that_is_up() {
+fn heights_are_along_the_upward_axis() {
     let height = ["f.csv", "--limit", "height=1"];
     for (words, exit) in [
         (&[][..], 0),
@@ -91,7 +91,7 @@ fn heights_are_along_the_axis_that_is_up() {
 }
 
 #[test]
-fn rows_out_of_order_and_twice_are_read_as_the_user_says() {
+fn unordered_and_duplicate_rows_are_read_by_options() {
     let text = "t_s,id,x,y,z\n0,a,0,0,0\n2,a,2,0,0\n1,a,1,0,0\n1,a,1,0.5,0\n0,b,0,9,0\n1,b,0,9,0\n2,b,0,9,0\n";
     for (words, exit, expected) in [
         (&[][..], 2, "recording/time-backwards"),
@@ -106,7 +106,7 @@ fn rows_out_of_order_and_twice_are_read_as_the_user_says() {
 }
 
 #[test]
-fn one_vehicle_alone_is_judged_by_its_limits() {
+fn a_single_vehicle_is_judged_by_its_limits() {
     let text = "t_s,x,y,z,mode\n0,0,0,0,4\n1,1,0,0,4\n2,2,0,1,4\n";
     for (words, exit, expected) in [
         (&["--limit", "speed=2"][..], 2, "--one-vehicle"),
@@ -120,7 +120,7 @@ fn one_vehicle_alone_is_judged_by_its_limits() {
 }
 
 #[test]
-fn what_clocks_have_in_common_is_part_of_the_verdict() {
+fn the_common_window_of_clocks_is_in_the_verdict() {
     let px4 = |lat: &str| {
         let rows = ["1000000", "1020000"].map(|t| format!("{t},0,0,-10,{lat},8,400\n")).concat();
         format!("timestamp,x,y,z,ref_lat,ref_lon,ref_alt\n{rows}")

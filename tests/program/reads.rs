@@ -1,4 +1,4 @@
-//! What the program makes of recordings that are not plain files, of odd names, and of errors inside a recording.
+//! Recordings that are not plain files, unusual names, and errors inside a recording.
 
 use std::fs;
 
@@ -14,7 +14,7 @@ fn audit(text: &str, arguments: &[&str]) -> Ran {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_pipe_is_refused_because_its_beginning_would_be_lost() {
+fn a_pipe_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let lines: Vec<_> = (0..20_000).map(|k| format!("{k} 0 0 0 {} 0 0\n", if k == 9 { 0.5 } else { 5.0 })).collect();
     let text = lines.concat();
@@ -37,7 +37,7 @@ fn a_pipe_is_refused_because_its_beginning_would_be_lost() {
 const NAMES: &str = "t,id,x,y,z\n0,\"a,b\",0,0,0\n0,c,2,0,0\n0,d,2.5,0,0\n";
 
 #[test]
-fn a_name_with_a_comma_is_named_in_quotes() {
+fn a_name_with_a_comma_is_quoted() {
     for (arguments, exit) in [
         (&[][..], 1),
         (&["--ids", "\"a,b\",c"], 0),
@@ -53,7 +53,7 @@ fn a_name_with_a_comma_is_named_in_quotes() {
 }
 
 #[test]
-fn a_name_does_not_steer_the_terminal() {
+fn control_characters_in_names_are_escaped() {
     let names = NAMES.replace(",c,", ",\u{1b}[31mc,");
     for arguments in [&[][..], &["--ids", "nobody"]] {
         let ran = audit(&names, arguments);
@@ -64,19 +64,19 @@ fn a_name_does_not_steer_the_terminal() {
 }
 
 #[test]
-fn what_is_wrong_inside_a_recording_is_said_with_its_file() {
+fn errors_inside_a_recording_name_its_file() {
     let ran = audit("t,id,x,y,z,radius\n0,a,0,0,0,0.1\n1,a,0,0,0,0.2\n", &[]);
     assert_eq!(ran.exit, Some(2), "{ran:?}");
     assert!(ran.err.contains("flight.csv: vehicle a at 1.0 s"), "{}", ran.err);
 }
 
-/// A bag of `crates/recordings/tests/recordings`: two robots 2 m apart, whose odometry drifts.
+/// Returns a bag of `crates/recordings/tests/recordings`: two robots 2 m apart, with drifting odometry.
 fn bag(name: &str) -> String {
     format!("{}/crates/recordings/tests/recordings/bags/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 #[test]
-fn nothing_is_proved_of_positions_that_interpolated_transforms_brought() {
+fn positions_by_interpolated_transforms_are_not_proved() {
     let folder = tempfile::tempdir().expect("a folder");
     let ran = |name: &str, arguments: &[&str]| {
         let bag = bag(name);
@@ -102,7 +102,7 @@ fn nothing_is_proved_of_positions_that_interpolated_transforms_brought() {
 }
 
 #[test]
-fn bags_and_places_on_the_earth_are_exported_as_they_are_judged() {
+fn exports_of_bags_and_geographic_positions_have_the_same_verdict() {
     let folder = tempfile::tempdir().expect("a folder");
     let gps = "t,id,lat,lon,alt\n0,a,47,8,400\n0,b,47.0001,8,400\n1,a,47,8,401\n1,b,47.0001,8,401\n";
     fs::write(folder.path().join("gps.csv"), gps).expect("written");

@@ -1,4 +1,4 @@
-//! References through the program: from a file, and under laws that follow one or do not.
+//! References from a file, and under laws with and without support for references.
 
 use std::fs;
 use std::path::Path;
@@ -26,7 +26,7 @@ const PLACES: &str = "t,x,y\n0,0,0\n1,0.5,0\n2,1.5,0.25\n3,2,1\n";
 const SPLINE: &str = "kind = \"spline\"\ntimes_s = [0, 1, 2, 3]\npoints_m = [[0, 0], [0.5, 0], [1.5, 0.25], [2, 1]]\n";
 const FILE: &str = "kind = \"file\"\nfile = \"path.csv\"\n";
 
-/// A folder with a scenario below it, and its reference beside that.
+/// Returns a folder with a scenario in a folder below it, and the file of its reference beside that folder.
 fn folder(reference: &str, places: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let below = folder.path().join("below");
@@ -47,7 +47,7 @@ fn flown(folder: &Path, scenario: &str) -> (Value, Value) {
 }
 
 #[test]
-fn a_reference_in_a_file_is_the_curve_through_the_same_points_and_the_recording_needs_no_file() {
+fn a_reference_in_a_file_equals_inline_points_and_is_in_the_recording() {
     let inline = flown(folder(SPLINE, "").path(), "below/carried.toml");
     for same in [
         PLACES,
@@ -67,7 +67,7 @@ fn a_reference_in_a_file_is_the_curve_through_the_same_points_and_the_recording_
 }
 
 #[test]
-fn a_file_that_is_no_reference_is_refused_with_place_and_remedy() {
+fn a_wrong_reference_file_is_refused_with_place_and_remedy() {
     for (reference, places, said) in [
         (FILE, "t,x,y\n0,0,0\n1,one,0\n3,1,1\n", "below/path.csv:3: `one` is not a number"),
         ("kind = \"file\"\nfile = \"none.csv\"\n", PLACES, "cannot read below/none.csv"),
@@ -83,7 +83,7 @@ fn a_file_that_is_no_reference_is_refused_with_place_and_remedy() {
 }
 
 #[test]
-fn a_law_that_does_not_follow_is_refused_with_place_and_remedy() {
+fn a_law_without_references_is_refused_with_place_and_remedy() {
     let there = folder("kind = \"rest\"\n", "");
     for command in ["check", "run"] {
         let ran = ran(there.path(), &[command, "below/carried.toml", "--set", "law.kind=laplacian"]);
@@ -93,7 +93,7 @@ fn a_law_that_does_not_follow_is_refused_with_place_and_remedy() {
 }
 
 #[test]
-fn vehicles_are_assigned_anew_where_they_are_stalled_under_a_law_that_tells() {
+fn stalled_vehicles_are_reassigned_under_a_law_that_detects_stalls() {
     for sets in [
         ["law.kind=orca", "deadlock.mode=auto"],
         ["law.kind=displacement", "deadlock.mode=off"],

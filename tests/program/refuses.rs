@@ -1,5 +1,5 @@
-//! Wrong input ends with exit code 2, a message that names the place and the remedy, and nothing written. A machine that
-//! fails ends with exit code 3 and the name of the file. Nothing ends in a panic.
+//! Refusals: wrong input exits with 2, place and remedy, and writes nothing. A failure of the machine exits with 3 and
+//! the name of the file. No failure is a panic.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -10,7 +10,7 @@ use tempfile::TempDir;
 const BAD: Option<i32> = Some(1);
 const WRONG_INPUT: Option<i32> = Some(2);
 
-/// A minimal flight that is right: what the wrong ones below are changed from.
+/// A minimal valid flight, from which the wrong ones below are derived.
 const RIGHT: &str = r#"name = "pair"
 [start]
 positions_m = [
@@ -43,7 +43,7 @@ fn refused(folder: &Path, scenario: &str, more: &[&str]) -> (String, String) {
     assert!(!err.contains("panicked") && !err.contains("RUST_BACKTRACE"), "{err}");
     assert!(err.contains("help:"), "a remedy is named: {err}");
     assert_eq!(names(), before, "nothing is written");
-    // Long lines are broken for the terminal.
+    // The terminal breaks long lines.
     (code, err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" "))
 }
 
@@ -73,7 +73,7 @@ fn a_scenario_that_cannot_be_flown_is_refused_at_its_place() {
 }
 
 #[test]
-fn what_is_no_scenario_file_is_refused_by_name() {
+fn a_file_that_is_no_scenario_is_refused_by_name() {
     let folder = folder();
     fs::create_dir(folder.path().join("folder.toml")).expect("a folder");
     fs::write(folder.path().join("empty.toml"), b"").expect("a file");
@@ -103,7 +103,7 @@ fn a_wrong_override_is_refused_at_its_place() {
 }
 
 #[test]
-fn what_a_file_holds_does_not_steer_the_terminal() {
+fn control_characters_of_a_file_are_escaped() {
     let folder = folder();
     fs::write(folder.path().join("wrong.toml"), RIGHT.replacen("\"pair\"", "\"\\u001b[2J\u{1b}[2J\"", 1))
         .expect("a file");
@@ -152,7 +152,7 @@ mod machine {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn a_full_disk_is_named_with_the_file_that_did_not_fit() {
+    fn a_full_disk_is_reported_with_the_file() {
         let folder = folder();
         fs::create_dir(folder.path().join("full")).expect("a folder");
         std::os::unix::fs::symlink("/dev/full", folder.path().join("full/run.mcap")).expect("a link");
@@ -166,9 +166,9 @@ mod machine {
     }
 
     #[test]
-    fn what_was_written_before_the_disk_was_full_can_be_read() {
+    fn a_recording_up_to_a_full_disk_can_be_read() {
         let folder = folder();
-        // Blocks of 512 bytes: 1 MiB, a tenth of the recording. The limit is told as an error instead of a signal.
+        // Blocks of 512 bytes: 1 MiB, a tenth of the recording. The limit is reported as an error instead of a signal.
         let script = format!("trap '' XFSZ; ulimit -f 2048; exec '{TAUTLINE}' run --out out");
         let failed = ran_by("sh", folder.path(), &["-c", &script]);
         assert_failed(failed, "cannot write out/run.mcap:");
@@ -181,9 +181,9 @@ mod machine {
     }
 
     #[test]
-    fn a_motion_that_leaves_the_range_of_numbers_is_judged_and_keeps_its_recording() {
+    fn an_overflowing_motion_is_judged_and_recorded() {
         let folder = folder();
-        // A common velocity that grows a hundredfold every 2.3 s: no law can hold it.
+        // A common velocity that grows a hundredfold every 2.3 s, which no law can stop.
         let start = "positions_m = [[0.0, 0.0], [4.0, 0.0]]\nvelocities_m_s = [[1.0, 0.0], [1.0, 0.0]]\n";
         let scenario = RIGHT
             .replacen("positions_m = [\n    [0.0, 0.0],\n    [4.0, 0.0],\n]\n", start, 1)

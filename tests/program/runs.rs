@@ -1,4 +1,4 @@
-//! The program does what its help says: commands, options, texts, JSON and exit codes.
+//! Commands, options, texts, JSON and exit codes of the program.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ const GOOD: Option<i32> = Some(0);
 const BAD: Option<i32> = Some(1);
 const WRONG_INPUT: Option<i32> = Some(2);
 
-/// A flight that ends soon, and therefore without a formation.
+/// A flight too short to reach its formation.
 const SHORT: [&str; 2] = ["--set", "time.duration_s=1"];
 
 fn folder() -> TempDir {
@@ -26,7 +26,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, arguments)
 }
 
-/// `run` with these arguments, into `out` below the folder.
+/// Calls `run` with these arguments, into `out` below the folder.
 fn run(folder: &Path, arguments: &[&str]) -> Ran {
     ran(folder, &[&["run", "--out", "out"], arguments].concat())
 }
@@ -35,7 +35,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
-/// Paths of all keys, lists taken as values.
+/// Collects the paths of all keys; lists are values.
 fn key_paths(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(object) => {
@@ -60,7 +60,7 @@ fn the_pentagon_as_json_is_the_reference_flight() {
         let found = number(pointer);
         assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
     };
-    // The reference values, and how far a step of 1/240 s may be from them, are those of crates/sim/tests/flights/reference_flights.rs.
+    // Reference values, with the error of a step of 1/240 s, from crates/sim/tests/flights/reference_flights.rs.
     near("/separation/min_m", 2.460_353, 1e-4);
     near("/separation/min_at_s", 2.151, 0.02);
     near("/separation/certified_m", 2.055_307, 1e-5);
@@ -95,7 +95,8 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "energy.initial energy.final energy.max_over_initial energy.max_over_leg_start energy.rose",
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",
-        "run.duration_s run.dt_s run.steps run.refined_steps run.overlong_steps run.ended_early run.vehicles run.state_hash",
+        "run.duration_s run.dt_s run.steps run.refined_steps run.overlong_steps",
+        "run.ended_early run.vehicles run.state_hash",
         "performance.wall_s performance.real_time_factor performance.law_s performance.energy_s",
         "performance.physics_s performance.airframe_s performance.audit_s performance.record_s",
     ];
@@ -113,7 +114,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
 }
 
 #[test]
-fn a_person_reads_the_verdict_first_and_where_the_files_are_last() {
+fn the_verdict_comes_first_and_the_paths_of_files_last() {
     let folder = folder();
     let Ran { exit, out, err } = run(folder.path(), &[]);
     assert_eq!(exit, GOOD);
@@ -135,7 +136,7 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
-fn with_json_talk_goes_to_standard_error_and_with_quiet_nowhere() {
+fn with_json_text_goes_to_standard_error_unless_quiet() {
     let folder = folder();
     let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());
     assert!(talking.err.lines().any(|line| line.starts_with("NOT REACHED: ")), "{}", talking.err);
@@ -148,7 +149,7 @@ fn with_json_talk_goes_to_standard_error_and_with_quiet_nowhere() {
 }
 
 #[test]
-fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
+fn the_baseline_violates_and_the_line_reaches_no_formation() {
     let folder = folder();
     let laplacian = run(folder.path(), &["pentagon-laplacian"]);
     assert_eq!(laplacian.exit, BAD);
@@ -164,7 +165,7 @@ fn the_baseline_ends_in_a_violation_and_the_line_in_no_formation() {
 }
 
 #[test]
-fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
+fn colliding_hulls_end_the_judged_flight_and_points_pass_through() {
     let folder = folder();
     let weak =
         ["pentagon-laplacian", "--set", "law.f1_per_s2=30", "--set", "law.f2_per_s=1", "--no-snapshots", "--json"];
@@ -203,7 +204,7 @@ fn hulls_that_hit_end_what_was_to_be_judged_and_points_pass_through() {
     assert!(points.err.contains("passed through each other: vehicles "), "{}", points.err);
     assert!(report["verdict"]["reasons"].to_string().contains("Solid hulls would move otherwise"));
 
-    // Nothing of the kind is said of a flight without.
+    // A flight without a collision has no such note.
     let clear = run(folder.path(), &["--json", "--force", "--no-snapshots"]);
     assert_eq!(json(&clear.out)["hulls"]["bounces"], json("[]"));
     assert!(!clear.err.contains("hulls"), "{}", clear.err);
@@ -229,7 +230,7 @@ fn without_arguments_the_pentagon_is_flown_into_out() {
 }
 
 #[test]
-fn a_finished_run_is_kept_unless_it_is_forced_away() {
+fn a_finished_run_is_overwritten_only_by_force() {
     let folder = folder();
     assert_eq!(run(folder.path(), &SHORT).exit, BAD);
     let files = || ["report.json", "run.mcap"].map(|name| fs::read(folder.path().join("out").join(name)).expect(name));
@@ -323,7 +324,7 @@ fn every_shell_gets_a_completion_script() {
 }
 
 #[test]
-fn help_and_version_are_good_and_go_to_standard_output() {
+fn help_and_version_exit_with_0_on_standard_output() {
     let folder = folder();
     let commands: [&[&str]; 4] = [&["--help"], &["run", "--help"], &["help", "list"], &["--version"]];
     for arguments in commands {
@@ -354,7 +355,7 @@ fn any_number_of_threads_is_taken() {
 }
 
 #[test]
-fn a_reader_that_went_away_is_no_error_and_no_panic() {
+fn a_closed_pipe_is_no_error() {
     let folder = folder();
     let run = ["run", "--out", "out", "--json", "--quiet", "--set", "time.duration_s=45"];
     let commands: [&[&str]; 5] = [&run, &["list"], &["schema"], &["completions", "zsh"], &["--help"]];

@@ -1,4 +1,4 @@
-//! Where a scenario may come from, and what is refused before it is flown.
+//! Sources of scenarios, and refusals before the flight.
 
 use std::fs;
 use std::path::Path;
@@ -30,7 +30,7 @@ fn json(text: &str) -> Value {
 const RUN: [&str; 4] = ["run", "--no-figures", "--no-snapshots", "--json"];
 
 #[test]
-fn a_scenario_comes_from_a_file_that_names_it_or_from_standard_input() {
+fn a_scenario_is_read_from_a_file_or_standard_input() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("two by two.toml"), SHORT).expect("a file");
     let of_file = ran(folder.path(), &[&RUN[..], &["two by two.toml"]].concat());
@@ -54,7 +54,7 @@ fn a_scenario_comes_from_a_file_that_names_it_or_from_standard_input() {
 }
 
 #[test]
-fn the_scenario_of_a_recording_can_be_had_back() {
+fn the_scenario_of_a_recording_can_be_printed() {
     let folder = tempfile::tempdir().expect("a folder");
     let flown = ran(folder.path(), &[&RUN[..], &["circle", "--set", "time.duration_s=1", "--out", "first"]].concat());
     let shown = ran(folder.path(), &["list", "--show", "first/run.mcap"]);
@@ -73,9 +73,9 @@ fn the_scenario_of_a_recording_can_be_had_back() {
 }
 
 #[test]
-fn what_check_refuses_is_said_first_and_in_the_headline_and_never_passes() {
+fn refusals_of_check_are_in_the_headline_and_never_pass() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Two vehicles on a line that reach a line at once: nothing is refused but what drives the swarm.
+    // Two vehicles on a line that reach a line at once: only the instability is refused.
     let unstable =
         "[graph]\nkind = \"path\"\n[arrival]\nedge_error_m = 100.0\ndisagreement_m_s = 100.0\nhold_s = 0.1\n[time]";
     let text = SHORT.replace("[time]", unstable);
@@ -100,7 +100,7 @@ fn what_check_refuses_is_said_first_and_in_the_headline_and_never_passes() {
 }
 
 #[test]
-fn a_formation_that_is_not_reached_names_the_number_that_fails_and_whether_time_would_help() {
+fn an_unreached_formation_has_a_reason_and_advice_on_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let fly = |sets: &[&str]| {
         let sets = sets.iter().flat_map(|set| ["--set", set]);
@@ -124,7 +124,7 @@ fn a_formation_that_is_not_reached_names_the_number_that_fails_and_whether_time_
 }
 
 #[test]
-fn positions_that_numbers_no_longer_tell_apart_end_a_flight() {
+fn positions_beyond_their_resolution_end_a_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     let fly = |duration: &str| {
         let sets = ["--set", "swarm.a22_per_s=0.5", "--set", duration];
@@ -134,7 +134,7 @@ fn positions_that_numbers_no_longer_tell_apart_end_a_flight() {
     let reason = lost["run"]["ended_early"].as_str().expect("ended early");
     assert!(reason.contains("rounding may have moved vehicles by 1.0e-2 m, and 0.01 m has to be resolved"), "{reason}");
     let end_s = lost["run"]["duration_s"].as_f64().expect("a time");
-    // Rounding of 2e-16 m/s grows to some 3e10 m/s in 120 s, of which every step rounds 1e-6 m/s.
+    // Rounding of 2e-16 m/s grows to about 3e10 m/s in 120 s; at this speed every step rounds by 1e-6 m/s.
     assert!((100.0..140.0).contains(&end_s), "{end_s}");
     assert_eq!(lost["verdict"]["refused"], json("[\"drift-unresolved\"]"));
     let told = json(&fly("time.duration_s=25").out);

@@ -1,4 +1,4 @@
-//! Formations that have a shape of their own, through the program.
+//! Shapes of formations.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::program::{Ran, TAUTLINE, ran_by};
 use serde_json::Value;
 
-/// Fourteen vehicles on a grid that fly to slots in the directions given.
+/// Fourteen vehicles on a grid, with slots along given directions.
 const FRAME: &str = r#"[swarm]
 count = 14
 [start]
@@ -23,7 +23,7 @@ assignment = "optimal"
 
 const LOGO: &str = "<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'><path d='M 0 0 H 9 L 4 7 Z'/></svg>";
 
-/// A folder with a scenario below it, and beside that what it names.
+/// Returns a folder with a scenario in a folder below it, and its files beside that folder.
 fn folder(formation: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let below = folder.path().join("below");
@@ -36,7 +36,7 @@ fn folder(formation: &str) -> tempfile::TempDir {
     folder
 }
 
-/// A dark bar on white.
+/// Returns a picture with a dark bar on white.
 fn mask() -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 40, 8);
@@ -96,7 +96,7 @@ fn letters_named_on_the_command_line_are_flown() {
 }
 
 #[test]
-fn what_cannot_be_a_formation_is_refused_with_place_and_remedy() {
+fn wrong_formations_are_refused_with_place_and_remedy() {
     let at = |key: usize| format!("show.toml:{}:", 12 + key);
     for (formation, code, place) in [
         ("shape = \"text\"\ntext = \"HI\"\nheight_m = 3", "scenario/within-delta", at(3)),

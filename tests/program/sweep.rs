@@ -1,4 +1,4 @@
-//! `tautline sweep`: its flights are those of `run`, and wrong input is refused before anything is flown.
+//! `tautline sweep`: flights agree with `run`, and wrong input is refused before the first flight.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn each_point_has_the_bits_of_the_same_flight_by_run() {
+fn each_point_has_the_bits_of_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let grid = ["--key", "law.alpha=0.5,2", "--key", "start.jitter_m=0.1", "--runs", "2", "--json", "-"];
     let Ran { exit, out, err } = ran(folder.path(), &[&grid[..], &["--verdict", "clear"]].concat());
@@ -38,7 +38,7 @@ fn each_point_has_the_bits_of_the_same_flight_by_run() {
 }
 
 #[test]
-fn files_are_the_same_whatever_the_threads() {
+fn files_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a folder");
     let files = |name: &str, threads: &str| {
         let files = ["csv", "html", "latex"].map(|kind| format!("{name}.{kind}"));
@@ -76,7 +76,7 @@ fn wrong_input_is_refused_with_its_remedy() {
         (&["--key", "law..alpha=1,2"], "scenario/override"),
         (&["--key", "law.delta_m=9,10"], "scenario/within-delta"),
         (&["--key", "start.seed=1,2", "--runs", "3"], "request/equal-runs"),
-        // Values that the command line itself refuses have no code.
+        // Values that clap refuses have no code.
         (&[], ""),
         (&["--key", "law.alpha=1", "--runs", "0"], ""),
     ] {

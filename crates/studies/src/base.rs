@@ -96,7 +96,7 @@ impl Runs {
         Self { count, seed, jitter_m: moves.then(|| JITTER * base.own().delta_m) }
     }
 
-    /// Refuses several flights of each value of `keys` that are equal: those of which a key is the seed of all randomness.
+    /// Refuses several equal flights of one value: a key of `keys` sets the seed of all randomness.
     ///
     /// # Errors
     /// [`Failure`] with the remedy.

@@ -95,8 +95,8 @@ impl<'a> Batch<'a> {
         made.into_iter().map(|(_, made)| made).collect()
     }
 
-    /// Calls `make` for each member of `count` groups of `size`, group after group, as [`Batch::run`] does. A group is `None` if a
-    /// result is missing.
+    /// Calls `make` for each member of `count` groups of `size`, group after group, as [`Batch::run`] does. A group is
+    /// `None` if a result is missing.
     ///
     /// # Errors
     /// As [`Batch::run`].

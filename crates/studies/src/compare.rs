@@ -200,9 +200,9 @@ impl Experiment for Options {
     fn illustrate(&self, base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Vec<Section> {
         let block = match worst_moments(base, study, pictures) {
             Ok(pictures) => page::pictures(&pictures),
-            Err(failure) => page::list(&[format!("no pictures were taken: {}", failure.in_words())]),
+            Err(failure) => page::list(&[format!("no pictures: {}", failure.in_words())]),
         };
-        vec![Section::new("The worst moment of each law", [Block::Page(block)])]
+        vec![Section::new("Smallest separation of each law", [Block::Page(block)])]
     }
 }
 
@@ -211,14 +211,14 @@ impl Options {
     fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
         let names = self.laws.clone().unwrap_or_else(|| template.compared());
         if names.is_empty() {
-            let help = "name one with --laws, such as edge-tension";
-            return Err(Failure::input("compare/no-law", "no law is named", help));
+            let help = "give the kind of a law, such as edge-tension";
+            return Err(Failure::input("compare/no-law", "--laws: must name at least one law", help));
         }
         if let Some((_, twice)) = names.iter().enumerate().find(|&(k, name)| names[..k].contains(name)) {
             return Err(Failure::input(
                 "compare/law-twice",
-                format!("the law `{twice}` is named twice"),
-                "name each law once; two settings of one law need two tables [laws.NAME] with the same `kind`",
+                format!("--laws: `{twice}` is named twice"),
+                "name each law once; variants of a law are tables [laws.NAME] with the same `kind`",
             ));
         }
         Ok(names.iter().map(|name| template.law(name)).collect::<Result<_, _>>()?)
@@ -304,23 +304,22 @@ impl LawRow {
             codes.sort_unstable();
             codes.dedup();
             let (codes, refused) = (codes.join(", "), self.refused);
-            format!("{name}: {refused} of {of} flights are refused by `check` ({codes}) and were flown all the same")
+            format!("{name}: {refused} of {of} flights are refused by `check` ({codes}) and flown anyway")
         });
         let early: Vec<_> = self.flights.iter().filter(|flight| flight.ended_early.is_some()).collect();
         let ended = early.first().map(|first| {
             let violated = early.iter().filter(|flight| flight.outcome == Outcome::Violated).count();
             let why = first.ended_early.as_deref().unwrap_or_default().trim_end_matches('.');
             format!(
-                "{name}: {} of {of} flights ended early, {violated} of them after a violation; the first has start.seed {}: {why}",
+                "{name}: {} of {of} flights ended early, {violated} of them after a violation; the first has \
+                 start.seed {}: {why}",
                 early.len(),
                 first.seed
             )
         });
         let reached = self.reached.count;
         let censored = (reached > 0 && reached < self.reached.of).then(|| {
-            format!(
-                "{name}: the times to reach are over the {reached} of {of} flights that reached the formation, alone"
-            )
+            format!("{name}: times to reach are over the {reached} of {of} flights that reached the formation")
         });
         [refused, ended, censored].into_iter().flatten().collect()
     }
@@ -357,7 +356,7 @@ impl Study for Comparison {
     fn notes(&self) -> Vec<String> {
         let interrupted = (self.runs < self.runs_asked).then(|| {
             format!(
-                "interrupted: of {} starts, {} were flown under every law, and these are compared",
+                "interrupted: the comparison has {1} of {0} starts, those flown under every law",
                 self.runs_asked, self.runs
             )
         });
@@ -397,7 +396,7 @@ impl Study for Comparison {
         let part = |caption: &str, columns: std::ops::Range<usize>| {
             Block::Table(records.part(caption, |place| place == 0 || columns.contains(&place)))
         };
-        let keys = Table::of("The keys of each law", &self.laws)
+        let keys = Table::of("Keys of each law", &self.laws)
             .column("", "Law", Kind::Text, |law| law.name.clone())
             .column("", "Keys", Kind::Text, |law| law.overrides.join(", "))
             .build();
@@ -406,8 +405,8 @@ impl Study for Comparison {
                 "Laws side by side",
                 [
                     part("How flights ended, with 95 % intervals", 1..9),
-                    part("How soon they reached the formation, and how near two vehicles came", 9..14),
-                    part("What it cost", 14..18),
+                    part("Time to reach the formation, and separation", 9..14),
+                    part("Path and control", 14..18),
                 ],
             ),
             Section::detail("Keys", [Block::Table(keys)]),
@@ -423,7 +422,7 @@ impl Study for Comparison {
     }
 
     fn performance(&self) -> Option<Table> {
-        let table = Table::of("Measured on the machine that flew", &self.performance.laws)
+        let table = Table::of("Wall-clock time on this machine", &self.performance.laws)
             .column("", "Law", Kind::Text, |law| law.name.clone())
             .column("", "A step of the law [us]", Kind::Measured, |law| law.law_step_s.map(|step_s| 1e6 * step_s));
         Some(table.build())

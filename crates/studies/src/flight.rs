@@ -45,13 +45,13 @@ pub struct FlightSummary {
     pub reached_at_s: Option<f64>,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
-    /// Smallest distance of two centres \[m\].
+    /// Smallest separation of two centres \[m\].
     pub min_m: Option<f64>,
-    /// Time of the smallest distance \[s\].
+    /// Time of the smallest separation \[s\].
     pub min_at_s: Option<f64>,
-    /// Vehicles of the smallest distance, counted from 1.
+    /// Vehicles of the smallest separation, counted from 1.
     pub min_pair: Option<[usize; 2]>,
-    /// Separation that the law's certificate promises \[m\].
+    /// Separation that the law certifies \[m\].
     pub certified_m: Option<f64>,
     /// Whether two vehicles came closer than certified, by more than the error of integration: a defect.
     #[serde(default)]
@@ -81,7 +81,8 @@ pub struct FlightSummary {
 
 /// Flies a scenario to its end and summarises the flight; memory does not grow with the length of the flight.
 ///
-/// `carry_on` is called after each step with the number of steps. [`ControlFlow::Break`] ends the flight without a summary.
+/// `carry_on` is called after each step with the number of steps. [`ControlFlow::Break`] ends the flight without a
+/// summary.
 ///
 /// # Errors
 /// [`SimError`] if the law or the judge cannot be built.
@@ -188,7 +189,7 @@ impl Effort {
         self.path_length_m
     }
 
-    /// Returns the integral of |u| over the flight by the trapezoidal rule over its steps, summed over the vehicles \[m/s\].
+    /// Returns the integral of |u| by the trapezoidal rule over the steps, summed over the vehicles \[m/s\].
     #[must_use]
     pub fn total_control_m_s(&self) -> f64 {
         self.total_control_m_s
@@ -231,7 +232,7 @@ mod tests {
     use super::*;
     use tautline_core::swarm::Swarm;
 
-    /// Two vehicles on circles of 1 m and 2 m, commanded t and 2 t m/s^2.
+    /// Returns the effort of two vehicles on circles of 1 m and 2 m with commands of t and 2 t m/s^2.
     fn seen(steps: u32) -> Effort {
         let mut effort = Effort::default();
         for k in 0..=steps {
@@ -245,16 +246,16 @@ mod tests {
     }
 
     #[test]
-    fn ways_and_commands_of_all_vehicles_are_summed() {
+    fn paths_and_commands_are_summed_over_the_vehicles() {
         let effort = seen(1000);
-        // Chords of 1000 parts are shorter than their arcs by a part of 1.6e-6.
+        // The chords of 1000 parts are shorter than the arcs by a relative 1.6e-6.
         assert!((effort.path_length_m() / (3.0 * std::f64::consts::TAU) - 1.0).abs() < 2e-6);
         assert!((effort.total_control_m_s() - 1.5).abs() < 1e-12, "the trapezoidal rule is exact for a line");
         assert!(seen(4).path_length_m() < 0.91 * effort.path_length_m(), "few steps shorten the path");
     }
 
     #[test]
-    fn an_end_that_is_told_twice_counts_once_and_a_law_without_an_answer_leaves_the_last_command() {
+    fn a_repeated_step_counts_once_and_a_missing_command_keeps_the_last_one() {
         let mut effort = seen(10);
         let (way_m, control_m_s) = (effort.path_length_m(), effort.total_control_m_s());
         let swarm = Swarm::at_rest(Rows::from_row_slice(&[1.0, 0.0, 0.0, 2.0, 0.0, 0.0]));

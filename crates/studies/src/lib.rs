@@ -10,7 +10,7 @@
 //! | [`splitting`] | the probability of rare events by adaptive multilevel splitting |
 //! | [`statistics`] | shares, means, quantiles and differences of pairs with 95 % intervals |
 //!
-//! A study is an [`study::Experiment`], which holds its options and flies scenarios in a [`batch::Batch`], and its answer a
+//! An [`study::Experiment`] holds the options of a study and flies its scenarios in a [`batch::Batch`]. The answer is a
 //! [`study::Study`], whose [`table::Table`]s are written as text, CSV, LaTeX, Parquet and a page.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
@@ -38,9 +38,9 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 
-/// Most runs of a comparison, and of each value of a margin or point of a sweep.
+/// Largest number of runs of a comparison, of each value of a margin, and of each point of a sweep.
 pub const MOST_RUNS: u64 = 1_000_000;
-/// Seeds of a first run: up to the largest of a scenario file, less the most runs.
+/// Admitted seeds of a first run: the largest seed of a scenario file, less the largest number of runs, is the last.
 pub const SEEDS: RangeInclusive<u64> = 0..=i64::MAX as u64 - MOST_RUNS;
-/// Threads that a study may use.
+/// Admitted numbers of threads.
 pub const THREADS: RangeInclusive<usize> = 1..=256;

@@ -209,12 +209,12 @@ impl Experiment for Options {
         })?;
         let interrupted = batch.is_interrupted();
         probes.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let Some(found) = found.filter(|found| !matches!(found, Found::Even(_)) || !interrupted) else {
+        let Some(found) = found.filter(|found| !matches!(found, Bisection::Even(_)) || !interrupted) else {
             return Ok(None);
         };
         let turn = match found {
-            Found::Even(_) => None,
-            Found::Turn { before, after, was, turns } => Some(Turn {
+            Bisection::Even(_) => None,
+            Bisection::Turn { before, after, was, turns } => Some(Turn {
                 bracket: [before.min(after), before.max(after)],
                 holds_below: was == (before < after),
                 turns: turns as u64,
@@ -384,7 +384,7 @@ impl Study for Margin {
 
 /// Result of a bisection.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Found {
+enum Bisection {
     /// The answer is the same at every value that was tried.
     Even(bool),
     /// The answer turns between two values.
@@ -409,7 +409,7 @@ fn search<E>(
     range: Range,
     integers: bool,
     ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>,
-) -> Result<Option<Found>, E> {
+) -> Result<Option<Bisection>, E> {
     let between = |from: f64, to: f64, share: f64| {
         let ratio = || from * libm::pow(to / from, share);
         let value = if range.logarithmic { ratio() } else { from + (to - from) * share };
@@ -433,7 +433,7 @@ fn search<E>(
     let Some(&(_, was)) = scanned.first() else { return Ok(None) };
     let turns = || scanned.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let Some(turn) = turns().next() else {
-        return Ok(Some(Found::Even(was)).filter(|_| scanned.len() == values.len()));
+        return Ok(Some(Bisection::Even(was)).filter(|_| scanned.len() == values.len()));
     };
     let (mut before, mut after) = (turn[0].0, turn[1].0);
     for _ in 0..range.halvings {
@@ -448,7 +448,7 @@ fn search<E>(
             None => break,
         }
     }
-    Ok(Some(Found::Turn { before, after, was, turns: turns().count() }))
+    Ok(Some(Bisection::Turn { before, after, was, turns: turns().count() }))
 }
 
 #[cfg(test)]

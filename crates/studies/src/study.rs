@@ -18,7 +18,7 @@ use tautline_report::request::outputs::{self, Called, is_standard_output, write}
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 
-/// Version of the keys of every JSON file of this crate. Raised when a key is renamed, removed or changes its meaning.
+/// Version of the keys of every JSON file of this crate. It rises if a key is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 3;
 
 /// The answer of a study.
@@ -97,14 +97,14 @@ pub trait Study: Serialize {
         for Section { heading, blocks, .. } in self.sections() {
             whole.add(&heading, blocks.into_iter().map(Block::html));
         }
-        whole.add("What to know", [page::list(&self.notes())]);
+        whole.add("Notes", [page::list(&self.notes())]);
         for Section { heading, blocks, .. } in page.sections.clone() {
             whole.add(&heading, blocks.into_iter().map(Block::html));
         }
-        whole.add("What was assumed", [page::list(&self.assumptions())]);
-        whole.add("Repeat it", page.commands.iter().map(|command| page::command(command)));
+        whole.add("Assumptions", [page::list(&self.assumptions())]);
+        whole.add("Command", page.commands.iter().map(|command| page::command(command)));
         let repeat = |(what, command): &(String, String)| [page::list(&[what]), page::command(command)];
-        whole.add("Fly it again", page.repeats.iter().flat_map(repeat));
+        whole.add("Single flights", page.repeats.iter().flat_map(repeat));
         whole.add("Performance", self.performance().iter().map(Table::html));
         whole.render()
     }
@@ -294,7 +294,7 @@ pub fn answer<E: Experiment>(
     let flown = options.fly(&base, &batch);
     monitor.finish();
     let Some(study) = flown? else {
-        monitor.warn("interrupted too early: there is no answer");
+        monitor.warn("interrupted before there was an answer");
         return Ok(None);
     };
     for note in study.notes() {

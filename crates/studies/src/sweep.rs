@@ -127,7 +127,9 @@ impl SweptKey {
                     })?;
                 let (from, to) = (number(from)?, number(to)?);
                 if (count > 1) == (from == to) || !(to - from).is_finite() {
-                    return Err(wrong(&format!("--key {key}: {count} values from {from} to {to}")));
+                    return Err(wrong(&format!(
+                        "--key {key}: needs different finite ends and 2 values, got {count} from {from} to {to}"
+                    )));
                 }
                 let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
                 let part = |k: usize| k as f64 / (count - 1).max(1) as f64;
@@ -385,7 +387,7 @@ impl Study for Sweep {
     fn notes(&self) -> Vec<String> {
         let flown = self.points.len();
         let interrupted =
-            self.interrupted.then(|| format!("interrupted: of {} points {flown} were flown", self.points_asked));
+            self.interrupted.then(|| format!("interrupted: {flown} of {} points were flown", self.points_asked));
         let refused = self.points.iter().find_map(|point| Some((point, point.first_refusal.as_ref()?)));
         let refused = refused.map(|(point, why)| {
             let runs = self.points.iter().map(|point| point.refused).sum();

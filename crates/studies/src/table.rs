@@ -494,7 +494,8 @@ mod tests {
         let lines: Vec<_> = csv.lines().collect();
         assert_eq!(
             lines[0],
-            "law,seed,clear_count,clear_share,clear_low,clear_high,control_mean_m_s2,control_mean_low_m_s2,control_mean_high_m_s2"
+            "law,seed,clear_count,clear_share,clear_low,clear_high,\
+             control_mean_m_s2,control_mean_low_m_s2,control_mean_high_m_s2"
         );
         assert!(lines[1].starts_with("a_b,0,0,0.0,0.0,0.70") && lines[1].ends_with(",1.5,,3.0"), "{csv}");
         assert!(lines[2].ends_with(",1.0,,,"), "{csv}");

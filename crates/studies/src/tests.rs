@@ -1,4 +1,4 @@
-//! What the tests of studies share.
+//! Helpers of the tests of studies.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -8,7 +8,7 @@ use crate::batch::Batch;
 use tautline_report::request::{Monitor, Silent};
 use tautline_sim::scenario::{Override, Source};
 
-/// Two vehicles that close up.
+/// Scenario of two vehicles that approach each other.
 const PAIR: &str = r#"name = "pair"
 [start]
 positions_m = [[0.0, 0.0], [4.0, 0.0]]
@@ -23,24 +23,24 @@ duration_s = 2.0
 record_hz = 10
 "#;
 
-/// The scenario of two vehicles that close up.
+/// Returns the scenario of two vehicles that approach each other.
 pub(crate) fn pair() -> Source {
     Source::Text { name: "pair".to_owned(), text: PAIR.to_owned() }
 }
 
-/// A scenario with overrides.
+/// Returns a scenario with overrides.
 pub(crate) fn base(source: Source, sets: &[&str]) -> BaseScenario {
     let sets = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
     BaseScenario::read(source, sets).expect("a scenario")
 }
 
-/// Calls `fly` with a batch that nobody watches.
+/// Calls `fly` with a batch without a monitor.
 pub(crate) fn batch<T>(threads: usize, fly: &mut dyn FnMut(&Batch<'_>) -> T) -> T {
     let monitor = Silent::default();
     fly(&Batch::new(Some(threads), &monitor).expect("a batch"))
 }
 
-/// Interrupts once a number of steps has been flown.
+/// Monitor that interrupts after a number of steps.
 pub(crate) struct InterruptAfter {
     steps: u64,
     flown: AtomicU64,

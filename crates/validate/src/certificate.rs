@@ -1,6 +1,6 @@
-//! The energy and what it certifies, on random starts.
+//! Energy and certificate on random starts, in continuous time and in Rapier.
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{COUNTS, DELTA_M, random_starts};
 use super::flights::{certified_m, continuous, engine_to_any_end, larger, separation_m, times, with_step};
 use tautline_core::swarm::Swarm;
@@ -11,60 +11,60 @@ use tautline_sim::continuous::{self, IdealError, Tolerances};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::Ending;
 
-/// Random starts.
+/// Number of random starts.
 pub(super) const STARTS: usize = 500;
 const SEED: u64 = 2;
-/// Flight from each start \[s\]; the closest approach comes within the first seconds.
+/// Duration of each flight \[s\]; the closest approach is within the first seconds.
 const DURATION_S: f64 = 10.0;
-/// Looks at the energy per second \[Hz\].
-const LOOKS_HZ: f64 = 8.0;
-/// Largest share of the fastest oscillation at the certified separation that a step may cover: omega dt <= 0.3.
+/// Sampling rate of the energy \[Hz\].
+const SAMPLE_HZ: f64 = 8.0;
+/// Largest omega dt of a step, with the fastest oscillation at the certified separation.
 const STIFF_SHARE: f64 = 0.3;
-/// Longest step of the engine \[s\].
+/// Longest step of Rapier \[s\].
 const LONGEST_STEP_S: f64 = 1.0 / 240.0;
 
-/// Closing speeds of each of two vehicles \[m/s\].
+/// Speeds of each of two vehicles head on \[m/s\].
 const HEAD_ON_M_S: [f64; 3] = [1.0, 4.0, 16.0];
 const HEAD_ON_NAMES: [&str; 3] = ["ratio_at_1_m_s", "ratio_at_4_m_s", "ratio_at_16_m_s"];
 
-/// What one start gave.
+/// Results of one start.
 #[derive(Clone, Copy, Debug)]
 struct Trial {
     certified_m: f64,
-    /// Closest approach in continuous time and in the engine \[m\].
+    /// Smallest separation in continuous time and in Rapier \[m\].
     continuous_m: f64,
     engine_m: f64,
     dt_s: f64,
-    /// Largest rise of E from one look to the next, over E(0), in continuous time.
+    /// Largest rise of E between samples, divided by E(0), in continuous time.
     energy_rise: f64,
-    /// Largest rise of E above its lowest value so far, over E(0), in the engine.
+    /// Largest rise of E above its lowest value so far, divided by E(0), in Rapier.
     engine_energy_rise: f64,
-    /// Largest excess of E over E(0), over E(0), in the engine.
+    /// Largest excess of E over E(0), divided by E(0), in Rapier.
     engine_energy_excess: f64,
 }
 
-/// The longest step that resolves the tension at the certified separation.
-fn honest_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, Untried> {
+/// Returns the longest step that resolves the tension at the certified separation.
+fn resolving_step_s(scenario: &Scenario, certified_m: f64) -> Result<f64, MeasureError> {
     let LawSpec::EdgeTension(EdgeTensionKeys { alpha }) = scenario.law else { return Ok(LONGEST_STEP_S) };
     let Some((_, rest_m)) = scenario.formation().min_distance() else { return Ok(LONGEST_STEP_S) };
     let stiffness = EdgeTension::new(alpha, scenario.delta_m, rest_m)?.second_derivative(certified_m);
     Ok(LONGEST_STEP_S.min(STIFF_SHARE / stiffness.sqrt()))
 }
 
-/// Makes the law of a scenario.
+/// Constructor of the law of a scenario.
 type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 
-/// Flies a start under this law by the promise of the scenario's own. A flight in which the law loses its answer, or the
-/// solver its step, has no closest approach that keeps a promise.
-fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
-    // The certificate does not depend on a22, the motion of the centre of mass does.
+/// Flies a start under a law, against the certificate of the scenario's own law. A flight whose law or solver fails has
+/// the smallest separation NaN, which breaks the certificate.
+fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, MeasureError> {
+    // The certificate does not depend on a22; the motion of the centre of mass does.
     let scenario = Scenario { a22_per_s: 0.1, ..start.clone() };
     let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start), &[]);
     let certified_m = certificate.certified_m.unwrap_or(f64::NAN);
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
     let mut law = make_law(&scenario)?;
-    let looks_s = times(DURATION_S, LOOKS_HZ);
-    let (continuous_m, energy_rise) = match continuous::solve(&scenario, law.as_mut(), &looks_s, Tolerances::default())
+    let times_s = times(DURATION_S, SAMPLE_HZ);
+    let (continuous_m, energy_rise) = match continuous::solve(&scenario, law.as_mut(), &times_s, Tolerances::default())
     {
         Ok(solution) => {
             let energy = |state: &Swarm| law.energy(&scenario.observation(state)).unwrap_or(f64::NAN);
@@ -76,7 +76,7 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
         Err(error) => return Err(error.into()),
     };
 
-    let dt_s = honest_step_s(&scenario, certified_m)?;
+    let dt_s = resolving_step_s(&scenario, certified_m)?;
     let (mut lowest, mut engine_energy_rise, mut engine_energy_excess) = (energy_initial, 0.0, 0.0);
     let flight = engine_to_any_end(&with_step(&scenario, dt_s), law, |sample| {
         let energy = sample.energy.unwrap_or(f64::NAN);
@@ -88,7 +88,7 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, Untried> {
     Ok(Trial { certified_m, continuous_m, engine_m, dt_s, energy_rise, engine_energy_rise, engine_energy_excess })
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     let trials = try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law))?;
     let tight = tight()?;
     progress(1);
@@ -96,8 +96,9 @@ pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     Ok(vec![energy, in_engine, certificate, tight, certificate_in_engine])
 }
 
-/// Two vehicles head on, from twice delta, at this closing speed of each \[m/s\]: clearance left over clearance certified.
-fn head_on(speed_m_s: f64) -> Result<f64, Untried> {
+/// Returns the smallest clearance divided by the certified one, for two vehicles head on from 2 delta with these speeds
+/// \[m/s\].
+fn head_on(speed_m_s: f64) -> Result<f64, MeasureError> {
     let mut swarm = Swarm::at_rest(Formation::line(2, 2.0 * DELTA_M).slots_m);
     (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
     let scenario = Scenario::new("head-on", swarm, Formation::line(2, 2.0 * DELTA_M), DELTA_M, 1.0);
@@ -105,7 +106,7 @@ fn head_on(speed_m_s: f64) -> Result<f64, Untried> {
     Ok((separation_m(closest) - DELTA_M) / (certified_m(&scenario)? - DELTA_M))
 }
 
-fn tight() -> Result<Claim, Untried> {
+fn tight() -> Result<Claim, MeasureError> {
     let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s)).collect::<Result<Vec<_>, _>>()?;
     let list = HEAD_ON_M_S.iter().zip(&ratios).map(|(speed_m_s, ratio)| format!("{ratio:.3} at {speed_m_s} m/s"));
     let last = ratios.last().copied().unwrap_or(f64::NAN);
@@ -115,28 +116,28 @@ fn tight() -> Result<Claim, Untried> {
     Ok(claim.measured(words, HEAD_ON_NAMES.into_iter().zip(ratios)).pass(pass))
 }
 
-/// What the trials say of the energy and of the certificate, each in continuous time and in the engine.
-fn claims(trials: &[Trial]) -> Result<[Claim; 4], Untried> {
+/// Returns the claims about energy and certificate, in continuous time and in Rapier.
+fn claims(trials: &[Trial]) -> Result<[Claim; 4], MeasureError> {
     Ok([energy(trials)?, energy_in_the_engine(trials)?, in_continuous_time(trials)?, in_the_engine(trials)?])
 }
 
-fn energy(trials: &[Trial]) -> Result<Claim, Untried> {
+fn energy(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let claim = stated("energy-never-increases")?;
     let rise = trials.iter().map(|trial| trial.energy_rise).fold(0.0, larger);
     let words = format!(
-        "largest rise {} of E(0) over {STARTS} random starts of {DURATION_S} s with {LOOKS_HZ} looks a second",
+        "largest rise {} of E(0), {STARTS} random starts, {DURATION_S} s, {SAMPLE_HZ} samples a second",
         bound(rise, claim.limit())
     );
     Ok(claim.measured(words, [("largest_rise_over_initial", rise)]).within_limit())
 }
 
-fn energy_in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
+fn energy_in_the_engine(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let claim = stated("energy-in-the-engine")?;
     let excess = trials.iter().map(|trial| trial.engine_energy_excess).fold(0.0, larger);
     let rise = trials.iter().map(|trial| trial.engine_energy_rise).fold(0.0, larger);
     let words = format!(
-        "largest excess {} of E(0) over every step of {}; from its lowest value so far E rises by up to {rise:.1e} of \
-         E(0), as the method's does where a mode oscillates",
+        "largest excess {} of E(0), {}. With oscillating modes E rises above its lowest value by up to \
+         {rise:.1e} of E(0)",
         bound(excess, claim.limit()),
         population()
     );
@@ -149,36 +150,34 @@ fn population() -> String {
     format!("{STARTS} random starts of {} to {} vehicles in plane and space", COUNTS.start(), COUNTS.end())
 }
 
-/// How many trials broke the certificate, the smallest margin, and the smallest ratio of what was left to what was
-/// promised.
+/// Returns the number of trials that broke the certificate, the smallest margin \[m\], and the smallest clearance
+/// divided by the certified one.
 fn kept(trials: &[Trial], closest_m: fn(&Trial) -> f64) -> (usize, f64, f64) {
     let margins_m = trials.iter().map(|trial| closest_m(trial) - trial.certified_m);
     let ratios = trials.iter().map(|trial| (closest_m(trial) - DELTA_M) / (trial.certified_m - DELTA_M));
-    // A NaN keeps no promise.
+    // NaN counts as broken.
     let broken = trials.len() - margins_m.clone().filter(|&margin_m| margin_m >= 0.0).count();
     (broken, margins_m.fold(f64::INFINITY, f64::min), ratios.fold(f64::INFINITY, f64::min))
 }
 
-fn in_continuous_time(trials: &[Trial]) -> Result<Claim, Untried> {
+fn in_continuous_time(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let (broken, margin_m, ratio) = kept(trials, |trial| trial.continuous_m);
     let words = format!(
-        "broken {broken} times in {}; smallest margin {margin_m:.4} m, where clearance above delta was {ratio:.2} times \
-         the certified one or more",
-        population()
+        "broken {broken} times in {STARTS} starts; smallest margin {margin_m:.4} m; clearance at least {ratio:.2} \
+         times the certified one"
     );
     let values = [("broken", broken as f64), ("smallest_margin_m", margin_m), ("smallest_clearance_ratio", ratio)];
     Ok(stated("certificate")?.measured(words, values).pass(broken == 0))
 }
 
-fn in_the_engine(trials: &[Trial]) -> Result<Claim, Untried> {
+fn in_the_engine(trials: &[Trial]) -> Result<Claim, MeasureError> {
     let (broken, margin_m, _) = kept(trials, |trial| trial.engine_m);
     let differences_m = trials.iter().map(|trial| (trial.engine_m - trial.continuous_m).abs());
     let difference_m = differences_m.fold(0.0, larger);
     let shortest_s = trials.iter().map(|trial| trial.dt_s).fold(f64::INFINITY, f64::min);
     let words = format!(
-        "broken {broken} times in {}; smallest margin {margin_m:.4} m; closest approaches within {difference_m:.4} m of \
-         continuous time; steps of {:.2} ms to {:.2} ms",
-        population(),
+        "broken {broken} times in {STARTS} starts; smallest margin {margin_m:.4} m; closest approaches within \
+         {difference_m:.4} m of continuous time; steps of {:.2} to {:.2} ms",
         shortest_s * 1e3,
         LONGEST_STEP_S * 1e3
     );
@@ -199,7 +198,7 @@ mod tests {
     use tautline_core::swarm::Rows;
     use tautline_laws::law::LawError;
 
-    /// Starts in a short form of the claim.
+    /// Number of starts of a short form of the claim.
     const FEW: usize = 24;
     const GOOD: Trial = Trial {
         certified_m: 1.1,
@@ -230,8 +229,8 @@ mod tests {
     }
 
     #[test]
-    fn a_step_so_long_that_it_jumps_the_barrier_breaks_the_certificate_and_the_claim_says_so() {
-        // Head on at 5 m/s each from 3 m apart, half a second a step that is not refused.
+    fn a_step_across_the_barrier_breaks_the_certificate_and_fails_the_claim() {
+        // Head on at 5 m/s each from a separation of 3 m, with steps of 0.5 s without refinement.
         let mut swarm = Swarm::at_rest(Formation::line(2, 3.0).slots_m);
         (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (5.0, -5.0);
         let mut scenario = Scenario::new("jump", swarm, Formation::line(2, 2.0), DELTA_M, 1.0);
@@ -249,7 +248,7 @@ mod tests {
             let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
             Trial { certified_m, engine_m, dt_s, ..GOOD }
         };
-        let honest = trial(honest_step_s(&scenario, certified_m).expect("a tension"));
+        let honest = trial(resolving_step_s(&scenario, certified_m).expect("a tension"));
         let judge = |trials: &[Trial]| in_the_engine(trials).expect("a claim");
         assert!(judge(&[honest]).pass, "{honest:?}");
         let jumped = trial(0.5);
@@ -258,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn an_energy_that_rises_or_is_no_number_is_a_claim_that_fails() {
+    fn a_rising_energy_and_nan_fail_the_claims() {
         let passes = |second: Trial| claims(&[GOOD, second]).expect("claims").map(|claim| claim.pass);
         assert_eq!(passes(GOOD), [true; 4]);
         for rise in [1e-3, f64::NAN] {
@@ -271,8 +270,7 @@ mod tests {
 
     use tautline_laws::observation::Observation;
 
-    /// The edge-tension law with the sign of its tension flipped: the tension turns with the positions, the damping does
-    /// not.
+    /// Edge-tension law with the sign of the tension flipped; the damping is unchanged.
     #[derive(Clone)]
     struct Flipped(Box<dyn Law>, Swarm);
 
@@ -293,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn with_the_sign_of_the_tension_flipped_energy_and_certificate_fail_and_are_still_named() {
+    fn a_flipped_tension_fails_the_claims_about_energy_and_certificate() {
         let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         let flipped: MakeLaw = |scenario| Ok(Box::new(Flipped(scenario.law()?, scenario.start.clone())));
         let trials: Vec<Trial> = starts.par_iter().map(|start| fly(start, flipped).expect("a trial")).collect();

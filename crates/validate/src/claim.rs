@@ -1,4 +1,4 @@
-//! One statement, judged.
+//! Claims, groups of claims and the result of a validation.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize, Serializer};
@@ -7,84 +7,82 @@ use super::convergence::Refinement;
 use tautline_report::figures::Figure;
 use tautline_report::report::Tool;
 
-/// A statement of ours or of the paper, with what was measured about it.
-///
-/// `claims.json` holds what is known before anything is measured.
+/// Statement of tautline or of the paper, with its measurement. `claims.json` holds all texts except the measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Claim {
     /// Stable name.
     pub id: &'static str,
-    /// Where the statement comes from: equation, figure or theorem.
+    /// Source of the statement: equation, figure or theorem.
     pub source: &'static str,
-    /// The finding about the paper, F1 to F7, that the claim measures.
+    /// Finding about the paper, F1 to F7, that the claim measures.
     #[serde(borrow)]
     pub finding: Option<&'static str>,
-    /// Whose statement it is, and how it is expected to fare.
+    /// Author of the statement, and the expected result.
     pub kind: Kind,
-    /// What is stated.
+    /// Statement.
     pub statement: &'static str,
-    /// What the measurement should give.
+    /// Expected measurement.
     pub expected: &'static str,
-    /// What it gave, in words.
+    /// Measurement in words.
     pub measured: String,
-    /// The key numbers behind these words by name, units in the names; a JSON object in files, where a number that is not
-    /// finite is null.
+    /// Measured numbers by name, with units in the names; a JSON object in files, with null for numbers that are not
+    /// finite.
     #[serde(serialize_with = "as_object", skip_deserializing)]
     pub values: Vec<(&'static str, f64)>,
-    /// By how much the measurement may differ.
+    /// Largest difference between measured and expected.
     pub tolerance: &'static str,
-    /// Why by so much.
+    /// Reason for the tolerance.
     pub reason: &'static str,
     /// Whether the measurement is as expected.
     pub pass: bool,
 }
 
-/// Whose statement it is, and how it is expected to fare.
+/// Author of a statement, and the expected result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// This program's own: it must hold.
+    /// Of tautline; must hold.
     #[default]
     Ours,
-    /// The paper's, and it holds.
+    /// Of the paper; must hold.
     PaperHolds,
-    /// The paper's, and it is refuted: what must hold is the refutation.
+    /// Of the paper; must be refuted.
     PaperRefuted,
 }
 
-/// Claims about one thing.
+/// Claims about one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Group {
     /// Stable name.
     pub id: &'static str,
-    /// What they are about.
+    /// Subject.
     pub title: &'static str,
-    /// The claims.
+    /// Claims.
     pub claims: Vec<Claim>,
 }
 
 impl Claim {
-    /// What stands in the place of claims that could not be tried.
-    pub(super) fn untried(error: &impl ToString) -> Self {
+    /// Returns the claim in place of a group whose measurement failed.
+    pub(super) fn failed_group(error: &impl ToString) -> Self {
         Self {
             id: "tried",
             source: "this program",
-            statement: "These claims can be tried.",
+            statement: "The claims of this group can be measured.",
             expected: "every flight can be flown",
             measured: error.to_string(),
             tolerance: "none",
-            reason: "a law or a plant that gives up is broken",
+            reason: "a flight that fails is a defect",
             ..Self::default()
         }
     }
 
-    /// The number that the tolerance begins with; NaN, which nothing is within, where it begins with none.
+    /// Returns the first number of the tolerance; NaN without a number, which fails every comparison.
     pub(super) fn limit(&self) -> f64 {
         self.tolerance.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or(f64::NAN)
     }
 
-    /// What the measurement gave; the claim still fails until it is judged.
+    /// Adds the measurement. The claim fails until [`Claim::pass`] is called.
     pub(super) fn measured(self, words: String, values: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
         Self { measured: words, values: values.into_iter().collect(), ..self }
     }
@@ -93,7 +91,7 @@ impl Claim {
         Self { pass, ..self }
     }
 
-    /// A claim that every number measured is, without its sign, at most [`Claim::limit`].
+    /// Passes the claim if no measured number is larger than [`Claim::limit`] in magnitude.
     pub(super) fn within_limit(self) -> Self {
         let limit = self.limit();
         let pass = self.values.iter().all(|(_, number)| number.abs() <= limit);
@@ -105,7 +103,7 @@ impl Claim {
         self.pass(pass)
     }
 
-    /// How the statement fared, in two words at most.
+    /// Returns the result in at most two words.
     #[must_use]
     pub fn outcome(&self) -> &'static str {
         match (self.kind, self.pass) {
@@ -117,7 +115,7 @@ impl Claim {
         }
     }
 
-    /// The measured number of this name.
+    /// Returns the measured number of a name.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.values.iter().find(|(key, _)| *key == name).map(|&(_, value)| value)
@@ -128,58 +126,58 @@ fn as_object<S: Serializer>(values: &[(&str, f64)], serializer: S) -> Result<S::
     serializer.collect_map(values.iter().copied())
 }
 
-/// Counts further units of finished work, from any thread.
+/// Counts finished units of work, from any thread.
 pub(super) type Progress<'a> = dyn Fn(u64) + Sync + 'a;
 
-/// Why claims could not be tried: a law, a scenario or a flight failed. It cannot happen in a program that works.
-pub(super) type Untried = Box<dyn std::error::Error + Send + Sync>;
+/// Reason why claims could not be measured: a failed law, scenario or flight, which is a defect.
+pub(super) type MeasureError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Claims, judged.
-pub(super) type Judged = Result<Vec<Claim>, Untried>;
+/// Measured claims, or the reason why they could not be measured.
+pub(super) type ClaimsResult = Result<Vec<Claim>, MeasureError>;
 
-/// The claim of this name as `claims.json` states it: it fails until it is judged.
-pub(super) fn stated(id: &str) -> Result<Claim, Untried> {
+/// Returns the claim of a name from `claims.json`. It fails until it is measured.
+pub(super) fn stated(id: &str) -> Result<Claim, MeasureError> {
     let claims: Vec<Claim> = serde_json::from_str(include_str!("claims.json"))?;
-    claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("there is no claim {id}").into())
+    claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("unknown claim {id}").into())
 }
 
-/// Tries each of these in parallel, a unit of work each; the results are in their order.
+/// Calls `attempt` for each trial in parallel, with a unit of work each, and returns the results in order.
 pub(super) fn try_each<T: Sync, R: Send>(
     trials: &[T],
     progress: &Progress<'_>,
-    attempt: impl Fn(&T) -> Result<R, Untried> + Sync,
-) -> Result<Vec<R>, Untried> {
+    attempt: impl Fn(&T) -> Result<R, MeasureError> + Sync,
+) -> Result<Vec<R>, MeasureError> {
     trials.par_iter().map(|trial| attempt(trial).inspect(|_| progress(1))).collect()
 }
 
-/// Version of the keys of `validate.json`: raised when one is renamed, removed or changes its meaning.
+/// Version of the keys of `validate.json`. It rises if a key is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// The result of [`validate`](super::validate).
+/// Result of [`validate`](super::validate).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Validation {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// What judged.
+    /// Program.
     pub tool: Tool,
     /// Whether every claim is as expected.
     pub pass: bool,
     /// All claims.
     pub groups: Vec<Group>,
-    /// Rapier against continuous time, from coarse to fine steps.
+    /// Errors of Rapier against continuous time, from coarse to fine steps.
     #[serde(rename = "ladder")]
     pub convergence: Vec<Refinement>,
-    /// The paper's figures, and that of the convergence.
+    /// Figures of the paper, and of the convergence.
     #[serde(skip)]
     pub figures: Vec<Figure>,
-    /// Wall-clock time: the only part that differs from run to run.
+    /// Wall-clock time: the only part that differs between runs.
     pub performance: Performance,
 }
 
 /// Wall-clock time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Performance {
-    /// From start to end \[s\].
+    /// Duration of the validation \[s\].
     pub wall_s: f64,
 }
 
@@ -196,21 +194,21 @@ impl Validation {
         }
     }
 
-    /// All claims in their order.
+    /// Returns all claims in order.
     pub fn claims(&self) -> impl Iterator<Item = &Claim> {
         self.groups.iter().flat_map(|group| &group.claims)
     }
 
-    /// The claim of this id.
+    /// Returns the claim of a name.
     #[must_use]
     pub fn claim(&self, id: &str) -> Option<&Claim> {
         self.claims().find(|claim| claim.id == id)
     }
 
-    /// `validate.json`.
+    /// Returns the result as `validate.json`.
     ///
     /// # Errors
-    /// When the result cannot be written as JSON, which its types rule out.
+    /// None in practice: every value has a JSON form.
     pub fn to_json(&self) -> serde_json::Result<String> {
         serde_json::to_string_pretty(self).map(|json| json + "\n")
     }

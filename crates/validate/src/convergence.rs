@@ -1,10 +1,10 @@
-//! The physics engine against continuous time, step by half step.
+//! Convergence of Rapier to continuous time over successive halves of the step.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::claim::{Claim, Judged, Progress, Untried, stated};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated};
 use super::flights::{builtin, continuous, engine, larger, relative_speed_squared, times, with_step};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
@@ -14,28 +14,28 @@ use tautline_sim::scenario::Scenario;
 
 /// Steps per second, from coarse to fine.
 pub(super) const STEPS_HZ: [f64; 9] = [60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0, 7680.0, 15360.0];
-/// Length of the flights \[s\]: all encounters of the pentagon are over by then.
+/// Duration of the flights \[s\]; all encounters of the pentagon are earlier.
 const DURATION_S: f64 = 10.0;
-/// Instants that are compared \[Hz\].
+/// Rate of the compared states \[Hz\].
 const COMPARED_HZ: f64 = 10.0;
-/// Kick, drift, kick is of order 2.
+/// Admitted order: kick-drift-kick has order 2.
 const ORDER: std::ops::RangeInclusive<f64> = 1.9..=2.1;
 
-/// Free decay: coefficients \[1/s\], steps taken, and their lengths in turn \[s\].
+/// Free decay: coefficients \[1/s\], number of steps, and their lengths in turn \[s\].
 const FREE_A22_PER_S: [f64; 3] = [-1.0, -0.1, 0.1];
 const FREE_STEPS: usize = 6000;
 const FREE_STEP_S: [f64; 3] = [1.0 / 60.0, 1.0 / 240.0, 1.0 / 1000.0];
 
-/// One step length and the errors of a flight in such steps.
+/// Step length, with the errors of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Refinement {
     /// Step \[s\].
     pub dt_s: f64,
-    /// Largest distance of a vehicle from its place in continuous time \[m\].
+    /// Largest position error of a vehicle against continuous time \[m\].
     pub error_m: f64,
-    /// Observed order from the coarser step before; none for the first.
+    /// Observed order against the next coarser step; `None` for the first.
     pub order: Option<f64>,
-    /// Largest difference of E from what the dissipation leaves of E(0) \[m^2/s^2\].
+    /// Largest error of the energy balance: E against E(0) less the dissipated energy \[m^2/s^2\].
     pub energy_excess_m2_s2: f64,
     /// Largest rise of E above its lowest value so far \[m^2/s^2\].
     pub energy_rise_m2_s2: f64,
@@ -46,8 +46,8 @@ fn largest_distance_m(a: &Swarm, b: &Swarm) -> f64 {
     (0..a.count()).map(distance).fold(0.0, larger)
 }
 
-/// Flies with every step recorded and compares with the states of continuous time. The order is left out.
-fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Refinement, Untried> {
+/// Flies with every step recorded and returns the errors against continuous states, without the order.
+fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Refinement, MeasureError> {
     let dt_s = 1.0 / steps_hz;
     let scenario = with_step(scenario, dt_s);
     let every = steps_hz / COMPARED_HZ;
@@ -76,24 +76,24 @@ fn order(coarse: f64, fine: f64) -> f64 {
     (coarse / fine).log2()
 }
 
-/// The convergence of the pentagon.
-pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, Untried> {
+/// Returns the convergence in the pentagon flight.
+pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, MeasureError> {
     let mut scenario = builtin("pentagon")?;
     scenario.time.duration_s = DURATION_S;
     let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default())?.states;
     let mut refinements = STEPS_HZ
         .par_iter()
         .map(|&steps_hz| fly(&scenario, steps_hz, &reference).inspect(|_| progress(1)))
-        .collect::<Result<Vec<_>, Untried>>()?;
+        .collect::<Result<Vec<_>, MeasureError>>()?;
     for fine in 1..refinements.len() {
         refinements[fine].order = Some(order(refinements[fine - 1].error_m, refinements[fine].error_m));
     }
     Ok(refinements)
 }
 
-/// The claims about it.
-pub(super) fn claims(refinements: &[Refinement]) -> Judged {
-    let error = |first, last| format!("largest position error {first:.1e} m to {last:.1e} m");
+/// Returns the claims about the convergence.
+pub(super) fn claims(refinements: &[Refinement]) -> ClaimsResult {
+    let error = |first, last| format!("position error {first:.1e} to {last:.1e} m");
     let excess = |first, last| format!("difference {first:.1e} to {last:.1e} m^2/s^2");
     let [of_error, of_excess] =
         [["coarsest_error_m", "finest_error_m"], ["coarsest_excess_m2_s2", "finest_excess_m2_s2"]];
@@ -105,18 +105,18 @@ pub(super) fn claims(refinements: &[Refinement]) -> Judged {
 }
 
 fn steps() -> String {
-    format!("dt = 1/{} s to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
+    format!("dt = 1/{} to 1/{} s", STEPS_HZ[0], STEPS_HZ[STEPS_HZ.len() - 1])
 }
 
-/// Judges that a number of each flight falls with the square of the step. The names and the words are those of its first and
-/// last.
+/// Checks that a number of each flight falls with the square of the step. `names` and `words` are for the first and the
+/// last flight.
 fn of_second_order(
     id: &str,
     refinements: &[Refinement],
     names: [&'static str; 2],
     number: fn(&Refinement) -> f64,
     words: impl Fn(f64, f64) -> String,
-) -> Result<Claim, Untried> {
+) -> Result<Claim, MeasureError> {
     let numbers: Vec<f64> = refinements.iter().map(number).collect();
     let orders: Vec<f64> = numbers.windows(2).map(|pair| order(pair[0], pair[1])).collect();
     let (low, high) =
@@ -128,15 +128,15 @@ fn of_second_order(
     Ok(claim.measured(words, values).pass(orders.iter().all(|order| ORDER.contains(order))))
 }
 
-fn energy_rise(refinements: &[Refinement]) -> Result<Claim, Untried> {
+fn energy_rise(refinements: &[Refinement]) -> Result<Claim, MeasureError> {
     let claim = stated("energy-of-the-engine")?;
     let rise = refinements.iter().map(|one| one.energy_rise_m2_s2).fold(0.0, larger);
     let words = format!("largest rise {} m^2/s^2 over {}", bound(rise, claim.limit()), steps());
     Ok(claim.measured(words, [("largest_rise_m2_s2", rise)]).within_limit())
 }
 
-/// Largest relative error of a free velocity against v(0) exp(a22 t).
-fn free_decay_error() -> Result<f64, Untried> {
+/// Returns the largest relative error of a free velocity against v(0) exp(a22 t).
+fn free_decay_error() -> Result<f64, MeasureError> {
     let mut largest = 0.0;
     for a22_per_s in FREE_A22_PER_S {
         let mut scenario = builtin("pentagon")?;
@@ -163,13 +163,13 @@ fn free_decay_error() -> Result<f64, Untried> {
     Ok(largest)
 }
 
-/// The claim about free motion.
-pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, Untried> {
+/// Returns the claim about free motion.
+pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let largest = free_decay_error()?;
     progress(1);
     let claim = stated("free-decay")?;
     let words = format!(
-        "largest relative error {} after {FREE_STEPS} steps of mixed lengths with a22 of {FREE_A22_PER_S:?} 1/s",
+        "relative error {} after {FREE_STEPS} steps of mixed lengths, a22 = {FREE_A22_PER_S:?} 1/s",
         bound(largest, claim.limit())
     );
     Ok(claim.measured(words, [("relative_error", largest)]).within_limit())

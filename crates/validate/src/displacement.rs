@@ -1,8 +1,8 @@
-//! The displacement law: reference flights, a leader, and what breaks where its parts are changed.
+//! Displacement law: reference flights, a leader, and variants with defects.
 
 use nalgebra::Vector3;
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{builtin, certified_m, continuous, larger, reached_at_s, separation_m, times};
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::{Graph, Pinning};
@@ -12,16 +12,16 @@ use tautline_laws::target::{Guidance, ReferenceMotion};
 use tautline_sim::continuous::{self, Tolerances};
 use tautline_sim::scenario::{PlantSpec, Scenario};
 
-/// Units of work.
+/// Number of units of work.
 pub(super) const WORK: u64 = 4 + 3;
 
-/// Looks at a flight per second \[Hz\].
-const LOOKS_HZ: f64 = 200.0;
+/// Sampling rate of a flight \[Hz\].
+const SAMPLE_HZ: f64 = 200.0;
 const DURATION_S: f64 = 20.0;
-/// Here a formation counts as reached while every distance is within this of its slots' \[m\].
+/// Largest error of any distance between slots in a reached formation \[m\].
 const REACHED_M: f64 = 0.01;
 
-/// A flight and what an independent integration (DOP853 at a relative tolerance of 1e-11) says of it.
+/// Flight with the results of an independent integration (DOP853 at a relative tolerance of 1e-11).
 struct Reference {
     scenario: &'static str,
     hub: Option<usize>,
@@ -71,21 +71,21 @@ const REFERENCES: [Reference; 4] = [
     },
 ];
 
-/// By how much a flight differs from its reference: E(0) relatively, lengths in m, the time of arrival in s.
-struct Off {
+/// Differences between a flight and its reference: E(0) relative, lengths \[m\], time of arrival \[s\].
+struct Deviation {
     energy: f64,
     certified_m: f64,
     closest_m: f64,
     reached_s: f64,
 }
 
-fn star(count: usize, hub: usize) -> Result<Graph, Untried> {
+fn star(count: usize, hub: usize) -> Result<Graph, MeasureError> {
     let edges: Vec<_> = (0..count).filter(|&i| i != hub).map(|i| (hub, i)).collect();
     Ok(Graph::from_edges(count, &edges)?)
 }
 
-/// The built-in scenario under the displacement law, in continuous time.
-fn scenario(name: &str, keys: DisplacementKeys) -> Result<Scenario, Untried> {
+/// Returns a built-in scenario under the displacement law, in continuous time.
+fn scenario(name: &str, keys: DisplacementKeys) -> Result<Scenario, MeasureError> {
     let mut scenario = builtin(name)?;
     scenario.law = LawSpec::Displacement(keys);
     scenario.plant = PlantSpec::Ideal;
@@ -93,7 +93,7 @@ fn scenario(name: &str, keys: DisplacementKeys) -> Result<Scenario, Untried> {
     Ok(scenario)
 }
 
-/// Around vehicle `leader` where it starts, with this motion of it.
+/// Returns the scenario with vehicle `leader`, at its start, on a reference motion.
 fn led(mut scenario: Scenario, leader: usize, motion: ReferenceMotion, feed_forward: bool) -> Scenario {
     let begins = motion.at(0.0);
     let slot_m = row(&scenario.formation().slots_m, leader);
@@ -103,7 +103,7 @@ fn led(mut scenario: Scenario, leader: usize, motion: ReferenceMotion, feed_forw
     scenario
 }
 
-fn fly(reference: &Reference) -> Result<Off, Untried> {
+fn fly(reference: &Reference) -> Result<Deviation, MeasureError> {
     let mut scenario = scenario(reference.scenario, DisplacementKeys::default())?;
     if let Some(hub) = reference.hub {
         scenario.graph = star(scenario.count(), hub)?;
@@ -111,12 +111,12 @@ fn fly(reference: &Reference) -> Result<Off, Untried> {
             scenario = led(scenario, hub, ReferenceMotion::Rest { position_m: Vector3::zeros() }, true);
         }
     }
-    let looks_s = times(DURATION_S, LOOKS_HZ);
-    let solution = continuous(&scenario, &looks_s, Tolerances::default())?;
+    let times_s = times(DURATION_S, SAMPLE_HZ);
+    let solution = continuous(&scenario, &times_s, Tolerances::default())?;
     let energy = scenario.law()?.energy(&scenario.observation(&scenario.start)).unwrap_or(f64::NAN);
     let complete = Graph::complete(scenario.count());
-    let reached_s = reached_at_s(&looks_s, &solution.states, scenario.formation(), &complete, REACHED_M);
-    Ok(Off {
+    let reached_s = reached_at_s(&times_s, &solution.states, scenario.formation(), &complete, REACHED_M);
+    Ok(Deviation {
         energy: energy / reference.energy - 1.0,
         certified_m: certified_m(&scenario)? - reference.certified_m,
         closest_m: separation_m(solution.closest) - reference.closest_m,
@@ -124,34 +124,35 @@ fn fly(reference: &Reference) -> Result<Off, Untried> {
     })
 }
 
-fn largest(offs: &[Off], number: impl Fn(&Off) -> f64) -> f64 {
-    offs.iter().map(|off| number(off).abs()).fold(0.0, larger)
+fn largest(deviations: &[Deviation], number: impl Fn(&Deviation) -> f64) -> f64 {
+    deviations.iter().map(|off| number(off).abs()).fold(0.0, larger)
 }
 
-fn flights(offs: &[Off]) -> Result<[Claim; 2], Untried> {
-    let (energy, certified_m) = (largest(offs, |off| off.energy), largest(offs, |off| off.certified_m));
-    let closest_m = largest(offs, |off| off.closest_m);
+fn flights(deviations: &[Deviation]) -> Result<[Claim; 2], MeasureError> {
+    let (energy, certified_m) = (largest(deviations, |of| of.energy), largest(deviations, |of| of.certified_m));
+    let closest_m = largest(deviations, |of| of.closest_m);
     let lengths = stated("displacement-flights")?.measured(
         format!(
-            "E(0) off by {energy:.1e}, the certified distance by {certified_m:.1e} m, the closest approach by {closest_m:.1e} m"
+            "E(0) off by {energy:.1e}, certified separation by {certified_m:.1e} m, closest approach by \
+             {closest_m:.1e} m"
         ),
         [("energy_relative", energy), ("certified_m", certified_m), ("closest_m", closest_m)],
     );
-    let reached_s = largest(offs, |off| off.reached_s);
+    let reached_s = largest(deviations, |of| of.reached_s);
     let arrival = stated("displacement-arrival")?
-        .measured(format!("times of arrival off by at most {reached_s:.4} s"), [("reached_s", reached_s)]);
+        .measured(format!("off by at most {reached_s:.4} s"), [("reached_s", reached_s)]);
     Ok([lengths.within_limit(), arrival.within_limit()])
 }
 
-/// On a ring, with the least eigenvalue and with N in the denominator of the gain: the largest distance error after a while \[m\].
-fn on_a_ring() -> Result<Claim, Untried> {
-    let error_m = |share: f64| -> Result<f64, Untried> {
+/// Measures the largest distance error on a ring \[m\], with lambda2 and with N in the denominator of the gain.
+fn on_a_ring() -> Result<Claim, MeasureError> {
+    let error_m = |share: f64| -> Result<f64, MeasureError> {
         let keys = DisplacementKeys { k_per_s2: share, zeta_per_s: share, alpha: 1.0 };
         let mut scenario = scenario("pentagon", keys)?;
         let count = 12;
         let slots = tautline_laws::formation::Formation::circle(count, 6.0);
         let mut start = slots.clone();
-        // The slowest mode of the ring: all of one half too far to one side.
+        // Slowest mode of the ring: a sine of one period.
         for i in 0..count {
             start.slots_m[(i, 2)] = 3.0 * libm::sin(std::f64::consts::TAU * i as f64 / count as f64);
         }
@@ -166,13 +167,13 @@ fn on_a_ring() -> Result<Claim, Untried> {
     let (own_m, weak_m) = (error_m(1.0)?, error_m(connectivity / 12.0)?);
     Ok(stated("displacement-ring")?
         .measured(
-            format!("{own_m:.1e} m left after {DURATION_S} s with sigma = 1/lambda2, {weak_m:.2} m with sigma = 1/N"),
+            format!("error after {DURATION_S} s: {own_m:.1e} m with sigma = 1/lambda2, {weak_m:.2} m with sigma = 1/N"),
             [("left_m", own_m), ("left_with_1_over_n_m", weak_m)],
         )
         .pass(own_m < REACHED_M && weak_m > 1.0))
 }
 
-/// A law whose vehicles are drawn to each other where they should push.
+/// Law whose tension attracts instead of repels.
 #[derive(Clone)]
 struct Flipped(Box<dyn Law>);
 
@@ -194,18 +195,19 @@ impl Law for Flipped {
     }
 }
 
-/// The largest energy of the pentagon's flight over E(0), with the tension as it is and with its sign flipped.
-fn energies() -> Result<Claim, Untried> {
+/// Measures the largest energy of the pentagon flight divided by E(0), with the tension as it is and with its sign
+/// flipped.
+fn energies() -> Result<Claim, MeasureError> {
     let scenario = scenario("pentagon", DisplacementKeys::default())?;
-    let looks_s: Vec<f64> = times(3.0, LOOKS_HZ);
+    let times_s: Vec<f64> = times(3.0, SAMPLE_HZ);
     let mut watching = scenario.clone();
     watching.time.duration_s = 3.0;
     let highest = |law: &mut dyn Law| -> f64 {
         let Ok(own) = scenario.law() else { return f64::NAN };
         let energy = |swarm: &Swarm| own.energy(&scenario.observation(swarm));
         let Some(initial) = energy(&scenario.start) else { return f64::NAN };
-        // Drawn together two vehicles fall through delta, where there is no energy.
-        match continuous::solve(&watching, law, &looks_s, Tolerances::default()) {
+        // Two vehicles that attract each other fall below delta, where the energy is undefined.
+        match continuous::solve(&watching, law, &times_s, Tolerances::default()) {
             Ok(flown) => {
                 flown.states.iter().map(|state| energy(state).unwrap_or(f64::INFINITY) / initial).fold(0.0, larger)
             }
@@ -214,20 +216,20 @@ fn energies() -> Result<Claim, Untried> {
     };
     let own = highest(scenario.law()?.as_mut());
     let flipped = highest(&mut Flipped(scenario.law()?));
-    let shown = if flipped.is_finite() { format!("{flipped:.3}") } else { "without bound".to_owned() };
+    let shown = if flipped.is_finite() { format!("{flipped:.3}") } else { "unbounded".to_owned() };
     Ok(stated("displacement-energy")?
         .measured(
-            format!("at most {own:.6} of E(0); with the tension's sign flipped {shown}"),
+            format!("at most {own:.6} of E(0); flipped: {shown}"),
             [("highest_over_initial", own), ("highest_flipped", flipped)],
         )
         .pass(own <= 1.0 + 1e-9 && flipped > 1.01))
 }
 
-/// How far the followers of a leader that accelerates lag, with its acceleration fed forward and without \[m\].
-fn lags() -> Result<Claim, Untried> {
+/// Measures the lag of the followers of an accelerating leader \[m\], with and without feed-forward.
+fn lags() -> Result<Claim, MeasureError> {
     const RADIUS_M: f64 = 1e4;
     const PERIOD_S: f64 = 2000.0;
-    let lag_m = |fed: bool| -> Result<f64, Untried> {
+    let lag_m = |fed: bool| -> Result<f64, MeasureError> {
         let mut on_slots = scenario("pentagon", DisplacementKeys::default())?;
         on_slots.a22_per_s = 0.0;
         on_slots.graph = star(5, 0)?;
@@ -250,15 +252,15 @@ fn lags() -> Result<Claim, Untried> {
     let limit = claim.limit();
     Ok(claim
         .measured(
-            format!("{fed_m:.1e} m with it; without {late_m:.5} m, where |r''|/k is {expected_m:.5} m"),
+            format!("{fed_m:.1e} m; without feed-forward {late_m:.5} m, |r''|/k = {expected_m:.5} m"),
             [("lag_fed_m", fed_m), ("lag_not_fed_m", late_m), ("expected_m", expected_m)],
         )
         .pass(fed_m < 1e-6 && (late_m / expected_m - 1.0).abs() < limit))
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
-    let offs = try_each(&REFERENCES, progress, fly)?;
-    let mut claims = flights(&offs)?.to_vec();
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
+    let deviations = try_each(&REFERENCES, progress, fly)?;
+    let mut claims = flights(&deviations)?.to_vec();
     for claim in [on_a_ring, energies, lags] {
         claims.push(claim()?);
         progress(1);

@@ -1,8 +1,8 @@
-//! Where the law comes to rest, from many starts: F3.
+//! Equilibria of the edge-tension law, from many starts (finding F3).
 
 use nalgebra::Vector3;
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{continuous, end};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
@@ -10,11 +10,11 @@ use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_sim::continuous::Tolerances;
 use tautline_sim::scenario::{Scenario, Space, offset, random, scatter};
 
-/// Orderings of five vehicles on a line, counted up to their mirror image.
+/// Number of orderings of five vehicles on a line, without mirror images.
 const ORDERINGS: u64 = 60;
-/// Random starts of the 12-gon.
+/// Number of random starts of the 12-gon.
 const POLYGON_STARTS: u64 = 40;
-/// Flights that are counted as work.
+/// Number of flights, the units of work.
 pub(super) const FLIGHTS: u64 = ORDERINGS + POLYGON_STARTS;
 const SPACING_M: f64 = 3.0;
 const NOISE_M: f64 = 0.05;
@@ -26,19 +26,19 @@ const POLYGON_DELTA_M: f64 = 1.0;
 const POLYGON_HALF_EXTENT_M: f64 = 6.0;
 const POLYGON_SPACING_M: f64 = 1.1;
 const SEED: u64 = 3;
-/// A flight long enough to come to rest \[s\].
+/// Duration of a flight to rest \[s\].
 const ORDERING_S: f64 = 600.0;
-/// When the 12-gon is looked at \[s\].
+/// Times at which the 12-gon is checked \[s\].
 const POLYGON_TIMES_S: [f64; 4] = [60.0, 120.0, 300.0, 1000.0];
 const POLYGON_NAMES: [&str; 4] = ["after_60_s", "after_120_s", "after_300_s", "after_1000_s"];
-/// Here a formation counts as reached below this largest edge error \[m\].
+/// Largest edge error of a reached formation \[m\].
 const REACHED_M: f64 = 0.01;
-/// A swarm is at rest where no vehicle is pulled by more \[m/s^2\].
+/// Largest pull on a vehicle at rest \[m/s^2\].
 const REST_M_S2: f64 = 1e-9;
-/// Both tolerances must come to the same places.
+/// Coarse tolerances, which must give the same outcomes.
 const COARSE: Tolerances = Tolerances { relative: 1e-10, absolute: 1e-10 };
 
-/// Where a flight came to rest.
+/// State at rest at the end of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rest {
     edge_error_m: f64,
@@ -52,8 +52,8 @@ impl Rest {
     }
 }
 
-/// Flies to the pentagon without the common mode (a22 = 0, on which relative motion does not depend).
-fn rest(start: Rows, tolerances: Tolerances) -> Result<Rest, Untried> {
+/// Flies to the pentagon with a22 = 0, on which relative motion does not depend.
+fn rest(start: Rows, tolerances: Tolerances) -> Result<Rest, MeasureError> {
     let formation = Formation::pentagon(SIDE_M);
     let scenario = Scenario::new("rest", Swarm::at_rest(start), formation, DELTA_M, ORDERING_S);
     let last = end(&scenario, tolerances)?;
@@ -65,13 +65,13 @@ fn rest(start: Rows, tolerances: Tolerances) -> Result<Rest, Untried> {
     })
 }
 
-/// All orders of the vehicles 0 to 4, one of each pair of mirror images.
+/// Returns all orders of the vehicles 0 to 4, one of each pair of mirror images.
 fn orderings() -> Vec<[usize; 5]> {
     let codes = (0..5_usize.pow(5)).map(|code| [4, 3, 2, 1, 0].map(|place| code / 5_usize.pow(place) % 5));
     codes.filter(|order| (0..5).all(|vehicle| order.contains(&vehicle)) && order[0] < order[4]).collect()
 }
 
-/// A line along x in this order with transverse noise.
+/// Returns a line along x in this order with transverse noise.
 fn line(order: [usize; 5], stream: u64) -> Rows {
     let mut random = random(SEED);
     random.set_stream(stream);
@@ -83,12 +83,12 @@ fn line(order: [usize; 5], stream: u64) -> Rows {
     positions_m
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     let (orderings, polygon) = rayon::join(|| pentagon_orderings(progress), || polygon(progress));
     Ok(vec![orderings?, polygon?])
 }
 
-fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, Untried> {
+fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let orderings = orderings();
     let places: Vec<usize> = (0..orderings.len()).collect();
     let rests = try_each(&places, progress, |&place| {
@@ -103,10 +103,9 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let changed = rests.iter().filter(|(fine, coarse)| fine.reached() != coarse.reached()).count();
     let in_order_m = rests.first().map_or(f64::NAN, |(rest, _)| rest.edge_error_m);
     let words = format!(
-        "{reached} of the {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the \
-         pentagon; the other {} come to rest with every pull {} m/s^2 and a largest edge error of {least_m:.2} m to \
-         {most_m:.2} m (ordering 1, 2, 3, 4, 5: {in_order_m:.2} m); {changed} outcomes change with a hundred times the \
-         solver's tolerance",
+        "{reached} of {} orderings of five vehicles near a line ({SPACING_M} m apart, up to {NOISE_M} m off) reach the \
+         pentagon. The other {} come to rest with pulls {} m/s^2 and edge errors of {least_m:.2} to {most_m:.2} m. \
+         Ordering 1-2-3-4-5: {in_order_m:.2} m. {changed} outcomes change with 100 times the solver tolerance",
         orderings.len(),
         elsewhere.len(),
         bound(pull_m_s2, REST_M_S2)
@@ -125,8 +124,8 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, Untried> {
     Ok(stated("pentagon-orderings")?.measured(words, values).pass(pass))
 }
 
-/// How many flights have reached the 12-gon at each of the times.
-fn polygon(progress: &Progress<'_>) -> Result<Claim, Untried> {
+/// Measures how many flights have reached the 12-gon at each time.
+fn polygon(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let formation = Formation::circle(POLYGON_COUNT, POLYGON_RADIUS_M);
     let fly = |stream: u64| {
         let mut random = random(SEED + 1);
@@ -144,7 +143,7 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, Untried> {
     let reached = [0, 1, 2, 3].map(reached_by);
     let list = POLYGON_TIMES_S.iter().zip(reached).map(|(time_s, reached)| format!("{reached} after {time_s} s"));
     let words = format!(
-        "so many of {POLYGON_STARTS} starts have formed it (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} m): {}",
+        "of {POLYGON_STARTS} starts (radius {POLYGON_RADIUS_M} m, delta {POLYGON_DELTA_M} m): {}",
         list.collect::<Vec<_>>().join(", ")
     );
     let pass = reached[0] * 10 <= POLYGON_STARTS && reached[3] * 10 >= 9 * POLYGON_STARTS;

@@ -1,8 +1,8 @@
-//! The paper's experiments, Figs. 2 to 4, flown in continuous time and held against an independent integrator.
+//! The paper's experiments, Figs. 2 to 4, in continuous time against an independent integrator.
 
 use nalgebra::Vector3;
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{builtin, certified_m, continuous, end, larger, reached_at_s, times};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
@@ -10,28 +10,27 @@ use tautline_laws::formation::{best_rigid_motion, largest_edge_error_m, procrust
 use tautline_sim::continuous::{Solution, Tolerances};
 use tautline_sim::scenario::Scenario;
 
-/// Length of the paper's flights \[s\].
+/// Duration of the paper's flights \[s\].
 const DURATION_S: f64 = 120.0;
-/// Looks at the flight, as often as the reference's \[Hz\].
+/// Sampling rate, equal to that of the reference \[Hz\].
 const RATE_HZ: f64 = 10.0;
-/// Reached means a largest edge error below this \[m\].
+/// Largest edge error of a reached formation \[m\].
 const REACHED_M: f64 = 0.01;
-/// Error of a formation that is reached as well as doubles can hold it, after 120 s in which common motion has grown by
-/// e^12 \[m\].
+/// Largest edge error of a formation that is reached to working precision, after 120 s of common growth by e^12 \[m\].
 const CONVERGED_M: f64 = 1e-9;
-/// How far the start is turned to see what follows \[rad\].
+/// Rotation of the start \[rad\].
 const TURN_RAD: f64 = 1.0;
-/// Coefficients \[1/s\] between which relative motion is compared, and when \[s\].
+/// Coefficients \[1/s\] between which relative motion is compared, and the time of the comparison \[s\].
 const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
 const COMPARED_S: f64 = 10.0;
 
-/// Whether a number agrees with a printed one, to half a unit of its last digit.
+/// Returns whether a number agrees with a printed one, to half a unit of its last digit.
 fn agrees(measured: f64, printed: &str) -> bool {
     let decimals = printed.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     printed.parse::<f64>().is_ok_and(|expected| (measured - expected).abs() <= 0.5 * libm::exp10(-(decimals as f64)))
 }
 
-/// Holds these numbers against those of the independent integrator, which are what the claim expects, in its order.
+/// Compares numbers with those of the independent integrator, which the claim expects in the same order.
 fn against_reference(claim: Claim, measured: &[f64]) -> Claim {
     let expected: Vec<_> = claim.expected.split(", ").filter_map(|entry| entry.split_once(' ')).collect();
     let entries = || expected.iter().zip(measured).map(|(&(name, printed), &measured)| (name, printed, measured));
@@ -44,7 +43,7 @@ fn against_reference(claim: Claim, measured: &[f64]) -> Claim {
     claim.measured(entries().map(words).collect::<Vec<_>>().join(", "), values).pass(pass)
 }
 
-/// An experiment: the scenario, its flight, and its numbers.
+/// Scenario with its flight.
 struct Experiment {
     scenario: Scenario,
     times_s: Vec<f64>,
@@ -52,17 +51,18 @@ struct Experiment {
 }
 
 impl Experiment {
-    fn fly(scenario: Scenario) -> Result<Self, Untried> {
+    fn fly(scenario: Scenario) -> Result<Self, MeasureError> {
         let times_s = times(DURATION_S, RATE_HZ);
         let solution = continuous(&scenario, &times_s, Tolerances::default())?;
         Ok(Self { scenario, times_s, solution })
     }
 
-    fn energy_initial(&self) -> Result<f64, Untried> {
+    fn energy_initial(&self) -> Result<f64, MeasureError> {
         Ok(self.scenario.law()?.energy(&self.scenario.observation(&self.scenario.start)).unwrap_or(f64::NAN))
     }
 
-    /// The closest approach \[m\] and its time \[s\]. Its pair is not told: mirror images come equally close.
+    /// Returns the smallest separation \[m\] and its time \[s\]. Its pair is not unique: mirror images come equally
+    /// close.
     fn closest(&self) -> (f64, f64) {
         self.solution.closest.map_or((f64::NAN, f64::NAN), |closest| (closest.separation_m, closest.time_s))
     }
@@ -80,13 +80,12 @@ impl Experiment {
         largest_edge_error_m(self.last_positions_m(), self.scenario.formation(), &self.scenario.graph)
     }
 
-    /// The paper's statement about a figure under the edge-tension law: formed, and never below delta.
-    fn formed(&self, id: &str) -> Result<Claim, Untried> {
+    /// Returns the claim about a figure under the edge-tension law: reached, and never below delta.
+    fn formed(&self, id: &str) -> Result<Claim, MeasureError> {
         let (min_m, at_s) = self.closest();
         let (reached_at_s, error_m) = (self.reached_at_s(), self.last_edge_error_m());
         let words = format!(
-            "closest {min_m:.6} m at {at_s:.3} s; largest edge error below {REACHED_M} m from {reached_at_s:.1} s on, {} m \
-             after {DURATION_S} s",
+            "closest {min_m:.6} m at {at_s:.3} s; reached at {reached_at_s:.1} s; edge error {} m after {DURATION_S} s",
             bound(error_m, CONVERGED_M)
         );
         let values =
@@ -96,8 +95,8 @@ impl Experiment {
     }
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
-    let parts: [fn() -> Judged; 6] = [
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
+    let parts: [fn() -> ClaimsResult; 6] = [
         pentagon,
         circle,
         || Ok(vec![baseline()?]),
@@ -108,7 +107,7 @@ pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     Ok(try_each(&parts, progress, |part| part())?.concat())
 }
 
-fn pentagon() -> Judged {
+fn pentagon() -> ClaimsResult {
     let flight = Experiment::fly(builtin("pentagon")?)?;
     let mut law = flight.scenario.law()?;
     let mut control = Rows::zeros(flight.scenario.count());
@@ -130,19 +129,19 @@ fn pentagon() -> Judged {
     Ok(vec![flight.formed("figure-2")?, against_reference(stated("figure-2-reference")?, &measured)])
 }
 
-fn circle() -> Judged {
+fn circle() -> ClaimsResult {
     let flight = Experiment::fly(builtin("circle")?)?;
     let (min_m, min_at_s) = flight.closest();
     let measured = [flight.energy_initial()?, certified_m(&flight.scenario)?, min_m, min_at_s, flight.reached_at_s()];
     Ok(vec![flight.formed("figure-3")?, against_reference(stated("figure-3-reference")?, &measured)])
 }
 
-fn baseline() -> Result<Claim, Untried> {
+fn baseline() -> Result<Claim, MeasureError> {
     let flight = Experiment::fly(builtin("pentagon-laplacian")?)?;
     let (min_m, min_at_s) = flight.closest();
     let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
     let words = format!(
-        "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s, largest edge error {} m after \
+        "closest {min_m:.4} m at {min_at_s:.2} s, delta = {delta_m} m; reached at {:.1} s; edge error {} m after \
          {DURATION_S} s",
         flight.reached_at_s(),
         bound(error_m, CONVERGED_M)
@@ -152,14 +151,14 @@ fn baseline() -> Result<Claim, Untried> {
     Ok(stated("figure-4")?.measured(words, values).pass(pass))
 }
 
-fn straight_line() -> Result<Claim, Untried> {
+fn straight_line() -> Result<Claim, MeasureError> {
     let flight = Experiment::fly(builtin("pentagon-collinear")?)?;
     let (min_m, _) = flight.closest();
     let error_m = flight.last_edge_error_m();
     let states = &flight.solution.states;
     let off_line_m = states.iter().map(|state| state.positions_m.columns(1, 2).amax()).fold(0.0, f64::max);
     let words = format!(
-        "largest distance from the line {}; closest {min_m:.6} m; largest edge error {error_m:.2} m after {DURATION_S} s",
+        "distance from the line {}; closest {min_m:.6} m; edge error {error_m:.2} m after {DURATION_S} s",
         if off_line_m == 0.0 { "exactly 0".to_owned() } else { format!("{off_line_m:.1e} m") }
     );
     let pass = off_line_m == 0.0 && agrees(min_m, "2.458145") && agrees(error_m, "8.57");
@@ -167,8 +166,8 @@ fn straight_line() -> Result<Claim, Untried> {
     Ok(stated("straight-line")?.measured(words, values).pass(pass))
 }
 
-/// F6: turn and mirror the start, and everything that follows is turned and mirrored with it.
-fn up_to_rigid_motion() -> Result<Claim, Untried> {
+/// Finding F6: a rotated and mirrored start gives a rotated and mirrored flight.
+fn up_to_rigid_motion() -> Result<Claim, MeasureError> {
     let straight = Experiment::fly(builtin("pentagon")?)?;
     let (sin, cos) = libm::sincos(TURN_RAD);
     let mut scenario = straight.scenario.clone();
@@ -183,15 +182,14 @@ fn up_to_rigid_motion() -> Result<Claim, Untried> {
     let fits_m = [straight.last_positions_m(), positions_m].map(|end_m| procrustes_rms_m(end_m, formation));
     let fit_m = fits_m[0].max(fits_m[1]);
     let motion = best_rigid_motion(positions_m, formation);
-    // In space a flat shape is turned over instead of mirrored: what counts is the motion within the plane.
+    // In space a flat shape is turned over instead of mirrored, so only the motion within the plane counts.
     let mirrored = motion.is_some_and(|motion| motion.rotation.fixed_view::<2, 2>(0, 0).determinant() < 0.0);
-    // The image of the x axis: a side of the pentagon.
+    // The image of the x axis is a side of the pentagon.
     let turn_rad = motion.map_or(f64::NAN, |motion| motion.rotation[(1, 0)].atan2(motion.rotation[(0, 0)]));
     let offsets_m = (0..formation.count()).map(|i| (row(positions_m, i) - row(&formation.slots_m, i)).norm());
     let farthest_m = offsets_m.fold(0.0, f64::max);
     let words = format!(
-        "best rigid fit {} m (rms) either way; turned by {turn_rad:.6} rad and {}; a vehicle is {farthest_m:.2} m from its \
-         slot",
+        "rigid fit of both ends {} m (rms); turned by {turn_rad:.6} rad and {}; up to {farthest_m:.2} m from the slots",
         bound(fit_m, CONVERGED_M),
         if mirrored { "mirrored" } else { "not mirrored" }
     );
@@ -201,8 +199,8 @@ fn up_to_rigid_motion() -> Result<Claim, Untried> {
     Ok(stated("up-to-rigid-motion")?.measured(words, values).pass(pass))
 }
 
-/// Relative motion on the complete graph is the same for every a22.
-fn relative_motion() -> Result<Claim, Untried> {
+/// Relative motion on the complete graph does not depend on a22.
+fn relative_motion() -> Result<Claim, MeasureError> {
     let ends = try_each(&A22_PER_S, &|_| (), |&a22_per_s| {
         let mut scenario = Scenario { a22_per_s, ..builtin("pentagon")? };
         scenario.time.duration_s = COMPARED_S;
@@ -212,9 +210,7 @@ fn relative_motion() -> Result<Claim, Untried> {
     let [first, others @ ..] = &ends[..] else { return Err("no flight to compare".into()) };
     let apart_m = |other| (0..first.count()).map(move |i| (offset(other, i) - offset(first, i)).norm());
     let difference_m = others.iter().flat_map(apart_m).fold(0.0, larger);
-    let words = format!(
-        "relative positions after {COMPARED_S} s differ by {} m between a22 of {A22_PER_S:?} 1/s",
-        bound(difference_m, CONVERGED_M)
-    );
+    let words =
+        format!("difference after {COMPARED_S} s {} m, a22 = {A22_PER_S:?} 1/s", bound(difference_m, CONVERGED_M));
     Ok(stated("relative-motion")?.measured(words, [("largest_difference_m", difference_m)]).within_limit())
 }

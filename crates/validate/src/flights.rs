@@ -1,10 +1,10 @@
-//! Flights that claims are judged by, in continuous time and in the physics engine.
+//! Flights in continuous time and in Rapier, for the measurements of claims.
 
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 
-use super::claim::Untried;
+use super::claim::MeasureError;
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{ClosestApproach, Swarm, mean_row, row, set_row};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
@@ -14,57 +14,61 @@ use tautline_sim::continuous::{self, Solution, Tolerances};
 use tautline_sim::scenario::{PlantSpec, Scenario, Source, Space, offset, random, scatter};
 use tautline_sim::sim::{self, Ending, Flight, Parts};
 
-/// The embedded scenario of this name.
-pub(super) fn builtin(name: &str) -> Result<Scenario, Untried> {
+/// Returns a built-in scenario.
+pub(super) fn builtin(name: &str) -> Result<Scenario, MeasureError> {
     Ok(Scenario::read(&Source::Builtin(name.to_owned()), &[])?)
 }
 
-/// 0, 1/rate, 2/rate, ... up to a duration \[s\], for a rate \[Hz\] that divides it.
+/// Returns 0, 1/rate, 2/rate, ... up to a duration \[s\], for a rate \[Hz\] that divides it.
 pub(super) fn times(duration_s: f64, rate_hz: f64) -> Vec<f64> {
     (0..u32::MAX).map(|k| f64::from(k) / rate_hz).take_while(|&time_s| time_s <= duration_s).collect()
 }
 
-/// The scenario in continuous time, with its states at these times \[s\].
-pub(super) fn continuous(scenario: &Scenario, times_s: &[f64], tolerances: Tolerances) -> Result<Solution, Untried> {
+/// Flies a scenario in continuous time and returns its states at these times \[s\].
+pub(super) fn continuous(
+    scenario: &Scenario,
+    times_s: &[f64],
+    tolerances: Tolerances,
+) -> Result<Solution, MeasureError> {
     let mut law = scenario.law()?;
     Ok(continuous::solve(scenario, law.as_mut(), times_s, tolerances)?)
 }
 
-/// Where the scenario is in continuous time after its duration.
-pub(super) fn end(scenario: &Scenario, tolerances: Tolerances) -> Result<Swarm, Untried> {
+/// Returns the state in continuous time at the end of a scenario.
+pub(super) fn end(scenario: &Scenario, tolerances: Tolerances) -> Result<Swarm, MeasureError> {
     let last = continuous(scenario, &[scenario.time.duration_s], tolerances)?.states.pop();
     Ok(last.unwrap_or_else(|| scenario.start.clone()))
 }
 
-/// The separation certified before the first step \[m\]; NaN where there is none.
-pub(super) fn certified_m(scenario: &Scenario) -> Result<f64, Untried> {
+/// Returns the separation certified before the first step \[m\]; NaN without a certificate.
+pub(super) fn certified_m(scenario: &Scenario) -> Result<f64, MeasureError> {
     let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start), &[]);
     Ok(certificate.certified_m.unwrap_or(f64::NAN))
 }
 
-/// The separation of a closest approach \[m\]; NaN where there is none.
+/// Returns the separation of a closest approach \[m\]; NaN without one.
 pub(super) fn separation_m(closest: Option<ClosestApproach>) -> f64 {
     closest.map_or(f64::NAN, |closest| closest.separation_m)
 }
 
-/// The larger number; NaN where either is.
+/// Returns the larger number; NaN if either is NaN.
 pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// `v_i - mean v` \[m/s\].
+/// Returns `v_i - mean v` of each vehicle \[m/s\].
 pub(super) fn relative_velocities(swarm: &Swarm) -> impl Iterator<Item = Vector3<f64>> + '_ {
     let mean = mean_row(&swarm.velocities_m_s);
     (0..swarm.count()).map(move |i| row(&swarm.velocities_m_s, i) - mean)
 }
 
-/// `sum |v_i - mean v|^2`
+/// Returns `sum |v_i - mean v|^2`.
 pub(super) fn relative_speed_squared(swarm: &Swarm) -> f64 {
     relative_velocities(swarm).map(|v| v.norm_squared()).sum()
 }
 
-/// The scenario in the physics engine, step by step, to its duration; `observe` sees every recorded sample.
-pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, Untried> {
+/// Flies a scenario in Rapier to its end; `observe` receives every recorded sample.
+pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, MeasureError> {
     let flight = engine_to_any_end(scenario, scenario.law()?, observe)?;
     match flight.ending {
         Ending::Completed => Ok(flight),
@@ -75,17 +79,17 @@ pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> R
     }
 }
 
-/// The scenario in the physics engine under this law, to whatever end it comes.
+/// Flies a scenario in Rapier under a law, to any ending.
 pub(super) fn engine_to_any_end(
     scenario: &Scenario,
     law: Box<dyn Law>,
     observe: impl FnMut(&Sample<'_>),
-) -> Result<Flight, Untried> {
+) -> Result<Flight, MeasureError> {
     let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, Parts::under(scenario, law), &mut Watch(observe), go_on)?)
+    Ok(sim::fly(scenario, Parts::under(scenario, law), &mut SampleSink(observe), go_on)?)
 }
 
-/// The same scenario in Rapier at another step \[s\], with every step recorded and taken as it is.
+/// Returns the scenario in Rapier with another step \[s\], every step recorded, without refinement.
 pub(super) fn with_step(scenario: &Scenario, dt_s: f64) -> Scenario {
     let mut scenario = scenario.clone();
     scenario.plant = PlantSpec::Rapier;
@@ -95,7 +99,7 @@ pub(super) fn with_step(scenario: &Scenario, dt_s: f64) -> Scenario {
     scenario
 }
 
-/// The first of these times \[s\] from which on the largest edge error stays below `tolerance_m` \[m\].
+/// Returns the first of these times \[s\] after which the largest edge error stays below `tolerance_m` \[m\].
 pub(super) fn reached_at_s(
     times_s: &[f64],
     states: &[Swarm],
@@ -108,10 +112,10 @@ pub(super) fn reached_at_s(
     times_s.get(states.len() - held).copied()
 }
 
-/// A recorder that shows each sample to a function.
-struct Watch<F>(F);
+/// Sink that passes each sample to a function.
+struct SampleSink<F>(F);
 
-impl<F: FnMut(&Sample<'_>)> Sink for Watch<F> {
+impl<F: FnMut(&Sample<'_>)> Sink for SampleSink<F> {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         (self.0)(sample);
         Ok(())
@@ -122,28 +126,28 @@ impl<F: FnMut(&Sample<'_>)> Sink for Watch<F> {
     }
 }
 
-/// Fewest and most vehicles of a random start.
+/// Admitted numbers of vehicles of a random start.
 pub(super) const COUNTS: std::ops::RangeInclusive<usize> = 3..=8;
 /// Safety distance \[m\].
 pub(super) const DELTA_M: f64 = 1.0;
-/// Smallest separation of start positions and of slots over delta: starts may be tight.
+/// Smallest separation of starts and of slots, divided by delta; starts may be tight.
 const START_SPACING: f64 = 1.05;
 const SLOT_SPACING: f64 = 1.2;
-/// Half side of the square or cube of start positions over delta, and of that of the slots.
+/// Half side of the square or cube of starts, divided by delta, and the same for slots.
 const START_EXTENT: f64 = 4.0;
 const SLOT_EXTENT: f64 = 3.0;
 /// Largest velocity component \[m/s\] of a moving start.
 const SPEED_M_S: f64 = 0.5;
 
-/// So many flights of a random swarm to a random shape: the numbers of vehicles take turns, so do plane and space, and
-/// every other start moves.
-pub(super) fn random_starts(seed: u64, count: usize, duration_s: f64) -> Result<Vec<Scenario>, Untried> {
+/// Returns flights of random swarms to random shapes. The number of vehicles and plane or space take turns, and every
+/// second start moves.
+pub(super) fn random_starts(seed: u64, count: usize, duration_s: f64) -> Result<Vec<Scenario>, MeasureError> {
     let sizes: Vec<usize> = COUNTS.collect();
     (0..count)
         .map(|trial| {
             let (vehicles, round) = (sizes[trial % sizes.len()], trial / sizes.len());
             let space = if round.is_multiple_of(2) { Space::Plane } else { Space::Volume };
-            // A stream of its own for each trial: none depends on how many numbers another one took.
+            // Each trial has its own stream, independent of the numbers that other trials draw.
             let mut random = random(seed);
             random.set_stream(trial as u64);
             let mut points =
@@ -165,11 +169,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_flight_that_ends_early_is_an_error_and_not_a_short_flight() {
+    fn a_flight_that_ends_early_is_an_error() {
         let mut scenario = builtin("pentagon").expect("a scenario");
         scenario.time.duration_s = 0.1;
         assert!(engine(&scenario, |_| ()).is_ok());
-        // Closer than delta within the first step, which is not refused.
+        // Closer than delta within the first step, without refinement.
         scenario.time.max_halvings = 0;
         scenario.start.velocities_m_s[(0, 0)] = 600.0;
         let error = engine(&scenario, |_| ()).expect_err("the law is undefined below delta");

@@ -1,6 +1,6 @@
-//! The law (8) at single instants: its matrix form, its sum, and what it does to the energy.
+//! Edge-tension law (8) at single instants: matrix form, sum of controls, and energy rate.
 
-use super::claim::{Claim, Judged, Progress, Untried, stated};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated};
 use super::flights::{DELTA_M, random_starts};
 use super::flights::{larger, relative_speed_squared, relative_velocities};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, set_row};
@@ -12,15 +12,15 @@ use tautline_laws::law::{
 };
 use tautline_laws::observation::Observation;
 
-/// Random states that each claim is tried on; every one with each kind of graph.
+/// Number of random states of each claim, each with every kind of graph.
 const STATES: usize = 200;
 const SEED: u64 = 1;
 /// Scale of the edge tension \[m^2/s^2\].
 const ALPHA: f64 = 1.0;
-/// Values of a22 \[1/s\] that a state is tried with.
+/// Values of a22 \[1/s\] of each state.
 const A22_PER_S: [f64; 3] = [-0.5, 0.0, 0.1];
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     let states = states()?;
     let claims = vec![
         matrix_form(&states)?,
@@ -33,7 +33,7 @@ pub(super) fn judge(progress: &Progress<'_>) -> Judged {
     Ok(claims)
 }
 
-/// A state, and the law for it.
+/// State with its law.
 struct State {
     swarm: Swarm,
     graph: Graph,
@@ -42,20 +42,21 @@ struct State {
 }
 
 impl State {
-    fn law(&self) -> Result<EdgeTensionLaw, Untried> {
+    fn law(&self) -> Result<EdgeTensionLaw, MeasureError> {
         let context = LawContext::new(&self.graph, &self.formation, DELTA_M, self.a22_per_s);
         Ok(EdgeTensionLaw::new(&context, EdgeTensionKeys { alpha: ALPHA })?)
     }
 
-    fn control(&self) -> Result<Rows, Untried> {
+    fn control(&self) -> Result<Rows, MeasureError> {
         let mut control = Rows::zeros(self.swarm.count());
         self.law()?.command(&Observation::exact(&self.swarm, &self.graph, &self.formation), &mut control)?;
         Ok(control)
     }
 
-    /// dE/dt at this state, from E alone: the sum of v~ v~' + (1/N) grad V v, with the gradient taken edge by edge from
-    /// [`EdgeTension`]; and the sum of the sizes of its terms.
-    fn energy_rate(&self) -> Result<(f64, f64), Untried> {
+    /// Returns dE/dt at this state from E, and the sum of the magnitudes of its terms.
+    ///
+    /// `dE/dt = sum v~ v~' + (1/N) grad V v`, with the gradient from [`EdgeTension`] edge by edge.
+    fn energy_rate(&self) -> Result<(f64, f64), MeasureError> {
         let (swarm, count) = (&self.swarm, self.swarm.count() as f64);
         let control = self.control()?;
         let accelerations = swarm.velocities_m_s.clone() * self.a22_per_s + control;
@@ -72,9 +73,9 @@ impl State {
     }
 }
 
-/// Random swarms of 3 to 8 vehicles in plane and space, each on the complete graph, a ring and a star, and each with a
-/// shape of random slots.
-fn states() -> Result<Vec<State>, Untried> {
+/// Returns random swarms of 3 to 8 vehicles in plane and space, on the complete graph, a ring and a star, each with
+/// random slots.
+fn states() -> Result<Vec<State>, MeasureError> {
     let mut states = Vec::new();
     for (k, scenario) in random_starts(SEED, STATES, 1.0)?.into_iter().enumerate() {
         let count = scenario.count();
@@ -90,45 +91,45 @@ fn states() -> Result<Vec<State>, Untried> {
     Ok(states)
 }
 
-/// The claim that a ratio is within rounding at every state; `words` says so of the bound of the largest, which has this
-/// name.
+/// Returns the claim that a ratio is within rounding at every state. `words` describes the bound of the largest ratio,
+/// whose name is `name`.
 fn within_rounding(
     states: &[State],
     id: &str,
     name: &'static str,
     words: impl Fn(&str) -> String,
-    ratio: impl Fn(&State) -> Result<f64, Untried>,
-) -> Result<Claim, Untried> {
+    ratio: impl Fn(&State) -> Result<f64, MeasureError>,
+) -> Result<Claim, MeasureError> {
     let claim = stated(id)?;
-    let largest = states.iter().try_fold(0.0, |largest, state| Ok::<_, Untried>(larger(largest, ratio(state)?)))?;
+    let largest =
+        states.iter().try_fold(0.0, |largest, state| Ok::<_, MeasureError>(larger(largest, ratio(state)?)))?;
     let words = words(&bound(largest, claim.limit()));
     Ok(claim.measured(words, [(name, largest)]).within_limit())
 }
 
-fn matrix_form(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest difference {bound} of the largest component, {} states", states.len());
+fn matrix_form(states: &[State]) -> Result<Claim, MeasureError> {
+    let words = |bound: &str| format!("difference {bound} of the largest component, {} states", states.len());
     within_rounding(states, "matrix-form", "largest_relative_difference", words, |state| {
         let control = state.control()?;
         Ok((state.law()?.matrix_form(&state.swarm)? - &control).amax() / control.amax())
     })
 }
 
-fn zero_sum(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest mean {bound} of the largest component, {} states", states.len());
+fn zero_sum(states: &[State]) -> Result<Claim, MeasureError> {
+    let words = |bound: &str| format!("mean {bound} of the largest component, {} states", states.len());
     within_rounding(states, "zero-net-control", "largest_relative_mean", words, |state| {
         let control = state.control()?;
         Ok(mean_row(&control).norm() / control.amax())
     })
 }
 
-/// A number relative to the size of the terms that it is a sum of; a swarm at rest has none.
+/// Returns a number relative to the magnitude of its terms; 0 for a swarm at rest.
 fn of_scale(number: f64, scale: f64) -> f64 {
     if scale == 0.0 && number == 0.0 { 0.0 } else { number / scale }
 }
 
-fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
-    let words =
-        |bound: &str| format!("largest relative error {bound} over {STATES} states with a22 of {A22_PER_S:?} 1/s");
+fn energy_rate(states: &[State]) -> Result<Claim, MeasureError> {
+    let words = |bound: &str| format!("relative error {bound}, {STATES} states, a22 = {A22_PER_S:?} 1/s");
     within_rounding(states, "energy-rate", "largest_relative_error", words, |state| {
         if !state.graph.is_complete() {
             return Ok(0.0);
@@ -138,8 +139,8 @@ fn energy_rate(states: &[State]) -> Result<Claim, Untried> {
     })
 }
 
-fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
-    let words = |bound: &str| format!("largest relative excess {bound} over {} states", states.len());
+fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, MeasureError> {
+    let words = |bound: &str| format!("relative excess {bound}, {} states", states.len());
     within_rounding(states, "energy-rate-on-graphs", "largest_relative_excess", words, |state| {
         let (rate, scale) = state.energy_rate()?;
         let (a22, connectivity) = (state.a22_per_s, state.graph.algebraic_connectivity());
@@ -148,8 +149,8 @@ fn energy_rate_on_graphs(states: &[State]) -> Result<Claim, Untried> {
     })
 }
 
-/// Equation (3) with h as section 4 writes it, zeros over `h_p`: the goal is then a velocity.
-fn literal_baseline() -> Result<Claim, Untried> {
+/// Equation (3) with h as in section 4, zeros over `h_p`: the goal is then a velocity.
+fn literal_baseline() -> Result<Claim, MeasureError> {
     const A22_PER_S: f64 = 0.1;
     let goal = Formation::pentagon(3.0);
     let count = goal.count();
@@ -169,10 +170,8 @@ fn literal_baseline() -> Result<Claim, Untried> {
     };
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
     let claim = stated("goal-as-printed")?;
-    let words = format!(
-        "at rest at h_p the law still commands {at_goal:.4} m/s^2, at {f2_per_s} h_p {}",
-        bound(at_scaled, claim.limit())
-    );
+    let words =
+        format!("command at rest: {at_goal:.4} m/s^2 at h_p, {} at {f2_per_s} h_p", bound(at_scaled, claim.limit()));
     let pass = at_goal > 0.1 && at_scaled <= claim.limit();
     let values = [("control_at_goal_m_s2", at_goal), ("control_at_scaled_goal_m_s2", at_scaled)];
     Ok(claim.measured(words, values).pass(pass))

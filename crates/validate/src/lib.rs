@@ -1,12 +1,11 @@
-//! Every claim of ours and of the paper, judged by measurement.
+//! Measurement of every claim of tautline and of its source paper.
 //!
-//! [`validate`] flies and computes everything anew and returns [`Claim`]s in a fixed order; [`judge`] does one group of
-//! them. Claims and trials run side by side on the threads of the current rayon pool; every random start has a stream of
-//! its own and every sum is taken in index order, so the answer does not depend on the number of threads.
+//! [`validate`] measures all claims and returns them as [`Claim`]s in a fixed order; [`judge`] measures one group.
+//! Claims and trials run in parallel on the current rayon pool. Every random start has its own stream and every sum has
+//! a fixed order, so the result does not depend on the number of threads.
 //!
-//! A statement of the paper that fails is reported as refuted, with our own measurement: what must hold then is the
-//! refutation. [`Validation::pass`] asks every claim to be as expected. [`validate_into`] writes result, page and figures
-//! to a folder.
+//! A wrong statement of the paper is expected to be refuted. [`Validation::pass`] requires every claim to be as
+//! expected. [`validate_into`] writes result, page and figures to a folder.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
@@ -32,12 +31,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use claim::{Judged, Progress, Untried};
+use claim::{ClaimsResult, MeasureError, Progress};
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, OutFolder, in_range, svg_files, threads, write_files};
 
-/// A file of claims: its name, its subject, the units of work that it counts, and its judgement.
-type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> Judged);
+/// Group of claims: name, subject, units of work, and measurement.
+type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> ClaimsResult);
 
 const PARTS: [Part; 8] = [
     ("tension", "The edge tension", 1, tension::judge),
@@ -49,30 +48,30 @@ const PARTS: [Part; 8] = [
     ("displacement", "The displacement law", displacement::WORK, displacement::judge),
     ("margins", "Margins of delay and of held commands", margins::WORK, margins::judge),
 ];
-/// Convergence, free motion, and three flights.
+/// Units of work of convergence, free motion, and three flights.
 const ENGINE_WORK: u64 = convergence::STEPS_HZ.len() as u64 + 1 + 3;
 
-/// Units of work that [`validate`] counts in all.
+/// Returns the units of work of [`validate`].
 #[must_use]
 pub fn work() -> u64 {
     PARTS.iter().map(|&(_, _, work, _)| work).sum::<u64>() + ENGINE_WORK
 }
 
-/// Judges the claims of one group that needs no figure, by its name: `tension`, `law`, `certificate`, `figures`,
-/// `equilibria`, `rates`, `displacement` or `margins`. None where there is no such group.
+/// Measures the claims of one group without figures: `tension`, `law`, `certificate`, `figures`, `equilibria`, `rates`,
+/// `displacement` or `margins`. Returns `None` for another name.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
     PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&|_| ())))
 }
 
-/// Judges every claim. `progress` is told how many further units of [`work`] are done, from any thread.
+/// Measures every claim. `progress` receives the number of finished units of [`work`], from any thread.
 ///
-/// Claims that cannot be tried, because a flight of theirs fails, stand as one that fails.
+/// If a flight fails, its group has a single claim, which fails.
 #[must_use]
 pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
     let began = Instant::now();
     let parts = || PARTS.par_iter().map(|&(id, title, _, judge)| group(id, title, judge(progress))).collect::<Vec<_>>();
-    let engine = || -> Result<_, Untried> {
+    let engine = || -> Result<_, MeasureError> {
         let convergence = convergence::measure(progress)?;
         let mut claims = convergence::claims(&convergence)?;
         claims.push(convergence::free_decay(progress)?);
@@ -95,31 +94,31 @@ pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
     Validation::new(groups, convergence, figures, began.elapsed().as_secs_f64())
 }
 
-fn group(id: &'static str, title: &'static str, judged: Judged) -> Group {
-    Group { id, title, claims: judged.unwrap_or_else(|error| vec![Claim::untried(&error)]) }
+fn group(id: &'static str, title: &'static str, judged: ClaimsResult) -> Group {
+    Group { id, title, claims: judged.unwrap_or_else(|error| vec![Claim::failed_group(&error)]) }
 }
 
-/// The page for people.
+/// File name of the page.
 const PAGE: &str = "validate.html";
-/// Most threads.
+/// Largest number of threads.
 const MOST_THREADS: usize = 256;
 
-/// Where a validation leaves its files.
+/// Request for a validation with files.
 #[derive(Clone, Debug)]
 pub struct ValidateRequest {
-    /// Folder for `validate.json` and the rest.
+    /// Folder for `validate.json`, the page and figures.
     pub out: PathBuf,
-    /// Whether a folder that holds a finished validation is overwritten.
+    /// Whether a folder with a finished validation is overwritten.
     pub force: bool,
-    /// Threads to use, by default one a core. The result is the same for any number.
+    /// Number of threads, by default one for each core. The result is the same for any number.
     pub threads: Option<usize>,
 }
 
-/// Judges every claim and leaves `validate.json`, `validate.html` and figures in a folder. The result, which marks the
-/// folder as finished, comes last.
+/// Measures every claim and writes `validate.json`, `validate.html` and figures to a folder. `validate.json` marks the
+/// folder as finished and is written last.
 ///
 /// # Errors
-/// [`Failure`] where the folder holds a finished validation, or the system refuses.
+/// [`Failure`] if the folder holds a finished validation, or a file cannot be written.
 pub fn validate_into(request: &ValidateRequest, monitor: &dyn Monitor) -> Result<Validation, Failure> {
     if let Some(number) = &request.threads {
         in_range("--threads", number, &(1..=MOST_THREADS))?;

@@ -1,6 +1,6 @@
-//! Margins of delay and of held commands: where a disturbance of a millimetre begins to grow, against linear theory.
+//! Margins of delays and of held commands: growth of a disturbance of 1 mm against linear theory.
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{builtin, larger};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Swarm, mean_row, row, set_row};
@@ -9,34 +9,34 @@ use tautline_laws::law::{DisplacementKeys, LawSpec, Linear};
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::{self, Ending, Parts};
 
-/// Units of work.
+/// Number of units of work.
 pub(super) const WORK: u64 = 3 * GRAPHS.len() as u64 + 2;
 
 const GRAPHS: [&str; 3] = ["complete", "star", "ring"];
-/// A tension that pushes nobody in the time of a flight.
+/// Tension so small that no pair pushes during a flight.
 const NO_TENSION: f64 = 1e-8;
 /// Size of the disturbance \[m\].
 const DISTURBANCE_M: f64 = 1e-3;
-/// Looks at a flight, and steps of it, a second \[Hz\].
-const LOOKS_HZ: f64 = 10.0;
-/// Length of a flight in margins of what is heard, which turns slowly, and of anything else \[s\].
+/// Sampling rate and step rate of a flight \[Hz\].
+const SAMPLE_HZ: f64 = 10.0;
+/// Duration of a flight in margins for heard delays, which change slowly, and for other kinds \[s\].
 const LONG_MARGINS: f64 = 25.0;
 const SHORT_S: f64 = 40.0;
-/// Commands of a flight that holds them.
+/// Number of commands in a flight with held commands.
 const COMMANDS: f64 = 80.0;
-/// Halvings of where a margin with the tension on may be, in its logarithm.
+/// Number of halvings of the range of a margin with tension, by its logarithm.
 const HALVINGS: u32 = 6;
-/// Length of such a flight, whose solver is held up wherever a push begins \[s\].
+/// Duration of a flight with tension \[s\]; the solver slows down at every onset of a push.
 const PUSHED_S: f64 = 40.0;
 
-/// Kinds of margin.
+/// Kind of margin.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    /// Of all that vehicles know.
+    /// Delay of all known states.
     KnownLate,
-    /// Of what they hear of others.
+    /// Delay of the states of others.
     HeardLate,
-    /// Between commands.
+    /// Period between commands.
     Held,
 }
 
@@ -66,9 +66,9 @@ impl Kind {
     }
 }
 
-/// The pentagon at its slots but for a millimetre, in continuous time; nobody hears anything before the start, from which on
-/// all drift by a millimetre a second.
-fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, Untried> {
+/// Returns the pentagon in continuous time, displaced from its slots by 1 mm, with a common drift of 1 mm/s. No message
+/// arrives before the start.
+fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, MeasureError> {
     let mut scenario = builtin("pentagon")?;
     let count = scenario.count();
     scenario.law = LawSpec::Displacement(DisplacementKeys { alpha, ..DisplacementKeys::default() });
@@ -88,20 +88,20 @@ fn disturbed(graph: &str, alpha: f64) -> Result<Scenario, Untried> {
     scenario.start = start;
     (scenario.a22_per_s, scenario.plant) = (0.0, PlantSpec::Ideal);
     scenario.time.duration_s = SHORT_S;
-    (scenario.time.dt_s, scenario.time.record_hz) = (1.0 / LOOKS_HZ, LOOKS_HZ);
+    (scenario.time.dt_s, scenario.time.record_hz) = (1.0 / SAMPLE_HZ, SAMPLE_HZ);
     scenario.arrival.hold_s = 0.0;
     scenario.deadlock.mode = tautline_laws::target::DeadlockMode::Off;
     Ok(scenario)
 }
 
-/// Keeps how large the disturbance is at each look: of relative motion, and of common velocity where that counts.
-struct Looks<'a> {
+/// Sink that keeps the size of the disturbance at each sample: relative motion, and optionally the common velocity.
+struct DisturbanceSink<'a> {
     scenario: &'a Scenario,
     counts_common: bool,
     sizes: Vec<(f64, f64)>,
 }
 
-impl Sink for Looks<'_> {
+impl Sink for DisturbanceSink<'_> {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         let errors_m = &sample.swarm.positions_m - &self.scenario.formation().slots_m;
         let (mean_m, mean_m_s) = (mean_row(&errors_m), mean_row(&sample.swarm.velocities_m_s));
@@ -118,30 +118,30 @@ impl Sink for Looks<'_> {
     }
 }
 
-/// Rate at which the disturbance grows \[1/s\] from the second quarter of a flight to its last; infinite where two came too near
-/// to each other.
-fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, Untried> {
+/// Returns the growth rate of the disturbance from the second quarter of a flight to the last \[1/s\]; infinite if the
+/// flight ended early.
+fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, MeasureError> {
     scenario.validate()?;
-    let mut looks = Looks { scenario, counts_common, sizes: Vec::new() };
-    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut looks, &mut |_| std::ops::ControlFlow::Continue(()))?;
+    let mut sink = DisturbanceSink { scenario, counts_common, sizes: Vec::new() };
+    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut sink, &mut |_| std::ops::ControlFlow::Continue(()))?;
     if flight.ending != Ending::Completed {
         return Ok(f64::INFINITY);
     }
     let mean = |from: f64, to: f64| {
-        let within = looks.sizes.iter().filter(|(time_s, _)| (from..to).contains(&(time_s / scenario.time.duration_s)));
+        let within = sink.sizes.iter().filter(|(time_s, _)| (from..to).contains(&(time_s / scenario.time.duration_s)));
         let (sum, number) = within.fold((0.0, 0.0), |(sum, number), (_, size)| (sum + size, number + 1.0));
         sum / number
     };
     Ok(0.5 * libm::log(mean(0.75, 1.0) / mean(0.25, 0.5)) / (0.5 * scenario.time.duration_s))
 }
 
-/// The period between commands that was measured \[s\] and the one predicted, by halving what is within 4 % of the prediction:
-/// two of its conditions may coincide, and then nothing is straight there.
-fn period_s(graph: &str) -> Result<(f64, f64), Untried> {
+/// Returns the measured and the predicted period between commands \[s\], by bisection within 4 % of the prediction. Two
+/// conditions of the prediction may coincide, so the growth rate is not linear there.
+fn period_s(graph: &str) -> Result<(f64, f64), MeasureError> {
     const ASIDE: f64 = 0.04;
     let plain = disturbed(graph, NO_TENSION)?;
     let predicted_s = Kind::Held.predicted_s(&plain.law()?.linear(plain.formation()).ok_or("no modes")?);
-    let grows = |share: f64| -> Result<bool, Untried> {
+    let grows = |share: f64| -> Result<bool, MeasureError> {
         let mut scenario = plain.clone();
         Kind::Held.set(&mut scenario, share * predicted_s);
         Ok(growth_per_s(&scenario, false)? > 0.0)
@@ -157,9 +157,9 @@ fn period_s(graph: &str) -> Result<(f64, f64), Untried> {
     Ok((0.5 * (low + high) * predicted_s, predicted_s))
 }
 
-/// The margin that was measured \[s\] and the one predicted: the rate of growth is found a little below and a little above the
-/// prediction, and is 0 in between where a straight line through both is.
-fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), Untried> {
+/// Returns the measured and the predicted margin \[s\]. The measured margin is the zero of the line through the growth
+/// rates a little below and above the prediction.
+fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), MeasureError> {
     const ASIDE: f64 = 0.03;
     if kind == Kind::Held {
         return period_s(graph);
@@ -179,27 +179,29 @@ fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), Untried> {
     Ok((share * predicted_s, predicted_s))
 }
 
-fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, Untried> {
+fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let margins = try_each(&GRAPHS, progress, |graph| margin_s(kind, graph))?;
     let off = |&(measured_s, predicted_s): &(f64, f64)| (measured_s / predicted_s - 1.0).abs();
     let worst = margins.iter().map(off).fold(0.0, larger);
     let words: Vec<_> = GRAPHS
         .iter()
         .zip(&margins)
-        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} s, predicted {predicted_s:.3} s"))
+        .map(|(graph, (measured_s, predicted_s))| format!("{graph} {measured_s:.3} ({predicted_s:.3})"))
         .collect();
-    Ok(stated(id)?.measured(words.join("; "), [("largest_relative_difference", worst)]).within_limit())
+    Ok(stated(id)?
+        .measured(format!("{} s (predicted)", words.join(", ")), [("largest_relative_difference", worst)])
+        .within_limit())
 }
 
-/// The delay at which a disturbance of the pentagon in contact begins to grow \[s\], between that of the contact formula and that
-/// of the free one.
-fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], Untried> {
+/// Returns the delay at which a disturbance of the pentagon in contact begins to grow, the contact formula and the
+/// formula without contact \[s\], by bisection between the two formulas.
+fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], MeasureError> {
     let mut plain = disturbed("complete", 1.0)?;
     plain.time.duration_s = PUSHED_S;
     let linear = plain.law()?.linear(plain.formation()).ok_or("no modes")?;
     let contact_s = linear.stiffest_contact_mode.map_or(f64::NAN, |mode| mode.delay_margin_s(0.0));
     let free_s = linear.delay_margin_s(0.0);
-    let grows = |latency_s: f64| -> Result<bool, Untried> {
+    let grows = |latency_s: f64| -> Result<bool, MeasureError> {
         let mut scenario = plain.clone();
         scenario.sensing.latency_s = latency_s;
         scenario.sensing.near_latency_s = (!near_is_late).then_some(0.0);
@@ -216,21 +218,20 @@ fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], Untried> {
     Ok([(low_s * high_s).sqrt(), contact_s, free_s])
 }
 
-fn with_tension(progress: &Progress<'_>) -> Result<Claim, Untried> {
+fn with_tension(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let measured = try_each(&[true, false], progress, |&near_is_late| in_contact_s(near_is_late))?;
     let [[late_s, contact_s, free_s], [at_once_s, ..]] = measured[..] else { return Err("no margins".into()) };
     Ok(stated("margin-in-contact")?
         .measured(
             format!(
-                "near ones seen as late as all else {late_s:.2} s, near ones seen at once {at_once_s:.2} s; contact formula \
-                 {contact_s:.3} s, free formula {free_s:.3} s"
+                "contact {contact_s:.3} s, near late {late_s:.2} s, near at once {at_once_s:.2} s, free {free_s:.3} s"
             ),
             [("near_late_s", late_s), ("near_at_once_s", at_once_s), ("contact_s", contact_s), ("free_s", free_s)],
         )
         .pass(contact_s < late_s && late_s < at_once_s && at_once_s < free_s))
 }
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     Ok(vec![
         free("margin-known-late", Kind::KnownLate, progress)?,
         free("margin-heard-late", Kind::HeardLate, progress)?,

@@ -1,14 +1,17 @@
-//! The result in words: a line a claim for the terminal, tables for `docs/validation.md`.
+//! Result of a validation as text, as the tables of `docs/validation.md`, and as a page.
 
-use super::claim::{Claim, Group, Kind, Untried, Validation};
+use super::claim::{Claim, Group, Kind, MeasureError, Validation};
 use super::convergence::Refinement;
-use super::detectors::{Flights, Flown};
+use super::detectors::{BuiltinFlight, Flights};
 use super::tension;
 use tautline_report::figures::{self, Figure, Step};
 use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
+/// Head of the table of a group of claims.
+const HEAD: &str = "| claim | result | statement | measured | tolerance |\n| --- | --- | --- | --- | --- |\n";
+
 impl Validation {
-    /// The result in one line.
+    /// Returns the result in one line.
     #[must_use]
     pub fn headline(&self) -> String {
         let count = |kind: Kind| self.claims().filter(|claim| claim.kind == kind && claim.pass).count();
@@ -17,14 +20,15 @@ impl Validation {
             return format!("NOT VALID: {failed} of {all} claims are not as expected");
         }
         format!(
-            "valid: all {all} claims are as expected: {} of ours hold, {} of the paper's hold, {} of the paper's are refuted",
+            "valid: all {all} claims are as expected: {} of ours hold, {} of the paper's hold, {} of the paper's are \
+             refuted",
             count(Kind::Ours),
             count(Kind::PaperHolds),
             count(Kind::PaperRefuted)
         )
     }
 
-    /// A line a claim: how it fared, its name, what was measured.
+    /// Returns a line for each claim: result, name and measurement.
     #[must_use]
     pub fn text(&self) -> String {
         let width = |of: fn(&Claim) -> usize| self.claims().map(of).max().unwrap_or(0);
@@ -35,37 +39,34 @@ impl Validation {
         })
     }
 
-    /// The generated part of `docs/validation.md`.
+    /// Returns the generated part of `docs/validation.md`.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut page = format!("{}.\n\n## Errata of the paper\n\n{}", capitalised(&self.headline()), self.errata());
         for group in &self.groups {
-            page.extend(["\n## ", group.title, "\n"]);
-            for claim in &group.claims {
-                page += &entry(claim);
-            }
+            page.extend(["\n## ", group.title, "\n\n", HEAD]);
+            page.extend(group.claims.iter().map(entry));
         }
         page + "\n## Convergence ladder\n\n" + &self.convergence_table()
     }
 
     fn errata(&self) -> String {
-        let mut table =
-            "| finding | the statement | what was measured | claim |\n| --- | --- | --- | --- |\n".to_owned();
+        let mut table = "| finding | the paper | correct | claim |\n| --- | --- | --- | --- |\n".to_owned();
         let mut findings: Vec<(&str, &Claim)> = self
             .claims()
             .filter(|claim| claim.kind == Kind::PaperRefuted)
             .filter_map(|claim| Some((claim.finding?, claim)))
             .collect();
         findings.sort_by_key(|&(finding, _)| finding);
-        for (finding, Claim { id, statement, measured, .. }) in findings {
-            table.extend(["| ", finding, " | ", statement, " | ", measured, " | `", id, "` |\n"]);
+        for (finding, Claim { id, statement, source, expected, .. }) in findings {
+            table += &format!("| {finding} | {} ({source}) | {} | `{id}` |\n", cell(statement), cell(expected));
         }
         table
     }
 
     fn convergence_table(&self) -> String {
-        let head = "Largest position error on the pentagon's flight against continuous time, 10 looks a second for 10 \
-                    seconds.\n\n| step [s] | position error [m] | order | energy excess [m^2/s^2] |\n\
+        let head = "Largest position error in the pentagon flight against continuous time, at 10 samples a second for \
+                    10 s.\n\n| step [s] | position error [m] | order | energy excess [m^2/s^2] |\n\
                     | --- | --- | --- | --- |\n";
         let rows = self.convergence.iter().map(|Refinement { dt_s, error_m, order, energy_excess_m2_s2, .. }| {
             let order = order.map_or("-".to_owned(), |order| format!("{order:.2}"));
@@ -81,14 +82,25 @@ fn capitalised(text: &str) -> String {
     rest.next().map(|first| first.to_uppercase().chain(rest).collect()).unwrap_or_default()
 }
 
+/// Returns the row of a claim.
 fn entry(claim: &Claim) -> String {
-    let Claim { id, statement, source, expected, measured, tolerance, reason, .. } = claim;
-    let head = format!("\n### {}: `{id}`\n\n{statement} ({source})\n\n", capitalised(claim.outcome()));
-    head + &format!("- expected: {expected}\n- measured: {measured}\n- tolerance: {tolerance} ({reason})\n")
+    let Claim { id, statement, source, measured, tolerance, .. } = claim;
+    let statement = match (claim.kind, claim.finding) {
+        (Kind::PaperRefuted, Some(finding)) => format!("{finding} above"),
+        (Kind::Ours, _) => (*statement).to_owned(),
+        _ => format!("{statement} ({source})"),
+    };
+    let outcome = claim.outcome();
+    format!("| `{id}` | {outcome} | {} | {} | {tolerance} |\n", cell(&statement), cell(measured))
 }
 
-/// Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
-pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, Untried> {
+/// Escapes a text for a cell of a Markdown table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+/// Draws Figs. 1, 2 (a to c), 3 (a to c) and 4, and the convergence.
+pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<Figure>, MeasureError> {
     let steps: Vec<Step> = convergence.iter().map(|&Refinement { dt_s, error_m, .. }| Step { dt_s, error_m }).collect();
     let mut drawn = vec![named("figure-1", figures::tension_curve(&tension::of_figure_1()?, "Fig. 1: edge tension"))];
     drawn.extend(of_flight(&flights.pentagon, ["figure-2a", "figure-2b", "figure-2c"], "Fig. 2", "pentagon"));
@@ -100,8 +112,8 @@ pub(super) fn draw(flights: &Flights, convergence: &[Refinement]) -> Result<Vec<
     Ok(drawn)
 }
 
-/// Paths, control effort and distances.
-fn of_flight(flown: &Flown, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
+/// Returns the figures of paths, control effort and distances.
+fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str) -> [Figure; 3] {
     let [a, b, c] = names;
     let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
     [
@@ -115,17 +127,17 @@ fn named(name: &str, figure: Figure) -> Figure {
     Figure { name: name.to_owned(), ..figure }
 }
 
-/// What the claims rest on.
+/// Assumptions of the claims.
 const ASSUMED: [&str; 3] = [
-    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, which knows nothing \
+    "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, independent \
      of the physics engine.",
-    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps that line.",
-    "Random starts come from fixed seeds: the same program finds the same numbers.",
+    "Within a step the engine moves every vehicle on a straight line, and the audit sweeps this line.",
+    "Random starts come from fixed seeds, so the same program gives the same numbers.",
 ];
 
 impl Validation {
-    /// The result as a self-contained page: claims, figures and the convergence. Two validations by one program give the same
-    /// bytes.
+    /// Returns the result as a self-contained page: claims, figures and the convergence. The bytes are the same for any
+    /// validation by the same program.
     #[must_use]
     pub fn to_html(&self) -> String {
         let failed = self.claims().filter(|claim| !claim.pass);
@@ -135,12 +147,12 @@ impl Validation {
         sections.extend([
             section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
             section("The paper's figures", &[page::figures(&of_paper)]),
-            section("What was assumed", &[page::list(&ASSUMED)]),
-            section("Repeat it", &[page::command("tautline validate")]),
+            section("Assumptions", &[page::list(&ASSUMED)]),
+            section("Command", &[page::command("tautline validate")]),
         ]);
         Page {
             title: "Validation".to_owned(),
-            kind: "Every claim, ours and the paper's, judged by measurement",
+            kind: "Measurement of every claim of tautline and of its source paper",
             badge: Badge::judged(self.pass),
             verdict: self.headline(),
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
@@ -188,7 +200,7 @@ fn convergence(refinements: &[Refinement]) -> Markup {
         [format!("1/{:.0}", 1.0 / dt_s), error, order, excess]
     };
     page::numbers(
-        "Largest position error of Rapier on the pentagon's flight, by step",
+        "Largest position error of Rapier in the pentagon flight, by step",
         &["Step [s]", "Position error [m]", "Order", "Energy excess [m²/s²]"],
         refinements.iter().map(row),
     )
@@ -212,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refuted_statement_of_the_paper_is_called_refuted_and_is_no_failure() {
+    fn a_refuted_statement_of_the_paper_is_not_a_failure() {
         let judged = validation(vec![
             claim("a", Kind::Ours, true),
             claim("b", Kind::PaperHolds, true),
@@ -224,13 +236,13 @@ mod tests {
         );
         assert_eq!(judged.text().lines().last(), Some("paper: refuted  c  [F9] none"));
         let page = judged.markdown();
-        assert!(page.contains("| F9 | Nothing moves. | none | `c` |"), "{page}");
-        assert!(page.contains("### Paper: refuted: `c`"), "{page}");
+        assert!(page.contains("| F9 | Nothing moves. (equation (0)) | no motion | `c` |"), "{page}");
+        assert!(page.contains("| `c` | paper: refuted | F9 above | none |"), "{page}");
         assert!(judged.to_html().contains("paper: refuted"));
     }
 
     #[test]
-    fn a_claim_that_is_not_as_expected_is_never_hidden() {
+    fn a_claim_that_is_not_as_expected_is_reported() {
         for (kind, outcome) in [(Kind::Ours, "FAILS"), (Kind::PaperHolds, "FAILS"), (Kind::PaperRefuted, "NOT REFUTED")]
         {
             let judged = validation(vec![claim("a", Kind::Ours, true), claim("b", kind, false)]);

@@ -1,8 +1,8 @@
-//! Rates of growth and decay near the formation: F4, F5 and the star.
+//! Rates of growth and decay near the formation: findings F4 and F5, and stars.
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::claim::{Claim, Judged, Progress, Untried, stated, try_each};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
 use tautline_core::swarm::{Rows, Swarm, mean_row, set_row};
 use tautline_core::text::bound;
@@ -13,39 +13,39 @@ use tautline_sim::scenario::{Scenario, Space};
 use tautline_sim::sim::Ending;
 
 const A22_PER_S: f64 = 0.1;
-/// The hexagon of the paper's second example.
+/// Number of vehicles of the paper's second example.
 const HEXAGON: usize = 6;
 const RADIUS_M: f64 = 1.5;
 const DELTA_M: f64 = 1.0;
-/// How far the hexagon is bent out of its plane, root sum of squares \[m\].
+/// Initial bend of the hexagon out of its plane, root of the sum of squares \[m\].
 const BEND_M: f64 = 0.16;
-/// When the bend is measured \[s\]: early, and late enough for the power law.
+/// Times at which the bend is measured \[s\]: early times, and times late enough for the power law.
 const BEND_TIMES_S: [f64; 4] = [100.0, 300.0, 10_000.0, 30_000.0];
 
-/// Common velocity for the growth of the common mode \[m/s\], and how long it grows \[s\].
+/// Initial common velocity \[m/s\], and duration of its growth \[s\].
 const COMMON_M_S: f64 = 1e-3;
 const COMMON_S: f64 = 100.0;
-/// The engine's step where no closed form depends on it \[s\].
+/// Step of Rapier where the closed form does not depend on it \[s\].
 const ENGINE_STEP_S: f64 = 1.0 / 60.0;
-/// Time by which rounding has grown by e^120 \[s\].
+/// Time by which rounding grows by e^120 \[s\].
 const LOST_S: f64 = 1200.0;
-/// A formation is lost beyond this largest edge error \[m\].
+/// Edge error above which a formation is lost \[m\].
 const LOST_M: f64 = 0.1;
 
-/// Common speed of a swarm that is lost \[m/s\].
+/// Common speed that a lost swarm exceeds \[m/s\].
 const RUNAWAY_M_S: f64 = 1e9;
 
-/// Stars: number of vehicles.
+/// Numbers of vehicles of the stars.
 const STARS: [usize; 3] = [10, 11, 12];
 const STAR_RADIUS_M: f64 = 3.0;
-/// Transverse speed of two followers \[m/s\], so small that edges stay straight to 1e-9 m.
+/// Transverse speed of two followers \[m/s\]; edges stay straight to 1e-9 m.
 const STAR_M_S: f64 = 1e-6;
 const STAR_S: f64 = 100.0;
-/// Far below the speeds of the star.
+/// Tolerances far below the speeds of the star.
 const FINE: Tolerances = Tolerances { relative: 1e-12, absolute: 1e-18 };
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
-    let parts: [fn() -> Result<Claim, Untried>; 5] =
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
+    let parts: [fn() -> Result<Claim, MeasureError>; 5] =
         [bent_hexagon, common_mode, common_mode_in_the_engine, lost_to_rounding, stars];
     try_each(&parts, progress, |part| part())
 }
@@ -54,14 +54,14 @@ fn hexagon() -> Formation {
     Formation::circle(HEXAGON, RADIUS_M)
 }
 
-/// How far a swarm is from its best plane, root sum of squares \[m\].
+/// Returns the distance of a swarm from its best plane, root of the sum of squares \[m\].
 fn bend_m(positions_m: &Rows) -> f64 {
     let centre = mean_row(positions_m);
     let centred = DMatrix::from_fn(positions_m.nrows(), 3, |i, axis| positions_m[(i, axis)] - centre[axis]);
     centred.singular_values().iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// The hexagon at rest, bent like a saddle: z in proportion to the cosine of twice the angle.
+/// Returns the hexagon at rest with a saddle bend: z is proportional to the cosine of twice the angle.
 fn bent() -> Scenario {
     let mut start = Swarm::at_rest(hexagon().slots_m);
     for i in 0..HEXAGON {
@@ -71,24 +71,24 @@ fn bent() -> Scenario {
     Scenario::new("bent", start, hexagon(), DELTA_M, LOST_S)
 }
 
-fn bent_hexagon() -> Result<Claim, Untried> {
+fn bent_hexagon() -> Result<Claim, MeasureError> {
     let scenario = bent();
     let solution = continuous(&scenario, &BEND_TIMES_S, Tolerances::default())?;
     let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
     let words = format!(
-        "a hexagon bent by {BEND_M} m still is by {at_100_m:.2} m after 100 s, {at_300_m:.2} m after 300 s and \
-         {at_10000_m:.3} m after 10000 s; exponent {exponent:.2} between 10000 s and 30000 s"
+        "bend {BEND_M} m, after 100 s {at_100_m:.2} m, after 300 s {at_300_m:.2} m, after 10000 s {at_10000_m:.3} m; \
+         exponent up to 30000 s {exponent:.2}"
     );
     let claim = stated("bent-hexagon")?;
-    // 1/A^2 grows linearly from its start, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
+    // 1/A^2 grows linearly, so the exponent at a bend A is -1/2 (1 - A^2/A(0)^2): 1 % short of its limit.
     let pass = (exponent + 0.5).abs() <= claim.limit();
     let values = [("after_100_s_m", at_100_m), ("after_300_s_m", at_300_m), ("exponent", exponent)];
     Ok(claim.measured(words, values).pass(pass))
 }
 
-/// The hexagon in formation, moving as a whole.
+/// Returns the hexagon in formation with a common velocity.
 fn drifting() -> Scenario {
     let mut start = Swarm::at_rest(hexagon().slots_m);
     for i in 0..HEXAGON {
@@ -99,7 +99,7 @@ fn drifting() -> Scenario {
     scenario
 }
 
-fn common_rate(id: &str, last: &Swarm, duration_s: f64) -> Result<Claim, Untried> {
+fn common_rate(id: &str, last: &Swarm, duration_s: f64) -> Result<Claim, MeasureError> {
     let rate_per_s = (last.mean_velocity_m_s().norm() / COMMON_M_S).ln() / duration_s;
     let error_per_s = rate_per_s - A22_PER_S;
     let claim = stated(id)?;
@@ -108,22 +108,22 @@ fn common_rate(id: &str, last: &Swarm, duration_s: f64) -> Result<Claim, Untried
     Ok(claim.measured(words, [("rate_per_s", rate_per_s)]).pass(pass))
 }
 
-fn common_mode() -> Result<Claim, Untried> {
+fn common_mode() -> Result<Claim, MeasureError> {
     common_rate("common-mode", &end(&drifting(), Tolerances::default())?, COMMON_S)
 }
 
-fn common_mode_in_the_engine() -> Result<Claim, Untried> {
+fn common_mode_in_the_engine() -> Result<Claim, MeasureError> {
     let flight = engine(&with_step(&drifting(), ENGINE_STEP_S), |_| ())?;
     common_rate("common-mode-in-the-engine", &flight.last, flight.duration_s)
 }
 
-fn lost_to_rounding() -> Result<Claim, Untried> {
+fn lost_to_rounding() -> Result<Claim, MeasureError> {
     let mut scenario = drifting();
     scenario.start.velocities_m_s.fill(0.0);
     scenario.time.duration_s = LOST_S;
     let mut scenario = with_step(&scenario, ENGINE_STEP_S);
     scenario.time.record_hz = 1.0;
-    // Flown on where positions are no longer told apart: that is what is to be seen.
+    // The flight continues beyond the precision of positions, which is the effect to measure.
     scenario.arrival.edge_error_m = f64::INFINITY;
     let mut lost_at_s = f64::NAN;
     let flight = engine_to_any_end(&scenario, scenario.law()?, |sample| {
@@ -139,12 +139,12 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
         Ending::Completed => "flown to its end",
         Ending::Interrupted => "interrupted",
         Ending::LawUndefined(_) => "ended by a collision",
-        Ending::BrokeDown(_) => "ended by numbers that ran out",
+        Ending::BrokeDown(_) => "ended by overflow",
     };
     let lost = if lost_at_s.is_nan() { "never lost".to_owned() } else { format!("lost after {lost_at_s:.0} s") };
     let words = format!(
-        "the hexagon, at rest in formation, is {lost}; the flight is {ending} at {:.0} s with a common \
-         speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = {DELTA_M} m",
+        "{lost}; {ending} at {:.0} s, common speed above {RUNAWAY_M_S:e} m/s; closest {min_m:.2} m, delta = \
+         {DELTA_M} m",
         flight.duration_s
     );
     let values =
@@ -152,13 +152,13 @@ fn lost_to_rounding() -> Result<Claim, Untried> {
     Ok(stated("lost-to-rounding")?.measured(words, values).pass(lost_at_s < LOST_S && common_m_s > RUNAWAY_M_S))
 }
 
-/// Growth rate of the relative velocities of a star of so many vehicles in formation \[1/s\].
-fn star_rate_per_s(count: usize) -> Result<f64, Untried> {
+/// Returns the growth rate of the relative velocities of a star in formation \[1/s\].
+fn star_rate_per_s(count: usize) -> Result<f64, MeasureError> {
     let mut slots_m = Rows::zeros(count);
     let rim = Formation::circle(count - 1, STAR_RADIUS_M);
     slots_m.rows_mut(1, count - 1).copy_from(&rim.slots_m);
     let formation = Formation::points(slots_m);
-    // Two followers move across the plane of the star, one up and one down: no edge resists, and the hub stays.
+    // Two followers move across the plane of the star in opposite directions: no edge resists, and the hub stays.
     let mut start = Swarm::at_rest(formation.slots_m.clone());
     (start.velocities_m_s[(1, 2)], start.velocities_m_s[(2, 2)]) = (STAR_M_S, -STAR_M_S);
     let mut scenario = Scenario::new("star", start, formation, DELTA_M, STAR_S);
@@ -168,13 +168,13 @@ fn star_rate_per_s(count: usize) -> Result<f64, Untried> {
     Ok((end(&scenario, FINE)?.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
 }
 
-fn stars() -> Result<Claim, Untried> {
+fn stars() -> Result<Claim, MeasureError> {
     let expected = STARS.map(|count| A22_PER_S - (1.0 + A22_PER_S) / count as f64);
     let rates = try_each(&STARS, &|_| (), |&count| star_rate_per_s(count))?;
     let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, larger);
     let claim = stated("star")?;
     let pass = error_per_s <= claim.limit();
-    // Rounded to what is printed, so that a rate of rounding size has no sign.
+    // Rounded to the printed digits, so that a rate of the size of rounding has no sign.
     let entry = |(count, rate): (&usize, &f64)| format!("N = {count}: {:+.6} 1/s", (rate * 1e6).round() / 1e6 + 0.0);
     let list = STARS.iter().zip(&rates).map(entry).collect::<Vec<_>>().join(", ");
     let words = format!("{list}; largest error {} 1/s", bound(error_per_s, claim.limit()));

@@ -1,10 +1,10 @@
-//! The edge tension (5), (6): its minimum and its derivatives.
+//! Edge tension (5), (6): its minimum and its derivatives.
 
-use super::claim::{Claim, Judged, Progress, Untried, stated};
+use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated};
 use tautline_core::text::bound;
 use tautline_laws::law::EdgeTension;
 
-/// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, and prints the constant of delta = 1 m.
+/// Figure 1 plots the tension for alpha = K = 1 and delta = 0.5 m, but prints the constant of delta = 1 m.
 const FIGURE_1_DELTA_M: f64 = 0.5;
 const FIGURE_1_K_M: f64 = 1.0;
 const FIGURE_1_PRINTED: f64 = 3.2956;
@@ -12,27 +12,27 @@ const PRINTED_FOR_DELTA_M: f64 = 1.0;
 
 /// Clearances l - delta from 2^-40 m to 2^20 m: powers of two, so that l and both ends of every difference are exact.
 const CLEARANCE_EXPONENTS: std::ops::RangeInclusive<i32> = -40..=20;
-/// Half width of a difference over the clearance. One of fourth order is off by 4 STEP^4 = 4e-12 for truncation and by
-/// 1.5 eps/STEP = 3e-13 for rounding, relative to the terms that it subtracts; six times that is allowed.
+/// Half width of a difference, divided by the clearance. The fourth-order difference has a truncation error of 4 STEP^4
+/// = 4e-12 and a rounding error of 1.5 eps/STEP = 3e-13, relative to its terms. The tolerance is 6 times the sum.
 const STEP: f64 = 1.0 / 1024.0;
 
-pub(super) fn judge(progress: &Progress<'_>) -> Judged {
+pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     let claims = vec![minimum()?, figure_1()?, slope()?, curvature()?];
     progress(1);
     Ok(claims)
 }
 
-/// The tension of these lengths for alpha = 1.
-fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, Untried> {
+/// Returns the tension of these lengths for alpha = 1.
+fn unit_tension(delta_m: f64, k_m: f64) -> Result<EdgeTension, MeasureError> {
     Ok(EdgeTension::new(1.0, delta_m, delta_m + k_m * 1.0_f64.asinh())?)
 }
 
-/// The tension that Figure 1 plots.
-pub(super) fn of_figure_1() -> Result<EdgeTension, Untried> {
+/// Returns the tension that Figure 1 plots.
+pub(super) fn of_figure_1() -> Result<EdgeTension, MeasureError> {
     unit_tension(FIGURE_1_DELTA_M, FIGURE_1_K_M)
 }
 
-fn minimum() -> Result<Claim, Untried> {
+fn minimum() -> Result<Claim, MeasureError> {
     let tension = unit_tension(2.0, 1.0 / 1.0_f64.asinh())?;
     let rest_m = tension.rest_m();
     // V' changes sign between the neighbours of d in double precision.
@@ -42,7 +42,7 @@ fn minimum() -> Result<Claim, Untried> {
     let claim = stated("tension-minimum")?;
     let near_0 = |number| bound(number, claim.limit());
     let words = format!(
-        "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) evaluated literally {}; V' {}",
+        "d = {rest_m} m: V(d) {}, V'(d) {}, equation (5) as printed {}; V' {}",
         near_0(value),
         near_0(slope),
         near_0(literal),
@@ -52,23 +52,23 @@ fn minimum() -> Result<Claim, Untried> {
     Ok(claim.within_limit().but_only_if(bracketed))
 }
 
-fn figure_1() -> Result<Claim, Untried> {
+fn figure_1() -> Result<Claim, MeasureError> {
     let of_caption = of_figure_1()?.minimum();
     let of_other = unit_tension(PRINTED_FOR_DELTA_M, FIGURE_1_K_M)?.minimum();
     let claim = stated("figure-1-caption")?;
     let printed_of = |number: f64| (number - FIGURE_1_PRINTED).abs() <= claim.limit();
     let pass = printed_of(of_other) && !printed_of(of_caption);
-    let words = format!("Vmin = {of_caption:.9} for delta = 0.5 and {of_other:.9} for delta = 1");
+    let words = format!("{of_caption:.9} for delta = 0.5, {of_other:.9} for delta = 1");
     let values = [("minimum_delta_0_5_m2_s2", of_caption), ("minimum_delta_1_m2_s2", of_other)];
     Ok(claim.measured(words, values).pass(pass))
 }
 
-/// The derivative at `x` of `f` by the difference of fourth order over x - 2h .. x + 2h.
+/// Returns the derivative of `f` at `x` by the fourth-order difference over x - 2h .. x + 2h.
 fn difference(f: impl Fn(f64) -> f64, x: f64, h: f64) -> f64 {
     (8.0 * (f(x + h) - f(x - h)) - (f(x + 2.0 * h) - f(x - 2.0 * h))) / (12.0 * h)
 }
 
-/// Largest error of `derivative` against differences of `f` over all clearances, relative to `scale`.
+/// Returns the largest error of `derivative` against differences of `f` over all clearances, relative to `scale`.
 fn largest_difference(
     tension: &EdgeTension,
     f: impl Fn(f64) -> f64,
@@ -86,17 +86,17 @@ fn largest_difference(
         .fold(0.0, f64::max)
 }
 
-/// A claim about such an error.
-fn of_difference(id: &str, error: f64, more: &str) -> Result<Claim, Untried> {
+/// Returns a claim about such an error.
+fn of_difference(id: &str, error: f64, more: &str) -> Result<Claim, MeasureError> {
     let decades = f64::from(CLEARANCE_EXPONENTS.end() - CLEARANCE_EXPONENTS.start()) * std::f64::consts::LOG10_2;
-    let words = format!("largest relative error {error:.0e} over {decades:.0} decades of clearance{more}");
+    let words = format!("relative error {error:.0e} over {decades:.0} decades of clearance{more}");
     Ok(stated(id)?.measured(words, [("largest_relative_error", error)]).within_limit())
 }
 
-fn slope() -> Result<Claim, Untried> {
+fn slope() -> Result<Claim, MeasureError> {
     let tension = unit_tension(2.0, 1.0)?;
     let (alpha, k_m) = (tension.alpha(), tension.k_m());
-    // Where V' changes sign its two terms are the scale: (alpha/K) (1 + csch^2 s) = 2 alpha/K - V'.
+    // At the zero of V' its two terms are the scale: (alpha/K) (1 + csch^2 s) = 2 alpha/K - V'.
     let error = largest_difference(
         &tension,
         |l| tension.value(l),
@@ -106,9 +106,9 @@ fn slope() -> Result<Claim, Untried> {
     of_difference("tension-slope", error, "")
 }
 
-fn curvature() -> Result<Claim, Untried> {
+fn curvature() -> Result<Claim, MeasureError> {
     let tension = unit_tension(2.0, 1.0)?;
-    // Far out V'' vanishes beside the change of V' that rounding alone makes.
+    // At large clearances V'' is smaller than the change of V' by rounding.
     let error = largest_difference(
         &tension,
         |l| tension.derivative(l),
@@ -117,7 +117,7 @@ fn curvature() -> Result<Claim, Untried> {
     );
     let positive = CLEARANCE_EXPONENTS.into_iter().all(|e| {
         let curvature = tension.second_derivative(tension.delta_m() + libm::exp2(f64::from(e)));
-        // Beyond some 350 K it is smaller than any double.
+        // Beyond about 350 K it underflows to 0.
         curvature > 0.0 || (curvature == 0.0 && e > 8)
     });
     let sign = if positive { "; never negative" } else { "; negative somewhere" };

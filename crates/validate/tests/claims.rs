@@ -1,13 +1,13 @@
-//! Claims that are judged in seconds: the figures of the paper, and those about the displacement law.
+//! Claims that are measured in seconds: the paper's figures and the displacement law.
 
 use std::sync::LazyLock;
 
 use tautline_validate::{Claim, Group, judge};
 
-/// Solver error of a flight of tens of seconds at 1e-12 a step, amplified by a22 > 0 where it is.
+/// Solver error of a flight of tens of seconds with 1e-12 per step, amplified by the growth for a22 > 0.
 const SOLVED_M: f64 = 1e-11;
 
-/// A claim about the paper's figures, which are flown once.
+/// Returns a claim about the paper's figures, which are flown once.
 fn claim(id: &str) -> &'static Claim {
     static FIGURES: LazyLock<Group> = LazyLock::new(|| judge("figures").expect("a group of claims"));
     FIGURES.claims.iter().find(|claim| claim.id == id).unwrap_or_else(|| panic!("{id} in {FIGURES:?}"))
@@ -17,7 +17,7 @@ fn assert_holds(id: &str) {
     assert!(claim(id).pass, "{:?}", claim(id));
 }
 
-/// Formed as well as doubles can hold it.
+/// Asserts that the formation is reached to working precision.
 fn assert_formed(id: &str) {
     assert_holds(id);
     assert!(claim(id).value("final_edge_error_m").is_some_and(|error_m| error_m < SOLVED_M), "{:?}", claim(id));
@@ -41,12 +41,12 @@ fn the_baseline_collides_as_the_reference_says() {
 }
 
 #[test]
-fn a_straight_line_is_never_left_and_its_minimum_is_the_known_one() {
+fn a_straight_line_is_kept_with_the_known_smallest_separation() {
     assert_holds("straight-line");
 }
 
 #[test]
-fn every_claim_about_the_law_is_as_expected_and_its_negative_twins_fail() {
+fn every_claim_about_the_displacement_law_is_as_expected() {
     let group = judge("displacement").expect("a group of claims");
     assert_eq!(group.claims.len(), 5);
     for claim in &group.claims {

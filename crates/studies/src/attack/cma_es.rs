@@ -1,48 +1,49 @@
-//! CMA-ES: candidates are normal around a mean, and mean, step and covariance follow the better half of them.
+//! CMA-ES with restarts: minimises a function of a box by samples from a normal distribution that adapts.
 //!
-//! N. Hansen, *The CMA evolution strategy: a tutorial* (2016), with its default numbers and positive weights. A generation of
-//! candidates is drawn first and learned from afterwards, so that it may be flown on any number of threads. Sums run in a fixed
-//! order and elementary functions come from `libm`: the same seed gives the same candidates on every machine.
+//! Reference: N. Hansen, *The CMA evolution strategy: a tutorial* (2016), with its default parameters and positive
+//! weights. A generation of candidates is drawn first and evaluated afterwards, so any number of threads may evaluate
+//! it. Sums run in a fixed order and elementary functions come from `libm`: a seed gives the same candidates on every
+//! machine.
 //!
-//! [`Optimiser`] starts the search again with twice the population where it converges (IPOP), [`folded`] keeps candidates within
-//! their bounds.
+//! [`Optimiser`] restarts a converged search with twice the population (IPOP). [`folded`] maps candidates into their
+//! bounds.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use tautline_laws::wind::Normals;
 
-/// Standard deviation of the first candidates along each axis, for bounds that are 1 apart.
+/// Initial standard deviation along each axis, for bounds that are 1 apart.
 const FIRST_STEP: f64 = 0.3;
 /// Standard deviation at which a search has converged.
 const CONVERGED_STEP: f64 = 1e-4;
-/// Range of the best values of late generations, over delta, at which a search has converged.
+/// Range of the best values of the last generations, divided by delta, at which a search has converged.
 const CONVERGED_VALUE: f64 = 1e-6;
-/// Population of a restarted search over that of the search before.
+/// Population of a restarted search, divided by the population before.
 const GROWTH: usize = 2;
-/// Part of the bounds that is bent on either side.
+/// Width of the parabolic zone at each bound, for bounds that are 1 apart.
 const BENT: f64 = 0.05;
-/// Smallest and largest eigenvalue of the covariance beyond whose ratio numbers run out of digits.
+/// Largest condition number of the covariance: above it, `f64` has too few digits.
 const WORST_CONDITION: f64 = 1e14;
 
-/// The distribution that candidates are drawn from.
+/// Normal distribution from which candidates are drawn.
 #[derive(Clone, Debug)]
 pub(super) struct CmaEs {
     mean: DVector<f64>,
-    /// Scale of the distribution.
+    /// Global step size sigma.
     step: f64,
     covariance: DMatrix<f64>,
-    /// Eigenvectors of the covariance, a column each.
+    /// Eigenvectors of the covariance, one per column.
     axes: DMatrix<f64>,
-    /// Square roots of its eigenvalues.
+    /// Square roots of the eigenvalues.
     lengths: DVector<f64>,
-    /// Evolution paths of step and covariance.
+    /// Evolution path of the step size.
     path_step: DVector<f64>,
     path_covariance: DVector<f64>,
     generation: u32,
     rates: Rates,
 }
 
-/// What does not change from one generation to the next.
+/// Constants of a search.
 #[derive(Clone, Debug)]
 struct Rates {
     population: usize,
@@ -54,11 +55,11 @@ struct Rates {
     path_covariance: f64,
     rank_one: f64,
     rank_many: f64,
-    /// Expected length of a vector of standard normal numbers.
+    /// Expected norm of a vector of standard normal numbers.
     expected: f64,
 }
 
-/// Default population: 4 + 3 ln n in n dimensions.
+/// Returns the default population: 4 + 3 ln n in n dimensions.
 pub(super) fn usual_population(dimensions: usize) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and far below 2^32")]
     let more = (3.0 * libm::log(dimensions.max(1) as f64)) as usize;
@@ -92,7 +93,7 @@ impl Rates {
 }
 
 impl CmaEs {
-    /// A round distribution about a mean, of which so many candidates, at least 2, are a generation.
+    /// Returns an isotropic distribution around a mean. A generation has `population` candidates, at least 2.
     pub(super) fn new(mean: &[f64], step: f64, population: usize) -> Self {
         let n = mean.len();
         Self {
@@ -108,31 +109,31 @@ impl CmaEs {
         }
     }
 
-    /// Candidates of a generation.
+    /// Returns the number of candidates in a generation.
     pub(super) fn population(&self) -> usize {
         self.rates.population
     }
 
-    /// A candidate.
+    /// Draws a candidate.
     pub(super) fn draw(&self, normals: &mut Normals) -> Vec<f64> {
         let n = self.mean.len();
         let along = DVector::from_fn(n, |k, _| self.lengths[k] * normals.next());
         (0..n).map(|row| self.mean[row] + self.step * dot(n, |k| self.axes[(row, k)] * along[k])).collect()
     }
 
-    /// Largest standard deviation of a candidate along any direction.
+    /// Returns the largest standard deviation of a candidate along any direction.
     pub(super) fn spread(&self) -> f64 {
         self.step * self.lengths.max()
     }
 
-    /// Whether nothing is left to be drawn from.
+    /// Returns whether the covariance is singular to working precision, or not finite.
     pub(super) fn is_degenerate(&self) -> bool {
         let [low, high] = [self.lengths.min(), self.lengths.max()];
         !(self.spread().is_finite() && high * high <= WORST_CONDITION * low * low)
     }
 
-    /// Moves the distribution to where the candidates of a generation have low values; of those with the same value the first
-    /// counts as the lower.
+    /// Adapts the distribution to the values of a generation, where lower is better. Of equal values the first is
+    /// better.
     pub(super) fn learn(&mut self, candidates: &[Vec<f64>], values: &[f64]) {
         let mut order: Vec<_> = (0..candidates.len()).collect();
         order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -170,7 +171,7 @@ impl CmaEs {
         self.decompose();
     }
 
-    /// What a step is in lengths of the distribution.
+    /// Returns a step multiplied by the inverse square root of the covariance.
     fn whitened(&self, step: &DVector<f64>) -> DVector<f64> {
         let n = self.mean.len();
         let along = DVector::from_fn(n, |k, _| dot(n, |row| self.axes[(row, k)] * step[row]) / self.lengths[k]);
@@ -184,7 +185,7 @@ impl CmaEs {
     }
 }
 
-/// A sum in the order of its terms.
+/// Returns a sum, added in the order of its terms.
 fn dot(count: usize, term: impl Fn(usize) -> f64) -> f64 {
     (0..count).map(term).sum()
 }
@@ -194,7 +195,7 @@ fn dot(count: usize, term: impl Fn(usize) -> f64) -> f64 {
 pub(super) struct Optimiser {
     normals: Normals,
     dimensions: usize,
-    /// Difference of values that counts as none \[m\].
+    /// Difference of values at which a search has converged \[m\].
     tolerance_m: f64,
     descent: Descent,
     restarts: u64,
@@ -226,7 +227,7 @@ impl Descent {
 }
 
 impl Optimiser {
-    /// A search from the middle of the bounds.
+    /// Returns a search that starts at the middle of the bounds.
     pub(super) fn new(dimensions: usize, delta_m: f64, seed: u64) -> Self {
         let descent = Descent::new(&vec![0.5; dimensions], usual_population(dimensions));
         Self {
@@ -238,22 +239,22 @@ impl Optimiser {
         }
     }
 
-    /// Number of candidates of a generation.
+    /// Returns the number of candidates in a generation.
     pub(super) fn population(&self) -> usize {
         self.descent.distribution.population()
     }
 
-    /// Number of restarts.
+    /// Returns the number of restarts.
     pub(super) fn restarts(&self) -> u64 {
         self.restarts
     }
 
-    /// Draws a candidate on the real line; [`folded`] gives its place within the bounds.
+    /// Draws a candidate on the real line; [`folded`] maps each coordinate into its bounds.
     pub(super) fn draw(&mut self) -> Vec<f64> {
         self.descent.distribution.draw(&mut self.normals)
     }
 
-    /// Takes the values of a whole generation.
+    /// Adapts to the values of a whole generation, and restarts after convergence.
     pub(super) fn learn(&mut self, candidates: &[Vec<f64>], values: &[f64]) {
         self.descent.distribution.learn(candidates, values);
         self.descent.best.push(values.iter().copied().fold(f64::INFINITY, f64::min));
@@ -262,7 +263,7 @@ impl Optimiser {
         }
     }
 
-    /// Starts again from a random place, with a population that is `growth` times as large.
+    /// Restarts from a random point, with `growth` times the population.
     pub(super) fn restart(&mut self, growth: usize) {
         let population = growth * self.population();
         let place: Vec<_> = (0..self.dimensions).map(|_| self.normals.unit()).collect();
@@ -271,9 +272,9 @@ impl Optimiser {
     }
 }
 
-/// Folds the real line into the interval from 0 to 1: the identity but for a twentieth at either bound, where a parabola leads to
-/// the bound and back again. A value that falls towards a bound so has its minimum inside, where an optimiser converges
-/// (`BoxConstraintsLinQuadTransformation` of Hansen's `pycma`).
+/// Maps the real line to the interval from 0 to 1. The map is the identity except in a zone of 0.05 at each bound,
+/// where a parabola leads to the bound and back. A function that falls towards a bound therefore has its minimum in the
+/// interior, and the optimiser converges there (`BoxConstraintsLinQuadTransformation` of Hansen's `pycma`).
 pub(super) fn folded(x: f64) -> f64 {
     let width = 1.0 + 2.0 * BENT;
     let along = (x + BENT).rem_euclid(2.0 * width);
@@ -292,8 +293,8 @@ pub(super) fn folded(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Candidates until a value is as low as asked, at most so many.
-    fn asked(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
+    /// Returns the number of candidates until a value is below `goal`; panics after `most` candidates.
+    fn count_candidates(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
         let mut normals = Normals::new(3, 0);
         let mut search = CmaEs::new(&vec![0.5; n], 0.3, usual_population(n));
         let mut count = 0;
@@ -311,15 +312,16 @@ mod tests {
     }
 
     #[test]
-    fn known_functions_are_minimised_within_what_is_published_of_them() {
-        // Hansen's tutorial and the BBOB tables: about 1e3 for a ball and some 6e3 for Rosenbrock's valley in ten dimensions.
+    fn test_functions_need_no_more_candidates_than_published() {
+        // Hansen's tutorial and the BBOB tables: about 1e3 candidates for a sphere, about 6e3 for Rosenbrock in ten
+        // dimensions.
         let ball = |x: &[f64]| x.iter().map(|x| (x - 0.2) * (x - 0.2)).sum::<f64>();
-        assert!(asked(10, 1e-9, 2_500, &ball) > 300);
+        assert!(count_candidates(10, 1e-9, 2_500, &ball) > 300);
         let narrow = |x: &[f64]| {
             let scale = |k: usize| libm::pow(1e6, k as f64 / 9.0);
             x.iter().enumerate().map(|(k, x)| scale(k) * (x - 0.2) * (x - 0.2)).sum::<f64>()
         };
-        asked(10, 1e-9, 9_000, &narrow);
+        count_candidates(10, 1e-9, 9_000, &narrow);
         let valley = |x: &[f64]| {
             let part = |pair: &[f64]| {
                 100.0 * (pair[1] - pair[0] * pair[0]) * (pair[1] - pair[0] * pair[0])
@@ -327,12 +329,12 @@ mod tests {
             };
             x.windows(2).map(part).sum::<f64>()
         };
-        asked(10, 1e-9, 12_000, &valley);
+        count_candidates(10, 1e-9, 12_000, &valley);
     }
 
     #[test]
-    fn one_dimension_and_equal_values_are_no_trouble() {
-        asked(1, 1e-9, 400, &|x| (x[0] - 0.9) * (x[0] - 0.9));
+    fn one_dimension_and_equal_values_work() {
+        count_candidates(1, 1e-9, 400, &|x| (x[0] - 0.9) * (x[0] - 0.9));
         let mut search = CmaEs::new(&[0.5, 0.5], 0.3, 6);
         let mut normals = Normals::new(0, 0);
         for _ in 0..50 {
@@ -343,14 +345,14 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_is_a_sequence() {
+    fn a_seed_determines_the_candidates() {
         let drawn = |seed: u64| CmaEs::new(&[0.5; 4], 0.3, 8).draw(&mut Normals::new(seed, 0));
         assert_eq!(drawn(1), drawn(1));
         assert_ne!(drawn(1), drawn(2));
     }
 
     #[test]
-    fn every_place_is_folded_into_the_interval_without_a_jump() {
+    fn folding_is_continuous_and_stays_in_the_interval() {
         let step = 1e-4;
         let mut before = folded(-7.0);
         for k in 1..140_000_i32 {

@@ -1,7 +1,7 @@
-//! The worst start, wind or loss within stated bounds, searched for by an optimiser over the smallest separation of a flight.
+//! Search for the worst start, wind or loss within stated bounds: minimises the smallest separation of a flight.
 //!
-//! [`Options`] say what may be varied and how far, and fly candidates on all threads; an [`Attack`] holds the worst that was
-//! found. A search that finds nothing proves nothing.
+//! [`Options`] define the bounds and fly candidates on all threads. An [`Attack`] holds the worst flight found. A
+//! search that finds no violation proves nothing.
 
 mod cma_es;
 mod space;
@@ -29,48 +29,47 @@ use tautline_report::request::{
 };
 use tautline_sim::scenario::Scenario;
 
-/// Flights that a search may have.
+/// Admitted numbers of flights of a search.
 pub const FLIGHTS: RangeInclusive<u64> = 1..=10_000_000;
-/// Seeds that a candidate may be flown with.
+/// Admitted numbers of seeds of a candidate.
 pub const SEEDS_OF_A_CANDIDATE: RangeInclusive<u64> = 1..=10_000;
-/// Candidates in a row that cannot be flown before a search starts again elsewhere.
+/// Refused candidates in a row after which the search restarts at another point.
 const MOST_REFUSED: usize = 1000;
-/// Places in a row at which it does so before it gives up.
+/// Restarts in a row without a flyable candidate after which the search ends.
 const MOST_PLACES: usize = 4;
 
-/// What every search says of itself.
-const CAVEAT: &str = "This is a search, not a proof: what it did not find may be there all the same, and the worst found need not be the worst.";
+/// Caveat in every headline.
+const CAVEAT: &str = "This is a search, not a proof: worse flights may exist within the bounds.";
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 4] = [
     CAVEAT,
-    "A candidate is as bad as its flight brings two vehicles close, as the judge saw it between the samples too; clearances of \
-     obstacles are judged, and not searched for.",
-    "Bounds are a box: every number is free between its own two, whatever the others are. What cannot be flown, such as a start of \
-     two vehicles within delta, is no attack and costs no flight.",
-    "Noise has the seed of the scenario, and those that follow it where several are asked for: another seed does not make a scenario \
-     harder.",
+    "The search minimises the smallest separation of two vehicles, also between samples. Clearances of obstacles are \
+     judged, but not minimised.",
+    "Bounds are a box: each number varies independently of the others. Candidates that cannot be flown, such as a start \
+     of two vehicles within delta, cost no flight.",
+    "Noise has the seed of the scenario, or with --seeds also the next: a seed does not make a scenario harder.",
 ];
 
 /// Options of an attack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Keys, each between two values.
+    /// Varied keys, each with its bounds.
     pub vary: Vec<Bound>,
-    /// How far each start may be from that of the scenario along each axis \[m\].
+    /// Largest displacement of each start from that of the scenario, along each axis \[m\].
     pub start_m: Option<f64>,
-    /// How far each velocity at the start may be from that of the scenario along each axis \[m/s\].
+    /// Largest change of each initial velocity, along each axis \[m/s\].
     pub velocity_m_s: Option<f64>,
-    /// Smallest distance of two starts, more than delta \[m\]; none for any start that can be flown.
+    /// Smallest separation of two starts, more than delta \[m\]; by default any start that can be flown.
     pub apart_m: Option<f64>,
     /// Flights of the whole search: [`FLIGHTS`].
     pub flights: u64,
-    /// Flights of each candidate, with the scenario's seed of noise and those that follow it; the worst counts:
+    /// Flights of each candidate, with consecutive seeds of noise from the scenario's on; the worst one counts:
     /// [`SEEDS_OF_A_CANDIDATE`].
     pub seeds: u64,
-    /// Seed of the search itself.
+    /// Seed of the search.
     pub seed: u64,
-    /// Folder for the recording, report and pictures of the worst flight, as `tautline run` leaves them.
+    /// Folder for the recording, report and pictures of the worst flight, as `tautline run` writes them.
     pub out: Option<PathBuf>,
 }
 
@@ -89,20 +88,20 @@ impl Default for Options {
     }
 }
 
-/// A candidate that was worse than all before it.
+/// Candidate that was worse than all before it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Candidate {
-    /// The number of its flight, from 1.
+    /// Number of its flight, from 1.
     pub flight: u64,
-    /// Which of the candidate's seeds, from 0.
+    /// Index of the candidate's seed, from 0.
     pub run: u64,
-    /// Its values, in the order of the bounds.
+    /// Values, in the order of the bounds.
     pub values: Vec<f64>,
-    /// Its flight; the seed is that of the noise.
+    /// Summary of the flight; its seed is the seed of noise.
     pub flown: FlightSummary,
 }
 
-/// The worst that a search found. What does not apply is null.
+/// Worst flight that a search found. Inapplicable values are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Attack {
     /// The scenario, the program and the safety distance.
@@ -110,17 +109,17 @@ pub struct Attack {
     pub about: About,
     /// Seed of the search.
     pub seed: u64,
-    /// Flights of each candidate, of which the worst counts.
+    /// Flights of each candidate; the worst one counts.
     pub seeds: u64,
-    /// Flights that were asked for.
+    /// Requested number of flights.
     pub flights_asked: u64,
-    /// Flights that were flown, without that of the scenario as it is.
+    /// Number of flights flown, without the flight of the unchanged scenario.
     pub flights: u64,
-    /// Each number that was free, and its bounds.
+    /// Varied numbers with their bounds.
     pub bounds: Vec<Bound>,
-    /// Candidates that could not be flown; they cost no flight.
+    /// Candidates that cannot be flown. They cost no flight.
     pub refused: u64,
-    /// Why the first of them could not be flown.
+    /// Reason of the first refusal.
     pub first_refusal: Option<String>,
     /// Flights with a violation.
     pub violated: u64,
@@ -128,21 +127,21 @@ pub struct Attack {
     pub ended_early: u64,
     /// Flights that the judge cannot decide.
     pub undecided: u64,
-    /// Flights that a certificate held for.
+    /// Flights with a certificate.
     pub certified: u64,
-    /// Flights in which two vehicles came closer than certified: each shows a defect.
+    /// Flights in which two vehicles came closer than certified. Each shows a defect.
     pub certificates_broken: u64,
-    /// Number of restarts from elsewhere.
+    /// Number of restarts at another point.
     pub restarts: u64,
-    /// Whether the search ended for want of candidates that can be flown.
+    /// Whether the search ended because too few candidates can be flown.
     pub exhausted: bool,
-    /// Whether the search was interrupted before the flights were spent.
+    /// Whether the search was interrupted before all flights were flown.
     pub interrupted: bool,
-    /// The scenario as it is.
+    /// Flight of the unchanged scenario.
     pub own: FlightSummary,
-    /// Candidates that were each worse than all before; the last is the worst.
+    /// Candidates that were each worse than all before, in order; the last is the worst.
     pub progress: Vec<Candidate>,
-    /// The overrides that fly the worst again by themselves, those of the call first.
+    /// Overrides that repeat the worst flight, those of the call first.
     pub sets: Vec<String>,
 }
 
@@ -170,7 +169,7 @@ impl Experiment for Options {
         batch
             .monitor()
             .begin(Self::COMMAND, Some(base.own().time.steps().saturating_mul(self.flights.saturating_add(1))));
-        let as_it_is = |error| Failure::from(error).under("with the keys as they are");
+        let as_it_is = |error| Failure::from(error).under("in the unchanged scenario");
         let Some(own) = batch.fly(base.own(), space.noise_seed(0)).map_err(as_it_is)? else { return Ok(None) };
         let delta_m = base.own().delta_m;
         let mut search = Search {
@@ -212,7 +211,7 @@ impl Experiment for Options {
 
     fn prepare(&self, force: bool) -> Result<(), Failure> {
         let Some(path) = self.out.as_deref() else { return Ok(()) };
-        // The flight itself opens the folder again.
+        // The flight opens the folder again.
         OutFolder::at(path, "run", "report.json").open(force).map(drop)
     }
 
@@ -233,16 +232,16 @@ impl Experiment for Options {
     }
 }
 
-/// A candidate that can be flown.
-struct Next {
-    /// Its place on the real line.
+/// Candidate that can be flown.
+struct FlyableCandidate {
+    /// Coordinates on the real line.
     drawn: Vec<f64>,
     values: Vec<f64>,
-    /// A flight for each seed.
+    /// Scenario of each seed.
     flights: Vec<Scenario>,
 }
 
-/// A search under way.
+/// Running search.
 struct Search<'a> {
     space: &'a SearchSpace,
     batch: &'a Batch<'a>,
@@ -251,7 +250,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Flies generations of candidates until the flights are spent.
+    /// Flies generations of candidates until the number of flights is reached.
     fn fly(&mut self) -> Result<(), Failure> {
         let (flights, seeds) = (self.found.flights_asked, self.found.seeds);
         while let Some(left) = (flights - self.found.flights).checked_div(seeds).filter(|&left| left > 0) {
@@ -270,8 +269,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Draws candidates that can be flown; none where hardly any can.
-    fn next(&mut self, count: usize) -> Option<Vec<Next>> {
+    /// Draws candidates that can be flown. Returns `None` if hardly any can.
+    fn next(&mut self, count: usize) -> Option<Vec<FlyableCandidate>> {
         for _ in 0..MOST_PLACES {
             let next: Option<Vec<_>> = std::iter::repeat_with(|| self.flyable()).take(count).collect();
             if next.is_some() || self.batch.is_interrupted() {
@@ -282,7 +281,7 @@ impl Search<'_> {
         None
     }
 
-    fn flyable(&mut self) -> Option<Next> {
+    fn flyable(&mut self) -> Option<FlyableCandidate> {
         for _ in 0..MOST_REFUSED {
             if self.batch.is_interrupted() {
                 return None;
@@ -290,7 +289,7 @@ impl Search<'_> {
             let drawn = self.optimiser.draw();
             let values = self.space.values(&drawn.iter().copied().map(folded).collect::<Vec<_>>());
             match self.space.candidate(&values) {
-                Ok(flights) => return Some(Next { drawn, values, flights }),
+                Ok(flights) => return Some(FlyableCandidate { drawn, values, flights }),
                 Err(why) => {
                     self.found.refused += 1;
                     self.found.first_refusal.get_or_insert(why);
@@ -300,8 +299,8 @@ impl Search<'_> {
         None
     }
 
-    /// Flies candidates and returns the smallest clearance of each; none where the search was interrupted.
-    fn values(&mut self, next: &[Next]) -> Result<Option<Vec<f64>>, Failure> {
+    /// Flies candidates and returns the smallest clearance of each. Returns `None` after an interruption.
+    fn values(&mut self, next: &[FlyableCandidate]) -> Result<Option<Vec<f64>>, Failure> {
         let flights: Vec<_> = next
             .iter()
             .flat_map(|next| next.flights.iter().enumerate().map(move |(k, flight)| (next, k as u64, flight)))
@@ -316,7 +315,7 @@ impl Search<'_> {
         let mut values = vec![f64::INFINITY; next.len()];
         let seeds = flights.len() / next.len().max(1);
         for (number, flight) in flown.into_iter().enumerate() {
-            // A flight that was interrupted, and those after it, do not count.
+            // An interrupted flight and all later flights do not count.
             let Some(flight) = flight else { return Ok(None) };
             let (candidate, run) = (number / seeds, (number % seeds) as u64);
             values[candidate] = values[candidate].min(flight.clearance_m().unwrap_or(f64::INFINITY));
@@ -337,21 +336,21 @@ impl Attack {
             Outcome::Clear => {}
         }
         self.certified += u64::from(flown.certified_m.is_some());
-        // A scenario that `check` refuses is certified nothing.
+        // A scenario that `check` refuses has no certificate.
         self.certificates_broken += u64::from(flown.breaks_certificate && flown.refused.is_empty());
         if self.progress.last().is_none_or(|worst| flown.is_worse_than(&worst.flown)) {
             self.progress.push(Candidate { flight: self.flights, run, values: values.to_vec(), flown });
         }
     }
 
-    /// The worst candidate; none where none could be flown.
+    /// Returns the worst candidate; `None` if no candidate was flown.
     #[must_use]
     pub fn worst(&self) -> Option<&Candidate> {
         self.progress.last()
     }
 
-    /// Whether a flight violated or came closer than certified, the scenario's own included; or whether too little is known to say
-    /// that none did.
+    /// Returns whether a flight, the scenario's own included, violated or came closer than certified, or whether no
+    /// flight of a candidate was decided.
     #[must_use]
     pub fn is_bad(&self) -> bool {
         let of_own = self.own.outcome == Outcome::Violated || self.own.breaks_certificate;
@@ -359,27 +358,27 @@ impl Attack {
         of_own || self.violated > 0 || self.certificates_broken > 0 || known == 0
     }
 
-    /// What was found, in a sentence without its end.
+    /// Returns the result as a sentence without a full stop.
     fn result(&self) -> String {
         let flights = counted(self.flights, "flight", "flights");
         let delta = exact(self.about.delta_m);
-        let Some(worst) = self.worst() else { return "no flight was flown: no candidate could be".to_owned() };
+        let Some(worst) = self.worst() else { return "no flight was flown: every candidate was refused".to_owned() };
         let closest = self.closest(worst);
         if self.violated > 0 {
             return format!("VIOLATION found: {closest} (delta {delta} m); {} of {flights} violated", self.violated);
         }
         if self.own.outcome == Outcome::Violated {
             return format!(
-                "VIOLATION in the scenario as it is; {flights} beside it found none: the worst came to {closest}"
+                "VIOLATION in the unchanged scenario; none in {flights} of the search: smallest separation {closest}"
             );
         }
         if self.ended_early + self.undecided >= self.flights {
-            return format!("nothing is known: of {flights} none was flown to its end and judged");
+            return format!("no result: none of {flights} ended with a verdict");
         }
-        format!("no violation found in {flights}: the worst came to {closest} (delta {delta} m)")
+        format!("no violation found in {flights}: smallest separation {closest} (delta {delta} m)")
     }
 
-    /// The closest approach of a candidate: distance, time and vehicles.
+    /// Returns the closest approach of a candidate: separation, time and vehicles.
     fn closest(&self, worst: &Candidate) -> String {
         let FlightSummary { min_m, min_at_s, min_pair, .. } = &worst.flown;
         let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
@@ -414,26 +413,25 @@ impl Study for Attack {
 
     fn notes(&self) -> Vec<String> {
         let flights = |count: u64| counted(count, "flight", "flights");
-        let flown = format!("of {} flights {} were flown", self.flights_asked, self.flights);
+        let flown = format!("{} of {} flights were flown", self.flights, self.flights_asked);
         let mut notes = Vec::new();
         let mut note = |is: bool, text: String| notes.extend(is.then_some(text));
         note(
             self.certificates_broken > 0,
             format!(
-                "DEFECT: in {} two came closer than the law's certificate promises; that is a defect of law, plant or step, \
-                 whatever delta says: please report it with the command below",
+                "DEFECT: in {} two vehicles came closer than certified, because of a defect of law, plant or step; \
+                 please report it with the command below",
                 flights(self.certificates_broken)
             ),
         );
         note(
             self.certified > 0 && self.certified == self.flights && self.certificates_broken == 0,
-            "every flight had a certificate of its law and kept it; a certificate, unlike a search, is a proof"
-                .to_owned(),
+            "every flight had a certificate and kept it; unlike the search, a certificate is a proof".to_owned(),
         );
         let worst = self.worst().map(|worst| &worst.flown);
         note(
             worst.is_some_and(|of| of.outcome == Outcome::Violated && of.clearance_m().is_some_and(|of| of >= 0.0)),
-            "the violation is of an obstacle's clearance; the search looks at separations of vehicles alone".to_owned(),
+            "the violation is of an obstacle's clearance; the search minimises separations of vehicles only".to_owned(),
         );
         note(self.interrupted, format!("interrupted: {flown}"));
         note(
@@ -445,21 +443,21 @@ impl Study for Attack {
         note(self.refused > 0, format!("{candidates} could not be flown and cost no flight{first}"));
         note(
             worst.is_some_and(|of| of.min_at_s == Some(0.0)),
-            "the worst is the distance of two starts; --apart keeps starts farther apart".to_owned(),
+            "the smallest separation is that of two starts; --apart keeps starts farther apart".to_owned(),
         );
         note(
             self.ended_early > 0,
             format!(
-                "{} ended early without a violation, and count with what the judge saw up to then",
+                "{} ended early without a violation, and count with their separation up to the end",
                 flights(self.ended_early)
             ),
         );
-        note(self.undecided > 0, format!("the judge cannot decide about {}", flights(self.undecided)));
+        note(self.undecided > 0, format!("{} undecided", flights(self.undecided)));
         notes
     }
 
     fn records(&self) -> Table {
-        let table = Table::of("Candidates that were each worse than all before", &self.progress)
+        let table = Table::of("Candidates that were worse than all before", &self.progress)
             .column("flight", "Flight", Kind::Count, |of| of.flight)
             .column("noise_seed", "", Kind::Integer, |of| of.flown.seed)
             .column("outcome", "Verdict", Kind::Text, |of| of.flown.outcome.name())
@@ -476,10 +474,10 @@ impl Study for Attack {
     fn sections(&self) -> Vec<Section> {
         let found = self.progress.iter().filter_map(|worst| Some((worst.flight, worst.flown.min_m?)));
         let chart = figure(&found.collect::<Vec<_>>(), self.flights, self.about.delta_m, self.own.min_m);
-        let own = ("as the scenario is", &self.own);
-        let worst = self.worst().map(|worst| ("the worst found", &worst.flown));
+        let own = ("unchanged scenario", &self.own);
+        let worst = self.worst().map(|worst| ("worst found", &worst.flown));
         let flights: Vec<_> = std::iter::once(own).chain(worst).collect();
-        let flights = Table::of("The scenario as it is, and the worst found", &flights)
+        let flights = Table::of("Unchanged scenario and worst flight found", &flights)
             .column("", "Flight", Kind::Text, |(what, _)| *what)
             .column("", "Separation [m]", Kind::AtLeast, |(_, flown)| flown.min_m)
             .column("", "Certified [m]", Kind::AtLeast, |(_, flown)| flown.certified_m)
@@ -487,7 +485,7 @@ impl Study for Attack {
             .build();
         let worst = |k: usize| self.worst().and_then(|worst| worst.values.get(k).copied());
         let bounds: Vec<_> = self.bounds.iter().enumerate().collect();
-        let bounds = Table::of("All else is as the scenario says", &bounds)
+        let bounds = Table::of("All other keys keep the values of the scenario", &bounds)
             .column("", "Key", Kind::Text, |(_, bound)| bound.key.clone())
             .column("", "Smallest", Kind::Exact, |(_, bound)| bound.low)
             .column("", "Largest", Kind::Exact, |(_, bound)| bound.high)
@@ -508,7 +506,7 @@ impl Study for Attack {
     }
 
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
-        let worst = self.worst().map(|_| ("Fly the worst again:".to_owned(), scenario.run_command(&self.sets)));
+        let worst = self.worst().map(|_| ("Repeat the worst flight:".to_owned(), scenario.run_command(&self.sets)));
         worst.into_iter().collect()
     }
 }

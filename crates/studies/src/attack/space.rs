@@ -1,4 +1,4 @@
-//! What an attack may vary, and how far.
+//! Search space of an attack: the varied numbers, their bounds, and the scenario of each candidate.
 
 use std::fmt;
 
@@ -11,23 +11,23 @@ use tautline_core::text::as_toml;
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Scenario, ScenarioError};
 
-/// A place between two bounds, neither an end nor the middle, at which a key is tried.
+/// Point between the bounds, neither an end nor the middle, at which a key is tried.
 const BETWEEN: f64 = 0.381_966;
-/// The axes of a point, as keys have them.
+/// Names of axes in keys.
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Steps from one bound to the other that values are rounded to, so that a flight can be repeated with few digits.
+/// Number of steps between the bounds to which values are rounded, so that few digits repeat a flight.
 const STEPS: f64 = 1e6;
 /// Most decimals of a value.
 const MOST_DECIMALS: u8 = 15;
 
-/// A number that a search chooses within bounds: an argument of `--vary`.
+/// Number that a search varies within bounds: an argument of `--vary`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// Its key, as for an override.
+    /// Key, as for an override.
     pub key: String,
-    /// Its smallest value.
+    /// Smallest value.
     pub low: f64,
-    /// Its largest value.
+    /// Largest value.
     pub high: f64,
     /// Whether the number is an integer. A search sets it from the key.
     pub whole: bool,
@@ -53,7 +53,7 @@ impl Bound {
         Self::new(key, number(low)?, number(high)?)
     }
 
-    /// Returns a key between two values.
+    /// Returns the bounds of a key.
     ///
     /// # Errors
     /// [`Failure`] `attack/variation` unless the values are finite and in increasing order.
@@ -67,12 +67,13 @@ impl Bound {
         Ok(Self { key: key.to_owned(), low, high, whole: false })
     }
 
-    /// Returns the value at a place from 0 to 1 between the bounds, rounded to a millionth of their distance, or to an integer.
+    /// Returns the value at a point from 0 to 1 between the bounds, rounded to an integer or to a millionth of their
+    /// distance.
     #[must_use]
     pub fn at(&self, place: f64) -> f64 {
         let Self { low, high, whole, .. } = *self;
         if whole {
-            // Each integer has the same share of the places.
+            // Each integer has the same share of the interval from 0 to 1.
             return (low + ((high - low + 1.0) * place).floor()).clamp(low, high);
         }
         let value = low + (high - low) * place;
@@ -83,16 +84,16 @@ impl Bound {
     }
 }
 
-/// The failure of an argument of `--vary`.
+/// Returns the failure of an argument of `--vary`.
 fn wrong(why: &str) -> Failure {
     Failure::input(
         "attack/variation",
         format!("--vary: {why}"),
-        "write a key that is a number and two different finite numbers, the smaller one first, as in --vary network.loss=0..0.3",
+        "write a numeric key and two finite numbers in increasing order, such as --vary network.loss=0..0.3",
     )
 }
 
-/// The numbers that a search chooses, and the scenario that they change.
+/// Varied numbers of a search, and the scenario that they change.
 #[derive(Clone, Debug)]
 pub struct SearchSpace {
     base: BaseScenario,
@@ -101,18 +102,18 @@ pub struct SearchSpace {
 }
 
 impl SearchSpace {
-    /// The space of a search, all else being as the scenario says.
+    /// Returns the space of a search. All other keys keep the values of the scenario.
     ///
     /// # Errors
-    /// [`Failure`] where nothing is varied or a key twice, for a key that is no number of the scenario, and for flights and
-    /// seeds that do not fit.
+    /// [`Failure`] if nothing is varied, a key is varied twice, a key is not a number of the scenario, or the numbers
+    /// of flights and seeds do not fit.
     pub fn new(base: &BaseScenario, options: &Options) -> Result<Self, Failure> {
         let Options { flights, seeds, start_m, velocity_m_s, .. } = *options;
         if seeds == 0 || flights < seeds {
             return Err(Failure::input(
                 "attack/too-few-flights",
-                format!("of {flights} flights none is left for a candidate that is flown with {seeds} seeds"),
-                "give --flights at least as many as --seeds",
+                format!("--flights: must be at least the {seeds} of --seeds, got {flights}"),
+                "give more flights or fewer seeds",
             ));
         }
         let mut space = Self { base: base.clone(), options: options.clone(), bounds: Vec::new() };
@@ -123,13 +124,13 @@ impl SearchSpace {
             is_random |= varied.is_random_in_flight();
             space.bounds.push(bound);
         }
-        let reaches = [("the start", start_m), ("the velocity at the start", velocity_m_s)];
-        for (what, by) in reaches.into_iter().filter_map(|(what, by)| Some((what, by?))) {
+        let reaches = [("--start", start_m), ("--velocity", velocity_m_s)];
+        for (option, by) in reaches.into_iter().filter_map(|(option, by)| Some((option, by?))) {
             if !(by.is_finite() && by > 0.0) {
                 return Err(Failure::input(
                     "attack/out-of-range",
-                    format!("{what} is to be varied by {by}"),
-                    "give --start metres and --velocity metres a second, each a positive finite number",
+                    format!("{option}: must be a finite number above 0, got {by}"),
+                    "give --start in metres and --velocity in metres per second",
                 ));
             }
         }
@@ -138,34 +139,34 @@ impl SearchSpace {
         if space.bounds.is_empty() {
             return Err(Failure::input(
                 "attack/nothing-varied",
-                "nothing is varied: the only flight to search is the scenario's own",
-                "say what may be varied: --start 1 moves every start by up to 1 m, --vary network.loss=0..0.3 a key",
+                "nothing is varied",
+                "vary starts, such as --start 1 (up to 1 m), or a key, such as --vary network.loss=0..0.3",
             ));
         }
         if seeds > 1 && !is_random {
             return Err(Failure::input(
                 "attack/nothing-random",
-                format!("nothing in the flight is random: with each of {seeds} seeds it is the same"),
-                "leave --seeds out, or give the scenario turbulence, noise of measurement, loss or jitter",
+                format!("--seeds: nothing in the flight is random, so all {seeds} seeds give the same flight"),
+                "leave --seeds out, or add turbulence, noise of measurement, loss or jitter to the scenario",
             ));
         }
         Ok(space)
     }
 
-    /// Each number that is free, and its bounds.
+    /// Returns the varied numbers with their bounds.
     #[must_use]
     pub fn bounds(&self) -> &[Bound] {
         &self.bounds
     }
 
-    /// The value of each number at places from 0 to 1.
+    /// Returns the values at points from 0 to 1.
     #[must_use]
     pub fn values(&self, places: &[f64]) -> Vec<f64> {
         self.bounds.iter().zip(places).map(|(bound, &place)| bound.at(place)).collect()
     }
 
-    /// The overrides that fly a candidate of these values with the `k`-th seed of noise, from 0, on top of those that every
-    /// flight has.
+    /// Returns the overrides that fly a candidate with the `k`-th seed of noise, from 0, after the overrides of the
+    /// call.
     #[must_use]
     pub fn sets(&self, values: &[f64], k: u64) -> Vec<String> {
         let of_keys = self.options.vary.len();
@@ -178,16 +179,16 @@ impl SearchSpace {
         sets
     }
 
-    /// The seed of noise of a candidate's `k`-th flight, from 0.
+    /// Returns the seed of noise of a candidate's `k`-th flight, from 0.
     #[must_use]
     pub fn noise_seed(&self, k: u64) -> u64 {
         self.base.own().noise_seed.saturating_add(k)
     }
 
-    /// The flights of a candidate, one for each seed of noise.
+    /// Returns the flights of a candidate, one for each seed of noise.
     ///
     /// # Errors
-    /// Why the candidate is no attack: it cannot be flown, or two vehicles start nearer than asked.
+    /// The reason of a refusal: the candidate cannot be flown, or two vehicles start closer than `apart_m`.
     pub fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
         let flight = |k: u64| {
             let scenario = self.scenario(values, k).map_err(|error| error.message().to_owned())?;
@@ -195,7 +196,7 @@ impl SearchSpace {
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
-                    Err(format!("two vehicles start {near_m} m apart, nearer than the {apart_m} m that were asked for"))
+                    Err(format!("two vehicles start {near_m} m apart, less than --apart {apart_m} m"))
                 }
                 _ => Ok(scenario),
             }
@@ -203,10 +204,10 @@ impl SearchSpace {
         (0..self.options.seeds).map(flight).collect()
     }
 
-    /// The flight of a candidate with the `k`-th seed of noise.
+    /// Returns the flight of a candidate with the `k`-th seed of noise.
     ///
     /// # Errors
-    /// [`ScenarioError`] where it cannot be flown, as a start of two vehicles within delta.
+    /// [`ScenarioError`] if the candidate cannot be flown, such as a start of two vehicles within delta.
     pub fn scenario(&self, values: &[f64], k: u64) -> Result<Scenario, ScenarioError> {
         self.base.with(&self.sets(values, k))
     }
@@ -218,41 +219,40 @@ impl SearchSpace {
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
-                format!("{key} is varied twice"),
+                format!("--vary: {key} is varied twice"),
                 "vary each key once; --start and --velocity vary the whole of [start]",
             ));
         }
         if key.rsplit('.').next() == Some("seed") {
             return Err(Failure::input(
                 "attack/seed-varied",
-                format!("{key} is a seed: varying a seed does not make a scenario harder"),
-                "leave it out; --seeds K flies each candidate with K seeds of noise",
+                format!("--vary: {key} is a seed, and varying a seed does not make a scenario harder"),
+                "leave the seed out; --seeds K flies each candidate with K seeds of noise",
             ));
         }
         Ok(())
     }
 
-    /// The scenario itself must be a candidate: where it is none, hardly any is.
+    /// Refuses an `apart_m` that the scenario's own start does not satisfy: hardly any candidate would.
     fn check_apart(&self) -> Result<(), Failure> {
         let Some(apart_m) = self.options.apart_m else { return Ok(()) };
         let (delta_m, own_m) = (self.base.own().delta_m, closest_start_m(self.base.own()));
-        let is_asked = apart_m.is_finite() && apart_m > delta_m && own_m >= apart_m;
-        if is_asked {
+        if apart_m.is_finite() && apart_m > delta_m && own_m >= apart_m {
             return Ok(());
         }
         Err(Failure::input(
             "attack/out-of-range",
             format!(
-                "starts are to be {apart_m} m apart, where delta is {delta_m} m and the scenario's own are {own_m} m apart"
+                "--apart: must be more than delta ({delta_m} m) and at most the scenario's own {own_m} m, got {apart_m}"
             ),
-            "give --apart a distance between the two, or leave it out",
+            "give a distance in this range, or leave --apart out",
         ))
     }
 
-    /// Returns a bound, with whether its key takes integers only, and a scenario with a value within it.
+    /// Returns a bound that states whether its key takes integers only, and a scenario with a value within the bound.
     ///
     /// # Errors
-    /// [`Failure`] if no tried value can be read, and for a bound with a fraction of a key that takes integers only.
+    /// [`Failure`] if no tried value can be read, and for a fractional bound of a key that takes integers only.
     fn bound(&self, bound: &Bound) -> Result<(Bound, Scenario), Failure> {
         let Bound { ref key, low, high, .. } = *bound;
         let read = |value: f64| self.base.with(&[format!("{key}={}", as_toml(value))]);
@@ -265,12 +265,12 @@ impl SearchSpace {
         if let Ok(scenario) = read(bound.at(BETWEEN)) {
             return Ok((bound, scenario));
         }
-        // What cannot be flown at one end may be at the other.
+        // A value that cannot be flown at one end may be valid at the other.
         let scenario = read(low).or_else(|error| read(high).map_err(|_| refused(low, error)))?;
         Ok((bound, scenario))
     }
 
-    /// What `--start` and `--velocity` leave free: each coordinate, positions before velocities.
+    /// Returns the bounds that `--start` and `--velocity` give each coordinate, positions before velocities.
     fn start_bounds(&self) -> Vec<Bound> {
         let of = |list: &str, rows: &Rows, by: Option<f64>| {
             let Some(by) = by else { return Vec::new() };
@@ -290,7 +290,7 @@ impl SearchSpace {
         bounds
     }
 
-    /// The start as an override, where it is varied as a whole.
+    /// Returns the whole start as an override, if it is varied as a whole.
     fn start(&self, values: &[f64]) -> Option<String> {
         let Options { start_m, velocity_m_s, .. } = self.options;
         (start_m.is_some() || velocity_m_s.is_some()).then(|| {
@@ -306,7 +306,7 @@ impl SearchSpace {
         })
     }
 
-    /// Points as TOML: those of the values, or else the rows.
+    /// Returns points as TOML: the given values, or else the rows.
     fn list(&self, values: Option<&[f64]>, rows: &Rows) -> String {
         let axes = self.base.own().space.dimensions();
         let value = |i: usize, axis: usize| values.and_then(|values| values.get(i * axes + axis).copied());
@@ -318,7 +318,7 @@ impl SearchSpace {
     }
 }
 
-/// Smallest distance of two starts in the lengths that delta is one of \[m\].
+/// Returns the smallest separation of two starts, in the metric of delta \[m\].
 fn closest_start_m(scenario: &Scenario) -> f64 {
     let places = scenario.metric().scaled_rows(&scenario.start.positions_m);
     let count = places.nrows();
@@ -331,11 +331,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bound_is_a_key_and_two_numbers() {
+    fn bounds_are_parsed() {
         let read = Bound::parse("start.positions_m.2.x = -1.5..0.25");
         let expected = Bound::new("start.positions_m.2.x", -1.5, 0.25);
         assert_eq!(read.expect("a bound"), expected.expect("a bound"));
-        for (text, said) in [
+        for (text, why) in [
             ("law.alpha", "is not KEY=LOW..HIGH"),
             ("law.alpha=1", "is not KEY=LOW..HIGH"),
             ("law.alpha=1..", "`` is not a number"),
@@ -347,12 +347,12 @@ mod tests {
             ("law.alpha=-1e308..1e308", "must be finite"),
         ] {
             let refused = Bound::parse(text).expect_err(text);
-            assert!(refused.message().contains(said), "{text}: {refused}");
+            assert!(refused.message().contains(why), "{text}: {refused}");
         }
     }
 
     #[test]
-    fn values_have_few_digits_and_never_leave_their_bounds() {
+    fn values_have_few_digits_and_stay_within_their_bounds() {
         let bound = Bound::new("key", -0.1, 2.0 / 3.0).expect("a bound");
         assert_eq!([bound.at(0.0), bound.at(1.0)], [bound.low, bound.high]);
         for k in 0..=1000 {

@@ -1,4 +1,4 @@
-//! A search finds what is there, says what it looked at, and never takes what cannot be flown for an attack.
+//! Searches that find violations, searches that find none, refused candidates, and wrong input.
 
 use std::ops::ControlFlow;
 
@@ -11,7 +11,7 @@ use crate::tests::{InterruptAfter, base, batch};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::Source;
 
-/// Two that change sides, the one a little aside, under a law that avoids nothing.
+/// Two vehicles that exchange their places, one offset to the side, under a law without avoidance.
 const BLIND: &str = r#"name = "blind"
 [start]
 positions_m = [[0.0, 0.0], [4.0, 3.0]]
@@ -27,7 +27,7 @@ dt_s = 0.01
 record_hz = 10
 "#;
 
-fn asked(flights: u64) -> Options {
+fn start_options(flights: u64) -> Options {
     Options { start_m: Some(1.5), flights, ..Options::default() }
 }
 
@@ -57,8 +57,8 @@ fn worst_m(attack: &Attack) -> f64 {
 }
 
 #[test]
-fn a_start_from_which_two_meet_is_found_and_flown_again_from_what_is_said_of_it() {
-    let (base, options) = (blind(&[]), asked(60));
+fn a_search_finds_a_collision_and_its_overrides_repeat_it() {
+    let (base, options) = (blind(&[]), start_options(60));
     let [attack, other] = [1, 3].map(|threads| searched_on(&base, &options, threads));
     assert_eq!(
         attack.to_json().expect("JSON"),
@@ -85,12 +85,12 @@ fn a_start_from_which_two_meet_is_found_and_flown_again_from_what_is_said_of_it(
 }
 
 #[test]
-fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
+fn a_search_without_a_violation_states_that_it_is_no_proof() {
     let sets = ["law.kind=displacement"];
-    let attack = searched(&sets, &asked(40));
+    let attack = searched(&sets, &start_options(40));
     assert_eq!((attack.violated, attack.certificates_broken), (0, 0));
     let said = attack.headline();
-    assert!(said.starts_with("no violation found in 40 flights: the worst came to 1."), "{said}");
+    assert!(said.starts_with("no violation found in 40 flights: smallest separation 1."), "{said}");
     assert!(said.contains("a search, not a proof"), "{said}");
     assert!(
         attack.certified == 40 && attack.notes().iter().any(|note| note.contains("certificate")),
@@ -106,10 +106,10 @@ fn a_search_that_finds_nothing_says_that_it_proves_nothing() {
 }
 
 #[test]
-fn a_flight_below_its_certificate_is_said_to_be_a_defect_first_of_all() {
-    let attack = searched(&["law.kind=displacement"], &asked(4));
+fn a_broken_certificate_comes_first_in_the_headline() {
+    let attack = searched(&["law.kind=displacement"], &start_options(4));
     let says_so = |attack: &Attack| {
-        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two came closer"));
+        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two vehicles came closer"));
         (attack.headline().starts_with("CERTIFICATE BROKEN, "), noted, attack.is_bad())
     };
     assert_eq!(says_so(&attack), (false, false, false));
@@ -117,8 +117,8 @@ fn a_flight_below_its_certificate_is_said_to_be_a_defect_first_of_all() {
 }
 
 #[test]
-fn what_cannot_be_flown_costs_no_flight_and_is_never_the_worst() {
-    // The second may start anywhere around the first, within delta too.
+fn refused_candidates_cost_no_flight_and_are_never_the_worst() {
+    // The second vehicle may start anywhere around the first, also within delta.
     let near = ["start.positions_m.2.x=-1.2..1.2", "start.positions_m.2.y=-1.2..1.2"];
     let attack = searched(&["law.kind=displacement"], &varied(&near, 30));
     assert!(attack.refused > 0 && attack.flights == 30, "{attack:?}");
@@ -134,7 +134,7 @@ fn what_cannot_be_flown_costs_no_flight_and_is_never_the_worst() {
 }
 
 #[test]
-fn starts_are_as_far_apart_as_is_asked() {
+fn starts_keep_the_separation_of_apart() {
     let sets = ["law.kind=displacement"];
     let nearest = |options: &Options| {
         let attack = searched(&sets, options);
@@ -142,21 +142,21 @@ fn starts_are_as_far_apart_as_is_asked() {
         let nearest_m = attack.progress.iter().map(|worst| apart_m(&worst.values)).fold(f64::INFINITY, f64::min);
         (nearest_m, attack)
     };
-    let wide = Options { start_m: Some(2.4), ..asked(60) };
+    let wide = Options { start_m: Some(2.4), ..start_options(60) };
     let (_, anywhere) = nearest(&wide);
     let (near_m, attack) = nearest(&Options { apart_m: Some(4.0), ..wide.clone() });
     assert!(near_m >= 4.0 && attack.refused > anywhere.refused, "{near_m}");
     let why = attack.first_refusal.expect("a reason");
-    assert!(why.contains("nearer than the 4 m"), "{why}");
+    assert!(why.contains("less than --apart 4 m"), "{why}");
     for apart_m in [1.0, 5.1, f64::NAN] {
         let refused =
             space(&sets, &Options { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
-        assert!(refused.contains("where delta is 1 m and the scenario's own are 5 m apart"), "{refused}");
+        assert!(refused.contains("must be more than delta (1 m) and at most the scenario's own 5 m"), "{refused}");
     }
 }
 
 #[test]
-fn keys_take_whole_numbers_where_they_take_no_others() {
+fn integer_keys_get_integer_values() {
     let whole = varied(&["time.max_halvings=0..4", "law.f1_per_s2=0.5..2"], 1);
     let space = space(&[], &whole).expect("a space");
     assert_eq!(space.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true, false]);
@@ -164,16 +164,16 @@ fn keys_take_whole_numbers_where_they_take_no_others() {
 }
 
 #[test]
-fn a_key_is_none_of_whole_numbers_where_a_value_between_is_refused_for_its_size() {
+fn a_key_whose_fractions_are_only_out_of_range_is_not_an_integer_key() {
     let scale = space(&["law.delta_m=3.5"], &varied(&["formation.scale=0..2"], 1)).expect("a space");
     assert_eq!(scale.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [false]);
-    // Refused from 21 on, and whole where it is taken.
+    // Refused from 21 on; below, the key takes integers only.
     let halvings = space(&[], &varied(&["time.max_halvings=0..100"], 1)).expect("a space");
     assert_eq!(halvings.bounds().iter().map(|bound| bound.whole).collect::<Vec<_>>(), [true]);
 }
 
 #[test]
-fn the_worst_of_several_seeds_counts_and_each_is_a_flight() {
+fn each_seed_is_a_flight_and_the_worst_seed_counts() {
     let radio = ["network={rate_hz=20, loss=0.3}", "noise.seed=5"];
     let seeds = Options { seeds: 3, ..varied(&["network.loss=0.1..0.6"], 20) };
     let attack = searched(&radio, &seeds);
@@ -184,11 +184,11 @@ fn the_worst_of_several_seeds_counts_and_each_is_a_flight() {
 }
 
 #[test]
-fn an_interrupted_search_says_so_and_one_without_a_flight_says_nothing() {
+fn an_interrupted_search_has_a_note_or_no_answer() {
     let fly = |most: u64| {
         let monitor = InterruptAfter::new(most);
         let batch = Batch::new(Some(1), &monitor).expect("a batch");
-        asked(60).fly(&blind(&[]), &batch).expect("no failure")
+        start_options(60).fly(&blind(&[]), &batch).expect("no failure")
     };
     assert!(fly(0).is_none());
     let attack = fly(20 * 600).expect("flights");
@@ -197,14 +197,18 @@ fn an_interrupted_search_says_so_and_one_without_a_flight_says_nothing() {
 }
 
 #[test]
-fn what_is_no_search_is_refused() {
+fn wrong_options_are_refused() {
     let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
-    let start = || asked(10);
+    let start = || start_options(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
-    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("the start is to be varied by 0"));
+    assert!(
+        refused(Options { start_m: Some(0.0), ..start() }).contains("--start: must be a finite number above 0, got 0")
+    );
     assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(refused(Options { flights: 0, ..start() }).contains("of 0 flights none is left"));
-    assert!(refused(Options { seeds: 11, ..start() }).contains("of 10 flights none is left"));
+    assert!(refused(Options { flights: 0, ..start() }).contains("--flights: must be at least the 1 of --seeds, got 0"));
+    assert!(
+        refused(Options { seeds: 11, ..start() }).contains("--flights: must be at least the 11 of --seeds, got 10")
+    );
     assert!(refused(Options { seeds: 2, ..start() }).contains("nothing in the flight is random"));
     assert!(refused(varied(&["law.f1=0..1"], 10)).contains("f1"));
     assert!(refused(varied(&["law.kind=0..1"], 10)).contains("law.kind = 0"));
@@ -218,7 +222,7 @@ fn what_is_no_search_is_refused() {
 }
 
 #[test]
-fn whole_numbers_are_those_of_keys_that_count_whatever_their_bounds() {
+fn whether_a_key_takes_integers_does_not_depend_on_its_bounds() {
     let bound = |key: &str| {
         let base = base(Source::Builtin("crazyflies".to_owned()), &[]);
         SearchSpace::new(&base, &varied(&[key], 2)).map(|space| space.bounds()[0].whole)

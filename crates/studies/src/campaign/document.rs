@@ -1,4 +1,4 @@
-//! The answer of a campaign for people: a sentence, notes, tables and figures.
+//! Answer of a campaign for readers: headline, notes, tables and figures.
 
 use super::summary::{LawSummary, Pair, Quantiles, Summary};
 use super::tally::{Bin, BinShares, Varied};
@@ -11,32 +11,33 @@ use tautline_core::text::{counted, significant};
 use tautline_report::figures::{Figure, Histogram, Share as Point, histograms, shares};
 use tautline_report::report::page::{Badge, Tone};
 
-/// What the numbers rest on.
+/// Assumptions of the numbers.
 const ASSUMED: [&str; 4] = [
-    "Runs are independent draws of what varies: a share is about that distribution, and about no other. Where only grids vary, \
-     runs are all of their points, and shares have no interval.",
-    "A flight violates where the independent judge finds two vehicles closer than delta, or one nearer to an obstacle than its \
-     clearance, between steps too. Flights that ended \
-     early, or that the judge cannot decide, count at the upper end of an interval.",
-    "Shares of a number of runs that was fixed beforehand have the two-sided interval of Clopper and Pearson, which leaves out 2.5 % on \
-     either side; the bound of the verdict is one-sided and leaves out 5 % above. Where flying stopped as soon as enough was known, \
-     both are those of a confidence sequence.",
-    "An interval holds the true value in at least 95 of 100 campaigns. Of many intervals on one page some will miss.",
+    "Runs are independent draws from the distributions of [vary], and shares apply to these distributions only. If \
+     only grids vary, the runs are all points of the grids, and shares have no interval.",
+    "A flight is violated if the independent judge finds two vehicles closer than delta, or a vehicle closer to an \
+     obstacle than its clearance, also between steps. Flights that ended early and undecided flights count at the \
+     upper end of an interval.",
+    "For a number of runs fixed beforehand, shares have the two-sided interval of Clopper and Pearson, with an error \
+     probability of 2.5 % on either side. The bound of the verdict is one-sided, with 5 %. With an early stop both are \
+     those of a confidence sequence.",
+    "An interval contains the true value in at least 95 of 100 campaigns. Of many intervals on one page some miss it.",
 ];
-/// What estimates of rare violations rest on.
+/// Assumptions of estimates of rare violations.
 const ASSUMED_OF_SPLITTING: [&str; 2] = [
-    "Each estimate is without bias for any number of flights; their mean has Student's interval, which is that of normal values.",
-    "Flights from one start differ by their noise from step to step; a run draws its start, and whatever else is varied, anew.",
+    "Each estimate is without bias for any number of flights. The mean has Student's interval for normal values.",
+    "Flights from one start differ by their noise from step to step. Each run draws its start and all varied keys.",
 ];
 
-/// A p-value in words.
+/// Returns a p-value, or its bound if it is small.
 fn p_value(p: f64) -> String {
     const LEAST: f64 = 1e-4;
     if p < LEAST { "below 0.0001".to_owned() } else { significant(p, 2) }
 }
 
 impl LawSummary {
-    /// Violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence (one-sided)`.
+    /// Returns the violations in a sentence, such as `0 of 10,000 flights violated: below 0.030 % with 95 % confidence
+    /// (one-sided)`.
     #[must_use]
     pub fn sentence(&self) -> String {
         if let Some(splitting) = &self.splitting {
@@ -44,13 +45,13 @@ impl LawSummary {
         }
         let Proportion { count, of, confidence, .. } = self.violated;
         if of == 0 {
-            return "no flight was flown: nothing is known".to_owned();
+            return "no flight was flown".to_owned();
         }
         let unknown = match self.unknown {
             0 => String::new(),
             unknown => format!(", {} unknown", separated(unknown)),
         };
-        // An upper bound of 1 bounds nothing.
+        // An upper bound of 1 is no information.
         let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
             let kind = match bound.kind {
                 BoundKind::OneSided => "one-sided",
@@ -70,7 +71,7 @@ impl LawSummary {
     }
 }
 
-/// The probability of a violation in a sentence.
+/// Returns the probability of a violation in a sentence.
 fn rare(splitting: &Repetitions) -> String {
     let Repetitions { repetitions, probability, confidence, extinct, .. } = splitting;
     let range = match (probability.low, probability.high) {
@@ -81,17 +82,16 @@ fn rare(splitting: &Repetitions) -> String {
     };
     let estimates = counted(*repetitions, "estimate", "estimates");
     match probability.value {
-        Some(0.0) => format!("no violation was found in {estimates}: nothing is known of how rare one is"),
-        Some(value) => format!(
-            "a flight is violated with a probability of {value:.2e}{range}, from {estimates}, of which {} came to nothing",
-            extinct.count
-        ),
-        None => "nothing was estimated".to_owned(),
+        Some(0.0) => format!("no violation in {estimates}: the probability has no upper bound"),
+        Some(value) => {
+            format!("probability of a violation {value:.2e}{range}, from {estimates}, {} of them 0", extinct.count)
+        }
+        None => "no estimate".to_owned(),
     }
 }
 
 impl Summary {
-    /// Whether runs are estimates of rare violations.
+    /// Returns whether runs are estimates of rare violations.
     fn is_of_estimates(&self) -> bool {
         self.laws.iter().any(|law| law.splitting.is_some())
     }
@@ -112,12 +112,12 @@ impl Summary {
         let numbers = |law: &LawSummary| {
             [
                 (format!("{}: smallest separation less delta [m]", law.name), law.clearance_m),
-                (format!("{}: formation reached at [s]", law.name), law.reached_at_s),
+                (format!("{}: time to reach the formation [s]", law.name), law.reached_at_s),
                 (format!("{}: path length of all vehicles [m]", law.name), law.path_length_m),
             ]
         };
         let rows: Vec<(String, Quantiles)> = self.laws.iter().flat_map(numbers).collect();
-        Table::of("Numbers of flights: quantiles with 95 % intervals of order statistics", &rows)
+        Table::of("Quantiles over the flights, with 95 % intervals of order statistics", &rows)
             .column("", "Number", Kind::Text, |(name, _)| name.clone())
             .column("", "Least", Kind::Metres, |(_, of)| of.min)
             .column("", "5 %", Kind::Metres, |(_, of)| of.p05)
@@ -145,7 +145,7 @@ impl Summary {
             .column("law", "Law", Kind::Text, |(law, _)| (*law).clone())
             .column("estimates", "Estimates", Kind::Count, |(_, of)| of.repetitions)
             .column("probability", "Probability of a violation", Kind::Rare, |(_, of)| of.probability)
-            .column("extinct", "Came to nothing", Kind::Count, |(_, of)| of.extinct.count)
+            .column("extinct", "Estimates of 0", Kind::Count, |(_, of)| of.extinct.count)
             .column("steps", "Steps flown", Kind::Count, |(_, of)| of.steps)
             .build()
     }
@@ -159,11 +159,11 @@ impl Summary {
         let drawn = (!clearance.is_empty())
             .then(|| histograms("clearance", "Smallest separation less delta", "clearance [m]", &clearance, limit));
         let arrived = (!reached.is_empty())
-            .then(|| histograms("reached", "When the formation was reached", "time [s]", &reached, None));
+            .then(|| histograms("reached", "Time to reach the formation", "time [s]", &reached, None));
         drawn.into_iter().chain(arrived).collect()
     }
 
-    /// Shares over a varied key.
+    /// Returns the section with the shares over a varied key.
     fn over(&self, varied: &Varied) -> Section {
         let share = |bin: &Bin, law: usize, pick: fn(&BinShares) -> Proportion| bin.laws.get(law).map(pick);
         let violated: fn(&BinShares) -> Proportion = |of| of.violated;
@@ -218,8 +218,8 @@ impl Study for Summary {
             (true, _) => (Tone::Good, "no violation"),
             (false, true) => (Tone::Bad, "violations"),
             (false, false) if is_broken => (Tone::Bad, "certificate broken"),
-            (false, false) if self.is_of_estimates() => (Tone::Bad, "nothing known"),
-            (false, false) => (Tone::Bad, "not all known"),
+            (false, false) if self.is_of_estimates() => (Tone::Bad, "no result"),
+            (false, false) => (Tone::Bad, "unknown flights"),
         };
         Badge { tone, word: word.to_owned() }
     }
@@ -239,11 +239,11 @@ impl Study for Summary {
         }
         notes.extend(self.stopped_early.then(|| {
             let runs = counted(self.runs, "run", "runs");
-            format!("enough was known after {runs} of {}: later ones are left out", separated(self.runs_planned))
+            format!("early stop after {runs} of {}: later runs are left out", separated(self.runs_planned))
         }));
         notes.extend((self.intervals == Intervals::ConfidenceSequence).then(|| {
-            "the number of runs was not fixed beforehand: shares have the interval of a confidence sequence, which is wider, and \
-             quantiles have none"
+            "the number of runs was not fixed beforehand: shares have the wider interval of a confidence sequence, and \
+             quantiles have no interval"
                 .to_owned()
         }));
         let mut each = |count: fn(&LawSummary) -> u64, what: [&str; 2], rest: &dyn Fn(&LawSummary) -> String| {
@@ -252,30 +252,28 @@ impl Study for Summary {
             }
         };
         each(|law| law.not_flown, ["run", "runs"], &|law| {
-            let why = law.not_flown_because.as_deref().unwrap_or("for no reason that was kept");
-            format!(" could not be flown as drawn and count nowhere ({why})")
+            let why = law.not_flown_because.as_deref().unwrap_or("unknown reason");
+            format!(" could not be flown and count in no share ({why})")
         });
         each(|law| law.certificates_broken, ["flight", "flights"], &|_| {
-            ": CERTIFICATE BROKEN, two vehicles came closer than the law promised, by a step too long for it or a defect; \
-             column breaks_certificate of the table says where"
+            ": CERTIFICATE BROKEN, two vehicles came closer than certified, because of a step too long for the law or \
+             a defect; see the column breaks_certificate of the table"
                 .to_owned()
         });
         each(|law| law.unknown, ["flight", "flights"], &|law| {
             let them = if law.unknown == 1 { "it as a violation" } else { "them as violations" };
-            format!(
-                " ended early without a violation, or the judge cannot decide; the upper end of the interval counts {them}"
-            )
+            format!(" ended early without a violation or undecided; the upper end of the interval counts {them}")
         });
         notes
     }
 
     fn sections(&self) -> Vec<Section> {
         if self.is_of_estimates() {
-            return vec![Section::new("How rare a violation is", [Block::Table(self.estimates_table())])];
+            return vec![Section::new("Probability of a violation", [Block::Table(self.estimates_table())])];
         }
         let mut sections = vec![
             Section::new("How flights ended", [Block::Table(self.shares_table()), Block::Figures(self.histograms())]),
-            Section::new("Numbers of flights", [Block::Table(self.numbers_table())]),
+            Section::new("Quantiles", [Block::Table(self.numbers_table())]),
         ];
         if !self.pairs.is_empty() {
             sections.push(Section::new("Laws on the same runs", [Block::Table(self.pairs_table())]));

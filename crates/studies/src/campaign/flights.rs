@@ -1,4 +1,4 @@
-//! A campaign: the flights of every run, made from its manifest alone.
+//! Flights of a campaign, each determined by the manifest and the number of its run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,24 +17,24 @@ use crate::splitting::{self, Settings};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
 
-/// Most runs of a campaign.
+/// Largest number of runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
-/// Runs of a shard, where the number of shards is not given: what a machine that dies loses, at most.
+/// Default number of runs of a shard: the most that a failed machine loses.
 const RUNS_OF_A_SHARD: u64 = 250;
-/// Most values of a list that are tried before anything is flown.
+/// Most values of a list that are tried before the first flight.
 const MOST_TRIED: usize = 1000;
-/// Runs among which one that can be flown is looked for beforehand.
+/// Number of first runs that are searched for one that can be flown.
 const FIRST_TRIED: u64 = 100;
-/// Seeds that are drawn by run where nobody says otherwise.
+/// Seeds that each run draws unless the specification sets them.
 const START_SEED: &str = "start.seed";
 const NOISE_SEED: &str = "noise.seed";
-/// Tables that bring chance into a flight.
+/// Tables whose keys can make a flight random.
 const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
 
-/// Flights whose rows are in memory at once.
+/// Largest number of rows in memory.
 const AT_ONCE: u64 = 1024;
 
-/// The flights of every run.
+/// Flights of all runs.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     manifest: Manifest,
@@ -47,21 +47,21 @@ pub struct Campaign {
     argument: String,
 }
 
-/// A law that flies every run.
+/// Law that flies every run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Law {
-    /// That of its kind, or of its table `[laws.NAME]`.
+    /// Name of the law: its kind, or that of its table `[laws.NAME]`.
     pub name: String,
-    /// What sets it, as `--set` takes it; nothing where it is the scenario's own.
+    /// Overrides that select the law, as `--set` takes them; empty for the scenario's own law.
     pub overrides: Vec<String>,
 }
 
 impl Campaign {
-    /// Plans a campaign, whose name is that of its file, in `shards` parts, or as many as are sensible. A scenario is found from
-    /// `folder`.
+    /// Plans a campaign with a name and a number of shards, by default one for each [`RUNS_OF_A_SHARD`] runs. The path
+    /// of a scenario is relative to `folder`.
     ///
     /// # Errors
-    /// [`Failure`] for a specification that makes no campaign, and for the first value, law or run that cannot be flown.
+    /// [`Failure`] for a wrong specification, and for the first value, law or run that cannot be flown.
     pub fn plan(
         spec: &Spec,
         name: &str,
@@ -101,22 +101,22 @@ impl Campaign {
         Ok(campaign)
     }
 
-    /// The campaign of a manifest.
+    /// Returns the campaign of a manifest.
     ///
     /// # Errors
-    /// [`Failure`] where it cannot be flown here, such as for a file that its scenario names and that is not there, or is
-    /// another one.
+    /// [`Failure`] if the campaign cannot be flown here, for example because a file of its scenario is missing or
+    /// different.
     pub fn of(manifest: Manifest) -> Result<Self, Failure> {
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec)?;
         let first = campaign.first();
         if first != campaign.manifest.first {
             let problem = format!(
-                "run 0 is another flight here than where the campaign was planned (SHA-256 {} here, {} there)",
+                "run 0 differs from the planned campaign (SHA-256 {} here, {} in the manifest)",
                 first.join(", "),
                 campaign.manifest.first.join(", ")
             );
-            let remedy = "provide the same files of the scenario everywhere";
+            let remedy = "use the same files of the scenario on all machines";
             return Err(other_campaign(&campaign.manifest.folder, problem, remedy));
         }
         Ok(campaign)
@@ -168,7 +168,7 @@ impl Campaign {
         Ok(Self { manifest, base, laws, variations, seed: spec.seed, stop: spec.stop, splitting, argument })
     }
 
-    /// Refuses values that their keys do not take, and runs that are all the same.
+    /// Refuses values that their keys do not take, and runs that are all the same flight.
     fn check(&self, spec: &Spec) -> Result<(), Failure> {
         let grids = self.variations.values().any(|variation| variation.grid_len().is_some());
         if grids && self.stop.is_some() {
@@ -183,8 +183,8 @@ impl Campaign {
         let runs = self.manifest.runs;
         if runs > 1 && self.splitting.is_none() && self.runs_are_equal() {
             let problem = format!("runs: all {runs} runs are the same flight");
-            let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in [vary], or \
-                          give the scenario a random start or wind";
+            let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in \
+                          [vary], or give the scenario a random start or wind";
             return Err(spec.refuse("runs", problem, remedy));
         }
         for law in &self.laws {
@@ -235,89 +235,90 @@ impl Campaign {
         flyable.map_or_else(|| first().map_err(under), Ok)
     }
 
-    /// What run 0 is under each law: the hash of its scenario, or why there is none.
+    /// Returns for run 0 under each law the hash of the scenario, or the reason why the run cannot be flown.
     fn first(&self) -> Vec<String> {
         let first = self.laws.iter().map(|law| self.scenario(0, law));
         first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
     }
 
-    /// What it is made from.
+    /// Returns the manifest.
     #[must_use]
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// The scenario without any drawn value.
+    /// Returns the scenario without drawn values.
     #[must_use]
     pub fn own(&self) -> &Scenario {
         self.base.own()
     }
 
-    /// The laws that fly every run, in their order.
+    /// Returns the laws that fly every run, in order.
     #[must_use]
     pub fn laws(&self) -> &[Law] {
         &self.laws
     }
 
-    /// What differs from run to run, in the order of the keys.
+    /// Returns the variations of all varied keys.
     #[must_use]
     pub fn variations(&self) -> &BTreeMap<String, Variation> {
         &self.variations
     }
 
-    /// When enough has been flown.
+    /// Returns the rule for an early stop.
     #[must_use]
     pub fn stop(&self) -> Option<Stop> {
         self.stop
     }
 
-    /// How each run is split, where runs are no flights.
+    /// Returns the settings of splitting, if runs are estimates.
     #[must_use]
     pub fn splitting(&self) -> Option<&Settings> {
         self.splitting.as_ref()
     }
 
-    /// What all random numbers begin from.
+    /// Returns the seed of all random numbers.
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// Steps of all flights of so many runs, as far as they are flown to their end.
+    /// Returns the number of steps of all flights of `runs` runs, if all are flown to their end.
     #[must_use]
     pub fn steps(&self, runs: u64) -> u64 {
         let flights = self.splitting.map_or(1, |settings| settings.flights as u64);
         self.own().time.steps().saturating_mul(runs).saturating_mul(self.laws.len() as u64).saturating_mul(flights)
     }
 
-    /// What `tautline run` takes for its scenario: a built-in one's name, or a path.
+    /// Returns the scenario as an argument of `tautline run`: the name of a built-in one, or a path.
     #[must_use]
     pub fn scenario_argument(&self) -> &str {
         &self.argument
     }
 
-    /// The drawn values of a run, in the order of the keys.
+    /// Returns the drawn values of a run, in the order of the keys.
     #[must_use]
     pub fn values(&self, run: u64) -> Vec<Value> {
         self.drawn(run).into_values().map(|value| serde_json::to_value(value).unwrap_or_default()).collect()
     }
 
-    /// What flies a run under a law, each as `--set` takes it.
+    /// Returns the overrides that fly a run under a law, as `--set` takes them.
     #[must_use]
     pub fn sets(&self, run: u64, law: &Law) -> Vec<String> {
         self.base.sets().chain(law.overrides.iter().cloned()).chain(written(&self.drawn(run))).collect()
     }
 
-    /// The flight of a run under a law.
+    /// Returns the scenario of a run under a law.
     ///
     /// # Errors
-    /// [`ScenarioError`] where what was drawn cannot be flown, such as a start of two vehicles too near each other.
+    /// [`ScenarioError`] if the drawn values cannot be flown, such as a start of two vehicles within delta.
     pub fn scenario(&self, run: u64, law: &Law) -> Result<Scenario, ScenarioError> {
         self.read_with(law, &self.drawn(run))
     }
 
-    /// Flies a run under one of the laws, counted from 0. Returns `None` after an interruption. A flight that has begun comes to
-    /// its end; an estimate does not.
+    /// Flies a run under one of the laws, counted from 0. Returns `None` after an interruption: it ends estimates, but
+    /// not flights under way.
+    ///
     ///
     /// # Errors
     /// [`Failure`] if a law or a judge cannot be built, or the campaign has no such law.
@@ -347,7 +348,8 @@ impl Campaign {
         Ok((row.flight.is_some() || row.splitting.is_some()).then_some(row))
     }
 
-    /// Flies everything and keeps no file: the answer that [`super::Folder::merge`] gives, or none where it was interrupted.
+    /// Flies the whole campaign without files. Returns the answer of [`super::Folder::merge`], or `None` after an
+    /// interruption.
     ///
     /// # Errors
     /// As [`Campaign::row`].
@@ -372,7 +374,7 @@ impl Campaign {
     }
 
     fn drawn(&self, run: u64) -> BTreeMap<&str, toml::Value> {
-        // The last grid changes fastest, as digits do.
+        // The last grid changes fastest, like the last digit of a number.
         let mut rest = run;
         let places = self.variations.iter().rev().map(|(key, variation)| {
             let place = variation.grid_len().map_or(0, |len| {
@@ -390,7 +392,7 @@ fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item 
     drawn.iter().map(|(key, value)| format!("{key}={value}"))
 }
 
-/// Whether a key of one of these tables is varied, which may bring chance into it.
+/// Returns whether a key of one of these tables is varied.
 fn varies(variations: &BTreeMap<String, Variation>, tables: &[&str]) -> bool {
     variations.keys().any(|key| tables.iter().any(|table| key.starts_with(table)))
 }

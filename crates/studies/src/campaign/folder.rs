@@ -1,4 +1,4 @@
-//! Folder of a campaign: its manifest, its parts, the missing shards, and the merge of all parts into a table and an answer.
+//! Folder of a campaign: manifest, parts, missing shards, and the merge of all parts into a table and an answer.
 
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher as _;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Campaign;
-use super::shard::{self, Found, Row, fields};
+use super::shard::{self, PartState, Row, fields};
 use super::spec::refused;
 use super::summary::{Gathered, Summary};
 use crate::SCHEMA_VERSION;
@@ -19,17 +19,17 @@ use crate::table::{Cell, ParquetTable};
 use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::Failure;
 
-/// The table's name in the folder of a campaign.
+/// File name of the table in the folder of a campaign.
 pub const RESULTS: &str = "results.parquet";
-/// The answer's name in the folder of a campaign.
+/// File name of the answer in the folder of a campaign.
 pub const ANSWER: &str = "campaign.json";
 
-/// Rows of a group of the table, which is built in memory.
+/// Number of rows of a row group of the table; one group is in memory.
 const GROUP_ROWS: usize = 50_000;
-/// Files beside the parts, which a new campaign does not overwrite.
+/// Files beside the parts that a new campaign does not overwrite.
 const LEFT: [&str; 3] = ["results.parquet", "campaign.json", "campaign.html"];
 
-/// What a merge left.
+/// Result of a merge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Merged {
     /// The answer.
@@ -38,7 +38,7 @@ pub struct Merged {
     pub sha256: String,
 }
 
-/// A folder and the campaign in it.
+/// Folder with the campaign in it.
 #[derive(Clone, Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -46,8 +46,8 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Writes the manifest of a campaign into a folder. A folder that holds the same campaign stays as it is; its number of shards
-    /// must be equal if `shards_asked`.
+    /// Writes the manifest of a campaign into a folder. A folder with the same campaign stays unchanged; its number of
+    /// shards must be equal if `shards_asked`.
     ///
     /// # Errors
     /// [`Failure`] if the folder holds another campaign, or this campaign in another number of shards.
@@ -72,14 +72,14 @@ impl Folder {
             return Err(other_campaign(&there, problem, "give another folder with --out, or move the file"));
         }
         let folder = Self { path: path.to_owned(), campaign };
-        folder.make()?;
+        folder.create_parts()?;
         folder.campaign.manifest().write(&file)?;
         // If two processes plan at once, the later manifest stays, and the other process sees it here.
         let there = Manifest::read(&file, &folder.campaign.manifest().tool)?;
         if there == *folder.campaign.manifest() { Ok(folder) } else { Self::plan(path, folder.campaign, shards_asked) }
     }
 
-    /// The campaign in a folder.
+    /// Opens the campaign in a folder.
     ///
     /// # Errors
     /// As [`Manifest::read`] and [`Campaign::of`].
@@ -90,53 +90,53 @@ impl Folder {
         Ok(Self { path: folder.to_owned(), campaign })
     }
 
-    /// Makes room for parts.
-    pub(super) fn make(&self) -> Result<(), Failure> {
+    /// Creates the folder of parts.
+    pub(super) fn create_parts(&self) -> Result<(), Failure> {
         let parts = self.path.join("parts");
         fs::create_dir_all(&parts).map_err(cannot("write", &parts))
     }
 
-    /// What is flown.
+    /// Returns the campaign.
     #[must_use]
     pub fn campaign(&self) -> &Campaign {
         &self.campaign
     }
 
-    /// Where it is.
+    /// Returns the path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A file beside the manifest.
+    /// Returns the path of a file beside the manifest.
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// The part of a shard.
+    /// Returns the path of the part of a shard.
     pub(super) fn part(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.jsonl", stem(shard)))
     }
 
-    /// A part that says something else than the one that was there.
+    /// Returns the path for a part that differs from the part that another machine wrote.
     pub(super) fn differs(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.differs.jsonl", stem(shard)))
     }
 
-    /// Wall-clock times of a shard.
+    /// Returns the path of the wall-clock times of a shard.
     pub(super) fn times(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.times.json", stem(shard)))
     }
 
-    /// A name for a file of a shard that no other process takes.
-    pub(super) fn own(&self, shard: u64, kind: &str) -> PathBuf {
+    /// Returns a path for a file of a shard that only this process uses.
+    pub(super) fn unique_path(&self, shard: u64, kind: &str) -> PathBuf {
         let number = RandomState::new().hash_one(std::process::id());
         self.path.join("parts").join(format!("{}.{number:016x}.{kind}", stem(shard)))
     }
 
-    /// Files of a shard of this kind that some process left.
-    pub(super) fn left(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, Failure> {
+    /// Returns the files of this kind that processes left for a shard.
+    pub(super) fn leftovers(&self, shard: u64, kind: &str) -> Result<Vec<PathBuf>, Failure> {
         let folder = self.path.join("parts");
         let (begin, end) = (format!("{}.", stem(shard)), format!(".{kind}"));
         let is_one = |path: &PathBuf| {
@@ -154,9 +154,9 @@ impl Folder {
     /// Reads the part of a shard.
     ///
     /// # Errors
-    /// [`Failure`] if the shard was flown twice with different results, the part is of another campaign, or the file cannot be
-    /// read.
-    pub fn read(&self, shard: u64) -> Result<Found, Failure> {
+    /// [`Failure`] if the shard was flown twice with different results, the part is of another campaign, or the file
+    /// cannot be read.
+    pub fn read(&self, shard: u64) -> Result<PartState, Failure> {
         let (kept, other) = (self.part(shard), self.differs(shard));
         if other.exists() {
             return Err(different_results(shard, &kept, &other));
@@ -174,9 +174,9 @@ impl Folder {
             return Ok(None);
         };
         match self.read(shard)? {
-            Found::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
-            Found::Nothing => Ok(None),
-            Found::Damaged(why) => Err(self.missing_shards(&[shard], &[self.damage(shard, why)])),
+            PartState::Whole(rows) => Ok(rows.into_iter().find(|row| row.place() == (run, law))),
+            PartState::Missing => Ok(None),
+            PartState::Damaged(why) => Err(self.missing_shards(&[shard], &[self.damage(shard, why)])),
         }
     }
 
@@ -187,9 +187,9 @@ impl Folder {
     pub fn missing(&self) -> Result<Vec<(u64, Option<String>)>, Failure> {
         let of_shard = |shard| {
             Ok(match self.read(shard)? {
-                Found::Whole(_) => None,
-                Found::Nothing => Some((shard, None)),
-                Found::Damaged(why) => Some((shard, Some(self.damage(shard, why)))),
+                PartState::Whole(_) => None,
+                PartState::Missing => Some((shard, None)),
+                PartState::Damaged(why) => Some((shard, Some(self.damage(shard, why)))),
             })
         };
         (0..self.campaign.manifest().shards).filter_map(|shard| of_shard(shard).transpose()).collect()
@@ -201,7 +201,7 @@ impl Folder {
     /// As [`Folder::read`].
     pub fn damaged(&self, shard: u64) -> Result<Option<String>, Failure> {
         let found = self.read(shard)?;
-        Ok(if let Found::Damaged(why) = found { Some(self.damage(shard, why)) } else { None })
+        Ok(if let PartState::Damaged(why) = found { Some(self.damage(shard, why)) } else { None })
     }
 
     fn damage(&self, shard: u64, why: &str) -> String {
@@ -223,8 +223,8 @@ impl Folder {
 }
 
 impl Folder {
-    /// Writes `results.parquet` and `campaign.json`: the same bytes for any number of shards and threads, in whatever order and
-    /// however often interrupted they were flown. Runs after which enough was known are left out, whether they were flown or not.
+    /// Writes `results.parquet` and `campaign.json`. Their bytes are the same for any number of shards, threads and
+    /// interruptions. Runs after an early stop are left out, flown or not.
     ///
     /// # Errors
     /// As [`Folder::read`], and [`Failure`] if shards are missing or a file cannot be written.
@@ -257,7 +257,7 @@ impl Folder {
         Ok(Merged { summary, sha256: base16(&Sha256::digest(&bytes)) })
     }
 
-    /// The answer of what was flown, without writing it.
+    /// Returns the answer of all flown rows without writing it.
     ///
     /// # Errors
     /// As [`Folder::merge`].
@@ -265,14 +265,14 @@ impl Folder {
         self.gather(&mut |_| Ok(()))
     }
 
-    /// The answer of all rows that count, each of which `take` receives in order.
+    /// Returns the answer, and calls `take` for each row that counts, in order.
     fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), Failure>) -> Result<Summary, Failure> {
         let mut gathered = Gathered::new(self.campaign());
         for shard in 0..self.campaign().manifest().shards {
             if gathered.is_enough() {
                 break;
             }
-            let Found::Whole(rows) = self.read(shard)? else {
+            let PartState::Whole(rows) = self.read(shard)? else {
                 let missing = self.missing()?.into_iter().filter(|&(missing, _)| missing >= shard);
                 let (missing, damaged): (Vec<_>, Vec<_>) = missing.unzip();
                 return Err(self.missing_shards(&missing, &damaged.into_iter().flatten().collect::<Vec<_>>()));
@@ -294,18 +294,18 @@ pub(super) fn different_results(shard: u64, kept: &Path, other: &Path) -> Failur
     Failure::machine("campaign/other-bits", problem).with_help(FAULTY)
 }
 
-/// Remedy for a flight that is not the same everywhere.
-pub(super) const FAULTY: &str = "the same flight has the same bits everywhere: look for a faulty machine, or a machine with another \
-                                 program; remove the wrong part to continue";
+/// Remedy for a flight with different bits on two machines.
+pub(super) const FAULTY: &str = "equal flights have equal bits on all machines: look for a faulty machine, or one with \
+                                 another program; remove the wrong part to continue";
 
-/// Rows of a process that is under way, or was killed.
+/// Kind of the file with the rows of a process that is running or was killed.
 pub(super) const JOURNAL: &str = "journal";
 
 fn stem(shard: u64) -> String {
     format!("shard-{shard:09}")
 }
 
-/// Shards as a list that [`parse`] reads: `13,500-502`.
+/// Returns shards as a list for [`parse`]: `13,500-502`.
 #[must_use]
 pub fn listed(shards: &[u64]) -> String {
     let mut spans: Vec<[u64; 2]> = Vec::new();
@@ -319,7 +319,7 @@ pub fn listed(shards: &[u64]) -> String {
     spans.iter().map(said).collect::<Vec<_>>().join(",")
 }
 
-/// Reads a list of shards such as `7`, `3-5`, `13,500-502`, or `env:NAME` for the list in an environment variable.
+/// Parses a list of shards such as `7`, `3-5`, `13,500-502`, or `env:NAME` for the list in an environment variable.
 ///
 /// # Errors
 /// [`Failure`] for a text that is not a list, and for a shard beyond the last.
@@ -347,60 +347,60 @@ pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, Failure> {
     Ok(parsed)
 }
 
-/// Everything that a shard needs to be flown anywhere.
+/// Everything that a machine needs to fly a shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Version of these keys and of the parts.
+    /// Version of the keys of manifest and parts.
     pub schema_version: u32,
-    /// SHA-256 over everything below but `shards` and `folder`: two campaigns with the same one fly the same flights.
+    /// SHA-256 over all keys below except `shards` and `folder`. Equal hashes mean equal flights.
     pub campaign: String,
-    /// Name of the campaign: that of its specification's file.
+    /// Name of the campaign: the file name of its specification.
     pub name: String,
-    /// What flies it.
+    /// Program that flies the campaign.
     pub tool: Program,
-    /// What the scenario is called.
+    /// Name of the scenario.
     pub scenario_name: String,
-    /// Its TOML.
+    /// TOML of the scenario.
     pub scenario: String,
-    /// The specification, with everything that the command line added.
+    /// Specification, with the keys of the command line.
     pub spec: String,
     /// Number of runs.
     pub runs: u64,
-    /// SHA-256 of the resolved scenario of run 0 under each law: other files that a scenario names make another campaign.
+    /// SHA-256 of the resolved scenario of run 0 under each law. It detects changes in files that the scenario names.
     pub first: Vec<String>,
-    /// Into how many parts the runs are split.
+    /// Number of parts into which the runs are split.
     pub shards: u64,
-    /// The folder that paths in the scenario count from, as it was planned.
+    /// Folder to which paths in the scenario are relative.
     pub folder: PathBuf,
 }
 
-/// A program, to its last bit.
+/// Identity of a program.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Program {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its version.
+    /// Version.
     pub version: String,
-    /// SHA-256 of its file.
+    /// SHA-256 of its executable.
     pub sha256: String,
 }
 
-/// The file that holds this crate, where it is not that of the process.
+/// File that contains this crate, if it is not the executable of the process.
 static HOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 impl Program {
-    /// Says which file holds this crate where it is a library that a program of others loads. Said once, before any campaign:
-    /// what flies is known by that file then.
+    /// Sets the file that contains this crate if it is a library of another program. The hash of this file then
+    /// identifies the program. Call it before any campaign.
     pub fn is_in(file: PathBuf) {
-        // Whoever says it again says the same.
+        // All calls set the same file, so a second call changes nothing.
         let _ = HOLDER.set(file);
     }
 
-    /// The one that is running.
+    /// Returns the running program.
     ///
     /// # Errors
-    /// [`Failure`] where its file cannot be read.
+    /// [`Failure`] if its file cannot be read.
     pub fn running() -> Result<Self, Failure> {
         let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
         let path = path.map_err(cannot("read", Path::new("the program")))?;
@@ -414,7 +414,7 @@ impl Program {
 }
 
 impl Manifest {
-    /// The same manifest with its own hash.
+    /// Returns the same manifest with its hash.
     #[must_use]
     pub(super) fn sealed(mut self) -> Self {
         self.campaign = self.hash();
@@ -427,18 +427,18 @@ impl Manifest {
         let texts = [&version, name, &tool.sha256, scenario_name, scenario, spec, &runs];
         let mut hash = Sha256::new();
         for text in texts.into_iter().chain(first) {
-            // Lengths keep what ends one text from beginning the next.
+            // Lengths separate the texts, so that different texts do not give the same bytes.
             hash.update((text.len() as u64).to_le_bytes());
             hash.update(text);
         }
         base16(&hash.finalize())
     }
 
-    /// Runs of a shard, from 0: as many as its neighbours', give or take one.
+    /// Returns the runs of a shard, from 0. The sizes of two shards differ by at most one run.
     #[must_use]
     pub fn range(&self, shard: u64) -> std::ops::Range<u64> {
         let shards = self.shards.max(1);
-        // The same as shard times runs over shards, which may be larger than any number.
+        // Equal to `shard * runs / shards`, without overflow.
         let at = |shard: u64| self.runs / shards * shard + self.runs % shards * shard / shards;
         at(shard)..at(shard + 1)
     }
@@ -446,8 +446,8 @@ impl Manifest {
     /// Reads a manifest.
     ///
     /// # Errors
-    /// [`Failure`] `campaign/other-campaign` if the file is missing, is not a manifest, was changed by hand, or was planned by
-    /// another program.
+    /// [`Failure`] `campaign/other-campaign` if the file is missing, is not a manifest, was changed by hand, or was
+    /// planned by another program.
     pub fn read(path: &Path, program: &Program) -> Result<Self, Failure> {
         let foreign = |problem: &str, remedy: &str| Err(other_campaign(path, problem, remedy));
         let text = match fs::read_to_string(path) {
@@ -478,7 +478,7 @@ impl Manifest {
             );
             return foreign(
                 &problem,
-                "use the same program everywhere, or plan the campaign again into another folder",
+                "use the same program on all machines, or plan the campaign again into another folder",
             );
         }
         Ok(read)
@@ -504,11 +504,11 @@ pub(super) fn cannot(what: &'static str, path: &Path) -> impl FnOnce(std::io::Er
     let path = path.display();
     move |error| {
         Failure::machine("files/cannot-access", format!("{path}: cannot {what} the file: {error}"))
-            .with_help("free some space or mend access, and start again: finished flights are kept")
+            .with_help("free some space or correct the permissions, and start again: finished flights are kept")
     }
 }
 
-/// Bytes in hexadecimal digits.
+/// Returns bytes as hexadecimal digits.
 pub(super) fn base16(bytes: &[u8]) -> String {
     use std::fmt::Write as _;
     bytes.iter().fold(String::new(), |mut text, byte| {

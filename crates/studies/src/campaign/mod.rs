@@ -1,9 +1,9 @@
-//! Many flights in shards, on one machine or on several with a common folder, merged into one answer with intervals.
+//! Campaigns: many flights in shards, on one or several machines, merged into one answer with intervals.
 //!
-//! A [`Spec`] is the file of the user. A [`Campaign`] has everything resolved and makes the flight of a run from the number of the
-//! run alone. A [`Folder`] holds the manifest and a part for each finished shard; each file is written whole or not at all. A merge
-//! writes a table with a row for each flight and a [`Summary`]. Their bytes are the same for any number of shards, threads,
-//! machines and interruptions.
+//! A [`Spec`] is the user's file. A [`Campaign`] is the resolved specification; it makes the flight of a run from the
+//! run's number only. A [`Folder`] holds the manifest and a part for each finished shard; each file is complete or
+//! absent. A merge writes a table with a row for each flight, and a [`Summary`]. Their bytes are the same for any
+//! number of shards, threads, machines and interruptions.
 
 mod document;
 mod flights;
@@ -20,7 +20,7 @@ pub use flights::{Campaign, Law, MOST_RUNS};
 pub use folder::{ANSWER, Folder, Manifest, Merged, Program, RESULTS, listed, parse};
 pub use replay::{ReplayRequest, WorstFlight, replay};
 pub use request::{CampaignAnswer, CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
-pub use shard::{Found, Known, Row, Shard};
+pub use shard::{Known, PartState, Row, Shard};
 pub use spec::{Method, Spec, Stop};
 pub use summary::{BadRun, LawSummary, Pair, Quantiles, Summary, Worst};
 pub use tally::{Bin, BinShares, BoundKind, Intervals, Tally, UpperBound, Varied};

@@ -1,4 +1,4 @@
-//! Flights of a campaign flown again: the worst flights for its page, and any flight by its number.
+//! Replays of flights of a campaign: the worst flights for its page, and any flight by its number.
 
 use std::path::{Path, PathBuf};
 
@@ -17,16 +17,16 @@ use tautline_report::request::{
 };
 use tautline_sim::scenario::Scenario;
 
-/// Flight of a campaign that is flown again, and the folder of its files.
+/// Request for a replay of a flight, with the folder of its files.
 #[derive(Clone, Debug)]
 pub struct ReplayRequest {
     /// Number of the run, from 0.
     pub run: u64,
-    /// The law; the first by default.
+    /// Name of the law; the first by default.
     pub law: Option<String>,
-    /// The flight among the violated flights of this run, from 0, if runs are estimates of rare violations.
+    /// Index of the violated flight in this run, from 0, if runs are estimates of rare violations.
     pub bad: Option<usize>,
-    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the campaign's.
+    /// Folder for the recording and the report; by default `worst/LAW-run-I` in the folder of the campaign.
     pub out: Option<PathBuf>,
 }
 
@@ -38,7 +38,7 @@ pub struct WorstFlight {
     /// The law.
     pub law: String,
     /// Description in a sentence.
-    pub said: String,
+    pub description: String,
     /// The command that repeats the flight.
     pub command: String,
     /// Path of its recording, relative to the page.
@@ -50,53 +50,53 @@ pub struct WorstFlight {
 }
 
 impl WorstFlight {
-    /// The section of a page on the worst flights.
+    /// Returns the section of a page on the worst flights.
     pub(super) fn section(flights: &[Self]) -> Section {
         let mut blocks = Vec::new();
         let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
         if flights.is_empty() {
-            blocks.push(page::list(&["There are none."]));
+            blocks.push(page::list(&["None."]));
         }
         blocks.push(page::pictures(&pictures));
         for flight in flights {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
-            blocks.push(page::list(&std::iter::once(flight.said.clone()).chain(recording).collect::<Vec<_>>()));
+            blocks.push(page::list(&std::iter::once(flight.description.clone()).chain(recording).collect::<Vec<_>>()));
             let replay = flight.replay.as_ref();
-            blocks.extend(replay.map(|replay| page::replay(&flight.said, replay, Start::OnDemand)));
+            blocks.extend(replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand)));
             blocks.push(page::command(&flight.command));
         }
         Section::new("The worst flights", blocks.into_iter().map(Block::Page))
     }
 }
 
-/// A flight of a campaign.
+/// Identity of a flight of a campaign.
 #[derive(Clone, Copy, Debug)]
 struct FlightId<'a> {
     law: &'a Law,
     run: u64,
-    /// Number among the violated flights of an estimate.
+    /// Index in the violated flights of an estimate.
     bad: Option<usize>,
 }
 
 impl FlightId<'_> {
-    /// Returns the name of its folder.
+    /// Returns the name of the flight's folder.
     fn name(self) -> String {
         let bad = self.bad.map_or_else(String::new, |bad| format!("-bad-{bad}"));
         format!("{}-run-{}{bad}", self.law.name, self.run)
     }
 
-    /// Returns the default folder of its files.
+    /// Returns the default folder of the flight's files.
     fn folder(self, folder: &Folder) -> PathBuf {
         folder.file("worst").join(self.name())
     }
 
-    /// Returns the flight in words.
+    /// Returns a description of the flight.
     fn words(self) -> String {
-        let bad = self.bad.map_or_else(String::new, |bad| format!("bad flight {bad} of "));
+        let bad = self.bad.map_or_else(String::new, |bad| format!("violated flight {bad} of "));
         format!("{bad}run {} under {}", self.run, self.law.name)
     }
 
-    /// Returns its row; `None` if the run has not been flown.
+    /// Returns the row of the flight; `None` if the run has not been flown.
     fn row(self, folder: &Folder) -> Result<Option<Row>, Failure> {
         let law = folder.campaign().laws().iter().position(|law| law == self.law).unwrap_or_default();
         folder.row(self.run, law)
@@ -107,15 +107,12 @@ impl FlightId<'_> {
         scenario.map_err(|error| Failure::from(error).under(&format!("run {}", self.run)))
     }
 
-    /// Refuses a state hash other than that of the campaign.
+    /// Refuses a state hash that differs from that of the campaign.
     fn compare(self, found: &str, expected: &str) -> Result<(), Failure> {
         if found == expected {
             return Ok(());
         }
-        let problem = format!(
-            "{}: flown again it has the state hash {found}, and in the campaign it had {expected}",
-            self.words()
-        );
+        let problem = format!("{}: the replay has the state hash {found}, the campaign {expected}", self.words());
         Err(Failure::machine("campaign/other-bits", problem).with_help(FAULTY))
     }
 
@@ -128,8 +125,8 @@ impl FlightId<'_> {
     }
 }
 
-/// Flies one flight of a campaign again, with its recording and pictures, and compares its state hash with the campaign's.
-/// Returns whether it passes.
+/// Flies one flight of a campaign again, with recording and pictures, and compares its state hash with that of the
+/// campaign. Returns whether the flight passes.
 ///
 /// # Errors
 /// [`Failure`] if the flight does not exist, has another state hash, or a file cannot be written.
@@ -174,7 +171,7 @@ pub fn replay(
             check(flight, &left, &row.state_hash)?;
             monitor.say(&format!("state hash {}, as in the campaign", row.state_hash));
         }
-        None => monitor.warn("note: the campaign has not flown this run: there is nothing to compare it with"),
+        None => monitor.warn("note: the campaign has not flown this run, so its state hash is not compared"),
     }
     Ok(left.report.verdict.pass)
 }
@@ -204,7 +201,7 @@ pub(super) fn fly_worst_again(
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     for (law, worst) in worst.into_iter().take(most) {
         if monitor.is_interrupted() {
-            monitor.warn("interrupted: the page has no recordings of the flights that were not flown again");
+            monitor.warn("interrupted: flights that were not repeated have no recordings on the page");
             break;
         }
         let flight = FlightId { law, run: worst.run, bad: None };
@@ -218,15 +215,16 @@ pub(super) fn fly_worst_again(
     Ok(flights)
 }
 
-/// Flies a violated flight of an estimate again.
+/// Repeats a violated flight of an estimate.
 fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
     fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
-    // Relative to the folder of the page, so that the page has the same bytes wherever the campaign is.
+    // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
-    let said = format!(
-        "Bad flight {number} of run {run} under {}: {} m below delta in step {}. To fly it again, in the folder of this page:",
+    let description = format!(
+        "Violated flight {number} of run {run} under {}: {} m below delta in step {}. To repeat it, in the folder of \
+         this page:",
         law.name,
         metres(-bad.clearance_m),
         bad.violated_at_step
@@ -234,7 +232,7 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     Ok(WorstFlight {
         run: bad.run,
         law: law.name.clone(),
-        said,
+        description,
         command: command_line(command.into_iter()),
         recording: Some(format!("worst/{}/{RECORDING}", flight.name())),
         picture: None,
@@ -242,13 +240,13 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
     })
 }
 
-/// Flies a violated flight of an estimate again, records it, and compares the state after the step of the violation. Returns the
-/// state hash.
+/// Repeats and records a violated flight of an estimate, and compares the state after the step of the violation.
+/// Returns the state hash.
 fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
         let problem = format!("--bad: the campaign has no {}", flight.words());
-        let remedy = format!("{} are kept of this run, counted from 0", kept.len());
+        let remedy = format!("this run has {} kept flights, counted from 0", kept.len());
         return Err(Failure::input("campaign/no-flight", problem, remedy));
     };
     let scenario = flight.scenario(folder.campaign())?;
@@ -278,7 +276,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
     let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
     let by_obstacle = worst.outcome == Outcome::Violated && worst.clearance_m >= 0.0;
-    let said = format!(
+    let description = format!(
         "Run {} under {}: {}{pair}{} m{at}, {} m {} delta; it {reached}.",
         flight.run,
         flight.law.name,
@@ -288,7 +286,8 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );
     let closest = left.pictures.iter().find(|(name, _)| name == "closest");
-    let picture = closest.map(|(_, picture)| Picture { description: said.clone(), data_uri: picture.data_uri.clone() });
+    let picture =
+        closest.map(|(_, picture)| Picture { description: description.clone(), data_uri: picture.data_uri.clone() });
     WorstFlight {
         run: flight.run,
         law: flight.law.name.clone(),
@@ -296,6 +295,6 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         command: flight.command(campaign),
         picture,
         replay: None,
-        said,
+        description,
     }
 }

@@ -1,4 +1,4 @@
-//! `campaign`: many flights, one answer with an error bar, on one machine or on as many as see one folder.
+//! Requests to plan, fly, merge and report a campaign, on one machine or on several with a common folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use tautline_core::text::counted;
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, Pictures, command_line, in_range};
 
-/// The page for people.
+/// File name of the page.
 const PAGE: &str = "campaign.html";
-/// Most flights that are flown again for the page.
+/// Largest number of flights that are flown again for the page.
 pub const MOST_WORST: usize = 10;
 
 /// A specification with its overrides, output folder, shards and threads.
@@ -23,37 +23,37 @@ pub const MOST_WORST: usize = 10;
 pub struct CampaignRequest {
     /// The file of the specification.
     pub spec: PathBuf,
-    /// Stop as soon as the interval of each law's share of clear flights is no wider.
+    /// Stop as soon as the interval of each law's share of clear flights is at most this wide.
     pub until_width: Option<f64>,
-    /// Stop as soon as each law's share of clear flights is known to be above or below this share.
+    /// Stop as soon as the interval of each law's share of clear flights does not contain this share.
     pub until_decided: Option<f64>,
-    /// Folder for everything; by default `out/NAME`, where NAME is the specification's.
+    /// Folder of the campaign; by default `out/NAME` with the name of the specification.
     pub out: Option<PathBuf>,
-    /// Parts to fly it in, by default one for 250 runs; one that is whole is not flown again.
+    /// Number of shards; by default one for 250 runs. Finished shards are not flown again.
     pub shards: Option<u64>,
-    /// Threads to use, by default one a core. The result is the same for any number.
+    /// Number of threads; by default one for each core. The result is the same for any number.
     pub threads: Option<usize>,
-    /// Flights with the least clearance that are flown again for the page: at most [`MOST_WORST`].
+    /// Number of flights with the least clearance that are flown again for the page: at most [`MOST_WORST`].
     pub worst: usize,
 }
 
-/// The answer of a campaign.
+/// Answer of a campaign.
 #[derive(Clone, Debug)]
 pub struct CampaignAnswer {
-    /// The numbers, as in `campaign.json`.
+    /// Numbers, as in `campaign.json`.
     pub summary: Summary,
-    /// Where everything is.
+    /// Folder of the campaign.
     pub folder: PathBuf,
 }
 
 impl CampaignRequest {
-    /// A campaign as its specification says, of which the ten worst flights are flown again.
+    /// Returns the request for a specification, with 10 worst flights on the page.
     #[must_use]
     pub fn new(spec: PathBuf) -> Self {
         Self { spec, until_width: None, until_decided: None, out: None, shards: None, threads: None, worst: MOST_WORST }
     }
 
-    /// The name of the campaign.
+    /// Returns the name of the campaign.
     fn name(&self) -> String {
         self.spec.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
     }
@@ -65,7 +65,7 @@ impl CampaignRequest {
             Failure::input(
                 "campaign/cannot-read",
                 format!("cannot read {shown}: {error}"),
-                "give the path of a specification, as docs/campaigns.md shows one",
+                "give the path of a specification; docs/campaigns.md has an example",
             )
         })?;
         let mut spec = Spec::read(&shown, &text)?;
@@ -80,10 +80,10 @@ impl CampaignRequest {
         Ok(spec)
     }
 
-    /// Plans the campaign into its folder, or opens it where it was planned before.
+    /// Plans the campaign into its folder, or opens the campaign that is there.
     ///
     /// # Errors
-    /// [`Failure`] where the specification is wrong, or the folder is of another campaign.
+    /// [`Failure`] if the specification is wrong, or the folder is of another campaign.
     pub fn plan(&self) -> Result<Folder, Failure> {
         let folder = self.spec.parent().unwrap_or(Path::new(""));
         let campaign = Campaign::plan(&self.read()?, &self.name(), folder, self.shards, Program::running()?)?;
@@ -92,11 +92,11 @@ impl CampaignRequest {
     }
 }
 
-/// Flies a whole campaign on this machine, merges it and writes its answer and page. Started again it goes on where it was.
-/// `None` where the monitor interrupted; what was flown is kept.
+/// Flies a whole campaign on this machine, merges it and writes its answer and page. A repeated call continues an
+/// interrupted campaign. Returns `None` after an interruption; finished flights are kept.
 ///
 /// # Errors
-/// [`Failure`] where the specification is wrong, or the system refuses.
+/// [`Failure`] if the specification is wrong, or a file cannot be written.
 pub fn campaign(
     request: &CampaignRequest,
     pictures: &dyn Pictures,
@@ -135,10 +135,10 @@ pub fn campaign(
     merge(&folder, request.worst, pictures, monitor)
 }
 
-/// Flies shards of a campaign. Returns whether all are flown: `false` where the monitor interrupted.
+/// Flies shards of a campaign. Returns whether all were flown; `false` after an interruption.
 ///
 /// # Errors
-/// [`Failure`] where the system refuses.
+/// As [`Folder::fly`].
 pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn Monitor) -> Result<bool, Failure> {
     let batch = Batch::new(Some(threads), monitor)?;
     let manifest = folder.campaign().manifest();
@@ -147,7 +147,7 @@ pub fn fly_shards(folder: &Folder, shards: &[u64], threads: usize, monitor: &dyn
     for &shard in shards {
         let Some(Shard { rows, flown }) = fly_shard(folder, shard, &batch, monitor)? else { return Ok(false) };
         monitor.say(&match flown {
-            0 => format!("shard {shard}: {} flights had been flown", rows.len()),
+            0 => format!("shard {shard}: {} flights were finished before", rows.len()),
             flown => format!("shard {shard}: {flown} flights flown"),
         });
     }
@@ -161,17 +161,16 @@ fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monit
     let flown = folder.fly(shard, batch)?;
     if flown.is_none() {
         monitor.finish();
-        monitor.warn(&format!(
-            "interrupted in shard {shard}: what was flown is kept, and the same command goes on from there"
-        ));
+        monitor
+            .warn(&format!("interrupted in shard {shard}: finished flights are kept, and the same command continues"));
     }
     Ok(flown)
 }
 
-/// The shards of a campaign that are missing. Warns of damaged ones.
+/// Returns the missing shards of a campaign, and warns of damaged ones.
 ///
 /// # Errors
-/// [`Failure`] where the system refuses.
+/// As [`Folder::missing`].
 pub fn missing_shards(folder: &Folder, monitor: &dyn Monitor) -> Result<Vec<u64>, Failure> {
     let missing = folder.missing()?;
     for (shard, damage) in &missing {
@@ -183,14 +182,14 @@ pub fn missing_shards(folder: &Folder, monitor: &dyn Monitor) -> Result<Vec<u64>
 /// Warns of a damaged part, whose shard is flown again.
 fn warn_of_damage(shard: u64, damage: Option<&str>, monitor: &dyn Monitor) {
     if let Some(damage) = damage {
-        monitor.warn(&format!("{damage}; shard {shard} is to be flown again, which replaces it"));
+        monitor.warn(&format!("{damage}; flying shard {shard} again replaces it"));
     }
 }
 
-/// Merges all parts of a campaign, and writes its answer and its page. `None` where the monitor interrupted.
+/// Merges all parts of a campaign, and writes its answer and page. Returns `None` after an interruption.
 ///
 /// # Errors
-/// [`Failure`] where shards are missing, or the system refuses.
+/// [`Failure`] if shards are missing, or a file cannot be written.
 pub fn merge(
     folder: &Folder,
     worst: usize,
@@ -201,10 +200,10 @@ pub fn merge(
     answer(folder, merged.summary, worst, Some(&merged.sha256), pictures, monitor)
 }
 
-/// Says the answer of a merged campaign again, and writes its page anew. `None` where the monitor interrupted.
+/// Reports the answer of a merged campaign again, and rewrites its page. Returns `None` after an interruption.
 ///
 /// # Errors
-/// [`Failure`] where the campaign is not merged, or the system refuses.
+/// [`Failure`] if the campaign is not merged, or a file cannot be written.
 pub fn report(
     folder: &Folder,
     worst: usize,
@@ -214,7 +213,7 @@ pub fn report(
     answer(folder, folder.summary()?, worst, None, pictures, monitor)
 }
 
-/// Says the answer and writes its page.
+/// Reports the answer and writes its page.
 fn answer(
     folder: &Folder,
     summary: Summary,

@@ -1,7 +1,8 @@
-//! Shards of a campaign: their flights as rows, the part of a finished shard, and the journal of a running process.
+//! Shards of a campaign: rows of flights, parts of finished shards, and journals of running processes.
 //!
-//! A part has lines of JSON: a heading, a row for each flight in the order of runs and laws, and a seal with the SHA-256 of the
-//! lines before. A part whose seal does not fit is damaged (truncated or altered), and its shard is flown again.
+//! A part has lines of JSON: a heading, a row for each flight in the order of runs and laws, and a seal with the
+//! SHA-256 of the preceding lines. A part with a wrong seal is damaged (truncated or altered), and its shard is flown
+//! again.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,27 +25,27 @@ use crate::splitting::Splitting;
 use crate::table::{Cell, Column, Kind};
 use tautline_report::request::Failure;
 
-/// A shard whose flights are finished.
+/// Flights of a finished shard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shard {
     /// The flights, in the order of runs and laws.
     pub rows: Vec<Row>,
-    /// Number of flights of this call; 0 if the shard had been flown.
+    /// Number of flights of this call; 0 if the shard was finished before.
     pub flown: u64,
 }
 
 impl Folder {
-    /// Flies a shard, unless it has been flown. Returns `None` after an interruption; finished flights are kept. The rows are the
-    /// same for any number of threads and interruptions.
+    /// Flies a shard that is not finished. Returns `None` after an interruption; finished flights are kept. The rows
+    /// are the same for any number of threads and interruptions.
     ///
     /// # Errors
-    /// [`Failure`] if another process flew the shard with different results, a law cannot be built, or the disk is full. Finished
-    /// flights are kept.
+    /// [`Failure`] if another process flew the shard with different results, a law cannot be built, or the disk is
+    /// full. Finished flights are kept.
     pub fn fly(&self, shard: u64, batch: &Batch<'_>) -> Result<Option<Shard>, Failure> {
-        if let Found::Whole(rows) = self.read(shard)? {
+        if let PartState::Whole(rows) = self.read(shard)? {
             return Ok(Some(Shard { rows, flown: 0 }));
         }
-        self.make()?;
+        self.create_parts()?;
         let began = Instant::now();
         let laws = self.campaign().laws().len();
         let places = self.campaign().manifest().range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
@@ -52,7 +53,7 @@ impl Folder {
         let there: BTreeSet<_> = rows.iter().map(Row::place).collect();
         let missing: Vec<_> = places.filter(|place| !there.contains(place)).collect();
         let flown = missing.len();
-        let journal = Mutex::new(Journal::create(self.own(shard, JOURNAL), self.campaign().manifest())?);
+        let journal = Mutex::new(Journal::create(self.unique_path(shard, JOURNAL), self.campaign().manifest())?);
         let made = batch.run(missing.len(), |number| {
             let (run, law) = missing[number];
             let row = self.campaign().row(run, law, batch)?;
@@ -65,19 +66,19 @@ impl Folder {
         rows.extend(made);
         rows.sort_by_key(Row::place);
         self.publish(shard, &rows)?;
-        self.sweep(shard)?;
+        self.remove_journals(shard)?;
         let (seconds, threads) = (began.elapsed().as_secs_f64(), batch.threads());
         let times = format!("{{\"wall_s\": {seconds:.3}, \"threads\": {threads}, \"flights\": {flown}}}\n");
         tautline_report::report::write_atomically(&self.times(shard), times.as_bytes())?;
         Ok(Some(Shard { rows, flown: flown as u64 }))
     }
 
-    /// Rows that processes left which were killed, each once.
+    /// Returns the rows in journals of killed processes, without repetition.
     fn flown_before(&self, shard: u64) -> Result<Vec<Row>, Failure> {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
         let manifest = self.campaign().manifest();
         let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
-        for path in self.left(shard, JOURNAL)? {
+        for path in self.leftovers(shard, JOURNAL)? {
             for row in Journal::rows(&path, manifest) {
                 if !range.contains(&row.run) || row.law >= laws {
                     continue;
@@ -94,29 +95,31 @@ impl Folder {
         Ok(rows.into_values().map(|(row, _)| row).collect())
     }
 
-    /// Puts a part in its place, whole, unless there is one: then both must say the same.
+    /// Publishes a complete part in one step. If another process has published the part, both must be equal.
     fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
-        let (path, own) = (self.part(shard), self.own(shard, "partial"));
+        let (path, own) = (self.part(shard), self.unique_path(shard, "partial"));
         let failed = |error| cannot("write", &own)(error);
         let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
             return Err(failed(error));
         }
-        if matches!(self.read(shard), Ok(Found::Damaged(_))) {
+        if matches!(self.read(shard), Ok(PartState::Damaged(_))) {
             return fs::rename(&own, &path).map_err(failed);
         }
-        // A link is made by one process alone; where a file system has none, the last one wins.
+        // Only one process can create the link. On a file system without links the last rename wins.
         match fs::hard_link(&own, &path) {
             Ok(()) => fs::remove_file(&own).map_err(failed),
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => self.settle(shard, &own, &bytes),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                self.compare_with_published(shard, &own, &bytes)
+            }
             Err(_) => fs::rename(&own, &path).map_err(failed),
         }
     }
 
-    /// Another process was faster: the same bytes are one part, others are an alarm.
-    fn settle(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    /// Compares this process's part with the published one: equal bytes are dropped, different bytes are a failure.
+    fn compare_with_published(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let kept = self.part(shard);
         let there = fs::read(&kept).map_err(cannot("read", &kept))?;
         if there == bytes {
@@ -127,9 +130,9 @@ impl Folder {
         Err(different_results(shard, &kept, &other))
     }
 
-    /// Removes what is left of a shard that is whole.
-    fn sweep(&self, shard: u64) -> Result<(), Failure> {
-        for path in self.left(shard, JOURNAL)? {
+    /// Removes the journals of a finished shard.
+    fn remove_journals(&self, shard: u64) -> Result<(), Failure> {
+        for path in self.leftovers(shard, JOURNAL)? {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
                     return Err(cannot("write", &path)(error));
@@ -159,18 +162,18 @@ struct Seal {
     sha256: String,
 }
 
-/// What a file is found to be.
+/// State of the part of a shard.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Found {
-    /// There is none.
-    Nothing,
-    /// Truncated or altered, and to be flown again: what shows it.
+pub enum PartState {
+    /// No file.
+    Missing,
+    /// Truncated or altered, with the reason; to be flown again.
     Damaged(&'static str),
     /// All rows of the shard.
     Whole(Vec<Row>),
 }
 
-/// The part of a shard as bytes.
+/// Returns the part of a shard as bytes.
 ///
 /// # Errors
 /// None in practice: every row has a JSON form.
@@ -198,28 +201,28 @@ fn line(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
 ///
 /// # Errors
 /// [`Failure`] for a part of another campaign, and for a file that cannot be read.
-pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<Found, Failure> {
+pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) -> Result<PartState, Failure> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(PartState::Missing),
         Err(error) => return Err(cannot("read", path)(error)),
     };
     decode(&bytes, manifest, shard, laws, path)
 }
 
-fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<Found, Failure> {
+fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Path) -> Result<PartState, Failure> {
     const TRUNCATED: &str = "it is truncated: the SHA-256 of its rows is missing";
     const ALTERED: &str = "it was altered: its rows do not have the SHA-256 at its end";
-    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(Found::Damaged(TRUNCATED)) };
-    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(Found::Damaged(TRUNCATED)) };
+    let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(PartState::Damaged(TRUNCATED)) };
+    let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(PartState::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
-    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(Found::Damaged(TRUNCATED)) };
+    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
     if seal.sha256 != base16(&Sha256::digest(sealed)) {
-        return Ok(Found::Damaged(ALTERED));
+        return Ok(PartState::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
     let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<Heading>(line).ok()) else {
-        return Ok(Found::Damaged(ALTERED));
+        return Ok(PartState::Damaged(ALTERED));
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
     if !is_ours {
@@ -232,12 +235,12 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     let rows: Vec<Row> = lines.map_while(|line| serde_json::from_slice(line).ok()).collect();
     let places = manifest.range(shard).flat_map(|run| (0..laws).map(move |law| (run, law)));
     let is_whole = seal.rows == rows.len() && rows.iter().map(Row::place).eq(places);
-    Ok(if is_whole { Found::Whole(rows) } else { Found::Damaged(ALTERED) })
+    Ok(if is_whole { PartState::Whole(rows) } else { PartState::Damaged(ALTERED) })
 }
 
-/// Rows as they are flown, of one process: what it flew before it was killed is not flown again.
+/// Journal of a process: its finished rows, so that a killed process loses no finished flight.
 ///
-/// A line is a hash over the campaign and the row, and the row: one of another campaign, torn or changed, is no row.
+/// A line is a row with a hash over campaign and row. Lines of other campaigns, and torn or altered lines, are ignored.
 #[derive(Debug)]
 pub(super) struct Journal {
     path: PathBuf,
@@ -246,10 +249,10 @@ pub(super) struct Journal {
 }
 
 impl Journal {
-    /// Begins a journal.
+    /// Creates a journal.
     ///
     /// # Errors
-    /// [`Failure`] if the file cannot be made.
+    /// [`Failure`] if the file cannot be created.
     pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, Failure> {
         let file = File::create(&path).map_err(cannot("write", &path))?;
         Ok(Self { path, file, campaign: manifest.campaign.clone() })
@@ -265,7 +268,7 @@ impl Journal {
         self.file.write_all(&written).map_err(cannot("write", &self.path))
     }
 
-    /// Rows of a campaign in a journal that was left behind.
+    /// Returns the rows of a campaign in a journal.
     #[must_use]
     pub(super) fn rows(path: &Path, manifest: &Manifest) -> Vec<Row> {
         let bytes = fs::read(path).unwrap_or_default();
@@ -279,47 +282,47 @@ impl Journal {
     }
 }
 
-/// Hash over a campaign and the line of a row.
+/// Returns the hash over a campaign and the line of a row.
 fn seal_of(campaign: &str, row: &[u8]) -> String {
     base16(&Sha256::new().chain_update(campaign).chain_update(row).finalize())
 }
 
-/// One flight: a run under a law.
+/// Result of a run under a law.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
     /// Number of the run, from 0.
     pub run: u64,
-    /// Which of the campaign's laws, from 0.
+    /// Index of the law in the campaign, from 0.
     pub law: usize,
-    /// What was drawn for it, in the order of the keys.
+    /// Drawn values, in the order of the keys.
     pub drawn: Vec<Value>,
-    /// Why it was not flown, where what was drawn cannot be, such as a start of two vehicles nearer than delta.
+    /// Reason why the drawn values cannot be flown, such as a start of two vehicles within delta.
     pub not_flown: Option<String>,
-    /// How it went.
+    /// Summary of the flight.
     pub flight: Option<FlightSummary>,
-    /// What was estimated, where a run is no flight.
+    /// Estimate, if runs are estimates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub splitting: Option<Splitting>,
 }
 
-/// What is known of a flight's separation.
+/// Verdict on the separation of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Known {
-    /// No two vehicles came closer than delta, to the end.
+    /// No violation up to the end of the flight.
     Clear,
-    /// Two did.
+    /// A violation.
     Violated,
-    /// It ended early or the judge cannot tell.
+    /// The flight ended early without a violation, or the judge cannot decide.
     Unknown,
-    /// What was drawn cannot be flown.
+    /// The drawn values cannot be flown.
     NotFlown,
-    /// It is no flight but an estimate.
+    /// The row is an estimate.
     Estimated,
 }
 
 impl Row {
-    /// What is known of its separation.
+    /// Returns the verdict on the separation.
     #[must_use]
     pub fn known(&self) -> Known {
         match self.flight.as_ref().map(|flight| flight.outcome) {
@@ -331,39 +334,39 @@ impl Row {
         }
     }
 
-    /// Smallest separation less delta \[m\].
+    /// Returns the smallest separation less delta \[m\].
     #[must_use]
     pub fn clearance_m(&self) -> Option<f64> {
         self.flight.as_ref()?.clearance_m()
     }
 
-    /// Its place in the order of all rows.
+    /// Returns the position in the order of all rows: run and law.
     #[must_use]
     pub fn place(&self) -> (u64, usize) {
         (self.run, self.law)
     }
 }
 
-/// A column of `results.parquet`, and its cell of a row.
+/// Column of `results.parquet`, with its cell of each row.
 pub(super) type Field<'a> = (Column, Box<dyn Fn(&Row) -> Cell + 'a>);
 
 fn field<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&Row) -> C + 'a) -> Field<'a> {
     (Column::new(name, "", kind), Box::new(move |row| cell(row).into()))
 }
 
-/// A column of flights, which is empty in a row that was not flown.
+/// Returns a column of flights, which is empty for a row without a flight.
 fn of_flight<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&FlightSummary) -> C + 'a) -> Field<'a> {
     field(name, kind, move |row| row.flight.as_ref().map(&cell))
 }
 
-/// A column of estimates.
+/// Returns a column of estimates.
 fn of_estimate<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&Splitting) -> C + 'a) -> Field<'a> {
     field(name, kind, move |row| row.splitting.as_ref().map(&cell))
 }
 
-/// The column of a varied key: of numbers where all its values are numbers, else of texts.
+/// Returns the column of a varied key: numbers if all its values are numbers, else texts.
 fn drawn<'a>(place: usize, key: &str, samples: &[toml::Value]) -> Field<'a> {
-    // Columns of our own have no dots.
+    // The fixed columns have no dots in their names.
     let name = if key.contains('.') { key.to_owned() } else { format!("vary.{key}") };
     let at = move |row: &Row| row.drawn.get(place).cloned();
     if samples.iter().all(toml::Value::is_integer) {
@@ -376,7 +379,7 @@ fn drawn<'a>(place: usize, key: &str, samples: &[toml::Value]) -> Field<'a> {
     }
 }
 
-/// Columns of `results.parquet`.
+/// Returns the columns of `results.parquet`.
 pub(super) fn fields(campaign: &Campaign) -> Vec<Field<'_>> {
     let law = |row: &Row| campaign.laws().get(row.law).map(|law| law.name.clone());
     let mut fields = vec![field("run", Kind::Count, |row| row.run), field("law", Kind::Text, law)];

@@ -14,42 +14,44 @@ use crate::splitting::Settings;
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Place, ScenarioError};
 
-/// Source of the overrides in errors of a scenario.
+/// Source of overrides in errors of a scenario.
 const SET: &str = "--set";
 /// Forms of a variation.
-const VARIATIONS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, { normal = [mean, deviation] }, \
-                          { integer = [low, high] }, { list = [...] }, { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
+const VARIATIONS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, log_uniform, \
+                          { normal = [mean, deviation] }, { integer = [low, high] }, { list = [...] }, \
+                          { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
 
-/// Names of distributions: a table of `[vary]` with one of these keys is a variation, any other table holds keys of the scenario.
+/// Names of distributions. A table in `[vary]` with one of these keys is a variation; any other table holds scenario
+/// keys.
 const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];
 
-/// The keys of a specification.
+/// Keys of a specification.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
-    /// Name of a built-in scenario, or the path of a file, from the folder of the specification.
+    /// Name of a built-in scenario, or the path of a file relative to the folder of the specification.
     pub scenario: String,
-    /// Number of runs; one for each point of the grids unless given.
+    /// Number of runs; by default one for each point of the grids.
     pub runs: Option<u64>,
-    /// What all random numbers begin from.
+    /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
-    /// Laws, each of which flies every run; the scenario's own unless given.
+    /// Laws that fly every run; by default the scenario's own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub laws: Vec<String>,
-    /// Keys of the scenario that are set in every run.
+    /// Scenario keys with the same value in every run.
     #[serde(default, skip_serializing_if = "Table::is_empty")]
     pub set: Table,
-    /// Keys of the scenario that differ from run to run.
+    /// Scenario keys that differ from run to run.
     #[serde(default, skip_serializing_if = "Table::is_empty")]
     pub vary: Table,
-    /// When enough has been flown.
+    /// Rule for an early stop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
-    /// What a run is.
+    /// Meaning of a run.
     #[serde(default, skip_serializing_if = "Method::is_flights")]
     pub method: Method,
-    /// How many flights each estimate has.
+    /// Settings of splitting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub splitting: Option<Settings>,
     #[serde(skip)]
@@ -63,7 +65,7 @@ struct Source {
     text: String,
 }
 
-/// What a run is.
+/// Meaning of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -75,22 +77,22 @@ pub enum Method {
 }
 
 impl Method {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
     fn is_flights(&self) -> bool {
         *self == Self::Flights
     }
 }
 
-/// When enough has been flown. What is decided is decided by intervals that hold at every look.
+/// Rule for an early stop, by intervals that hold at every look.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stop {
-    /// Which share it is about.
+    /// Verdict whose share decides.
     #[serde(default)]
     pub of: Question,
-    /// Once the interval of every law's share is no wider than this.
+    /// Stop when the interval of every law's share is at most this wide.
     pub width: Option<f64>,
-    /// Once every law's share is known to be above or below this.
+    /// Stop when the interval of every law's share does not contain this share.
     pub decided: Option<f64>,
 }
 
@@ -153,8 +155,8 @@ impl Spec {
         self.at(key, refused(problem, remedy))
     }
 
-    /// Returns the error of a scenario that a key of the specification caused, with the place in the specification unless the
-    /// scenario's own file has the place. `situation` precedes the message if it is not empty.
+    /// Returns the error of a scenario that a key of the specification caused. The place is in the specification unless
+    /// the error has a place in the scenario's own file. `situation` precedes the message if it is not empty.
     pub(super) fn scenario(&self, key: &str, situation: &str, error: ScenarioError) -> Failure {
         let is_varied = key.starts_with("vary.");
         let keys = match error.place() {
@@ -188,7 +190,7 @@ pub(super) fn refused(problem: impl AsRef<str>, remedy: impl AsRef<str>) -> Fail
     Failure::input("campaign/plan", problem, remedy)
 }
 
-/// Returns problem and remedy of a message of serde, in the words of errors of scenarios.
+/// Returns problem and remedy of a message of serde, in the words of scenario errors.
 pub(super) fn in_words(message: &str) -> (String, Option<String>) {
     let message = message.trim_end();
     let (problem, expected) = message.split_once(", expected ").map_or((message, None), |(a, b)| (a, Some(b)));
@@ -198,7 +200,7 @@ pub(super) fn in_words(message: &str) -> (String, Option<String>) {
     (problem, expected.map(|expected| format!("give {expected}")))
 }
 
-/// Returns the bytes of a key, whose name follows the names of its tables; each may be a table of its own or joined by dots.
+/// Returns the bytes of a key with the names of its tables before it; the tables may be nested or joined by dots.
 fn find(table: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     table.iter().find_map(|(name, value)| {
         let rest = key.strip_prefix(&**name.get_ref())?;
@@ -210,13 +212,13 @@ fn find(table: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     })
 }
 
-/// Whether a table says how a value is drawn, and holds no keys of a scenario.
+/// Returns whether a table is a variation.
 fn draws(table: &Table) -> bool {
     let mut keys = table.keys();
     matches!((keys.next(), keys.next()), (Some(word), None) if DRAWS.contains(&word.as_str()))
 }
 
-/// Keys of tables within tables, with dots between them: `[set.time] duration_s` is `[set] "time.duration_s"`.
+/// Collects the keys of nested tables, joined by dots: `[set.time] duration_s` is `[set] "time.duration_s"`.
 fn flatten(above: &str, table: &Table, is_value: &dyn Fn(&Table) -> bool, keys: &mut BTreeMap<String, Value>) {
     for (name, value) in table {
         let key = if above.is_empty() { name.clone() } else { format!("{above}.{name}") };
@@ -245,7 +247,7 @@ impl Spec {
         Ok(())
     }
 
-    /// Refuses two keys of which one contains the other, and a varied law if laws are named.
+    /// Refuses two keys if one contains the other, and a varied law if laws are named.
     pub(super) fn check_overlaps(
         &self,
         sets: &BTreeMap<String, Value>,
@@ -303,7 +305,7 @@ mod tests {
     "#;
 
     #[test]
-    fn keys_of_tables_have_their_names_before_them_and_what_is_written_reads_back() {
+    fn nested_keys_are_joined_and_a_written_spec_reads_back() {
         let spec = Spec::read("spec.toml", TEXT).expect("read");
         assert_eq!(spec.sets().keys().collect::<Vec<_>>(), ["law.delta_m", "time.duration_s"]);
         let variations = spec.variations().expect("variations");
@@ -315,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_has_the_place_and_the_words_of_errors_of_scenarios() {
+    fn errors_have_a_place_and_the_words_of_scenario_errors() {
         let refused = |text: &str| {
             let spec = Spec::read("spec.toml", text);
             spec.and_then(|spec| spec.variations().and(spec.check_stop())).expect_err(text).to_string()
@@ -342,9 +344,9 @@ mod tests {
     }
 
     #[test]
-    fn a_key_is_found_in_any_notation_and_otherwise_its_table() {
-        const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = 1\nlaw.alpha = { unifrom = [0, 1] }\n\
-                            [vary.network]\n  loss = 2\n[stop]\nwidth = 3\n";
+    fn a_key_or_else_its_table_is_found_in_any_notation() {
+        const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = 1\n\
+                            law.alpha = { unifrom = [0, 1] }\n[vary.network]\n  loss = 2\n[stop]\nwidth = 3\n";
         let spec = Spec::read("spec.toml", KEYS).expect("read");
         let at = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
         assert_eq!(at("runs"), Some((2, 1)));

@@ -1,4 +1,4 @@
-//! What came of a campaign: `campaign.json`.
+//! Answer of a campaign: the contents of `campaign.json`.
 
 use serde::Serialize;
 
@@ -13,127 +13,127 @@ use crate::splitting::{Repetitions, Splitting};
 use crate::statistics::{Estimate, Paired, Proportion};
 use tautline_report::figures::Histogram;
 
-/// Intervals of a histogram.
+/// Number of intervals of a histogram.
 const HISTOGRAM_INTERVALS: usize = 30;
 /// Number of worst flights that are kept.
 const WORST: usize = 10;
 
-/// What came of a campaign. What does not apply is null.
+/// Answer of a campaign. Inapplicable values are null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// SHA-256 that tells this campaign from all others.
+    /// SHA-256 that identifies the campaign.
     pub campaign: String,
-    /// Its name.
+    /// Name of the campaign.
     pub name: String,
     /// Name of the scenario.
     pub scenario: String,
-    /// Runs that count.
+    /// Number of runs that count.
     pub runs: u64,
-    /// Runs that were planned.
+    /// Number of planned runs.
     pub runs_planned: u64,
-    /// Whether enough was known before all of them.
+    /// Whether an early stop left runs out.
     pub stopped_early: bool,
-    /// Which intervals shares have.
+    /// Kind of the intervals of shares.
     pub intervals: Intervals,
-    /// Each law, in the order in which they were named.
+    /// Results of each law, in order.
     pub laws: Vec<LawSummary>,
-    /// Each two laws, on the runs that both flew; none where the number of runs was not fixed beforehand.
+    /// Each two laws, on the runs that both flew; empty if the number of runs was not fixed beforehand.
     pub pairs: Vec<Pair>,
-    /// Each varied number, and what flights showed over it.
+    /// Results over each varied number.
     pub varied: Vec<Varied>,
 }
 
-/// What flights of a law showed.
+/// Results of a law.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LawSummary {
-    /// The law's name.
+    /// Name of the law.
     pub name: String,
-    /// What sets it, as `--set` takes it.
+    /// Overrides that select the law, as `--set` takes them.
     pub overrides: Vec<String>,
-    /// Flights that what was drawn made impossible; they count nowhere else.
+    /// Runs whose drawn values cannot be flown. They count nowhere else.
     pub not_flown: u64,
-    /// The first of them says why.
+    /// Reason of the first of these runs.
     pub not_flown_because: Option<String>,
-    /// Flights that ended early without a violation, or of which the judge cannot tell.
+    /// Flights that ended early without a violation, and flights that the judge cannot decide.
     pub unknown: u64,
-    /// With a violation. Flights of which it is not known count at the upper end of the interval.
+    /// Flights with a violation. Unknown flights count at the upper end of the interval.
     pub violated: Proportion,
-    /// Bound that the share with a violation is below, those of which it is not known counted as violations; null where only grids
-    /// vary, and of no flight.
+    /// Upper bound of the share with a violation; unknown flights count as violations. Null if only grids vary, and
+    /// without a flight.
     pub violated_below: Option<UpperBound>,
-    /// Flights in which two vehicles came closer than their law's certificate; each is a defect.
+    /// Flights in which two vehicles came closer than certified. Each shows a defect.
     pub certificates_broken: u64,
-    /// Clear to the end.
+    /// Flights that are clear to the end.
     pub clear: Proportion,
-    /// With the formation reached and kept.
+    /// Flights that reached the formation and kept it.
     pub reached: Proportion,
-    /// Passed, as `tautline run` says it.
+    /// Flights that pass, as in `tautline run`.
     pub pass: Proportion,
-    /// Smallest separation less delta of a flight \[m\].
+    /// Smallest separation of a flight less delta \[m\].
     pub clearance_m: Quantiles,
-    /// When the formation was reached, of the flights that reached it \[s\].
+    /// Time to reach the formation, over the flights that reached it \[s\].
     pub reached_at_s: Quantiles,
-    /// Ways flown, summed over the vehicles \[m\].
+    /// Path length, summed over the vehicles \[m\].
     pub path_length_m: Quantiles,
-    /// Flights by their smallest separation less delta \[m\].
+    /// Histogram of the smallest separation less delta \[m\].
     pub clearance_histogram_m: Option<Histogram>,
-    /// Those that reached the formation by when they did \[s\].
+    /// Histogram of the time to reach the formation \[s\].
     pub reached_histogram_s: Option<Histogram>,
-    /// The flights with the least clearance, the worst first.
+    /// Flights with the least clearance, the worst first.
     pub worst: Vec<Worst>,
-    /// The probability of a violation, where runs are estimates of it and no flights; all numbers above are of none then.
+    /// Probability of a violation, if runs are estimates; the numbers above then have no flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub splitting: Option<Repetitions>,
-    /// Flights that were violated in them, those furthest into a violation first.
+    /// Violated flights of the estimates, the largest violation first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bad: Vec<BadRun>,
 }
 
-/// A flight of an estimate that was violated.
+/// Violated flight of an estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BadRun {
     /// Number of the run.
     pub run: u64,
-    /// Its number among the run's bad flights, from 0.
+    /// Index in the violated flights of the run, from 0.
     pub bad: usize,
-    /// Smallest separation less delta, up to the step in which it was violated \[m\].
+    /// Smallest separation less delta, up to the step of the violation \[m\].
     pub clearance_m: f64,
-    /// The step, from 1.
+    /// Step of the violation, from 1.
     pub violated_at_step: u64,
-    /// Hash over the state after that step.
+    /// Hash over the state after this step.
     pub state_hash: String,
 }
 
-/// What so many parts of all flights are not above. Intervals are those of order statistics; none where the number of runs
-/// was not fixed beforehand.
+/// Quantiles over the flights. Intervals are those of order statistics; `None` if the number of runs was not fixed
+/// beforehand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// The smallest.
+    /// Minimum.
     pub min: Option<f64>,
-    /// A twentieth.
+    /// 5 % quantile.
     pub p05: Estimate,
-    /// Half of them.
+    /// Median.
     pub median: Estimate,
-    /// All but a twentieth.
+    /// 95 % quantile.
     pub p95: Estimate,
-    /// The largest.
+    /// Maximum.
     pub max: Option<f64>,
 }
 
-/// Two laws on the same runs.
+/// Comparison of two laws on the same runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Pair {
-    /// Names of the two.
+    /// Names of the laws.
     pub laws: [String; 2],
-    /// Runs in which one was clear and the other was not known to be.
+    /// Runs that are clear under one law and not known to be clear under the other.
     pub clear: Paired,
-    /// Runs in which one reached the formation and the other did not.
+    /// Runs that reached the formation under one law only.
     pub reached: Paired,
 }
 
-/// Rows on their way to a summary. Memory is that of a few numbers a row.
+/// Accumulator of rows for a summary. It holds a few numbers of each row.
 #[derive(Debug)]
 pub(super) struct Gathered {
     intervals: Intervals,
@@ -157,7 +157,7 @@ struct LawNumbers {
 }
 
 impl Gathered {
-    /// Nothing yet.
+    /// Returns an empty accumulator.
     #[must_use]
     pub(super) fn new(campaign: &Campaign) -> Self {
         let laws = campaign.laws().len();
@@ -175,7 +175,8 @@ impl Gathered {
         }
     }
 
-    /// Takes the next row in the order of runs and laws. Returns whether the row counts, which no row does after the decision.
+    /// Adds the next row in the order of runs and laws. Returns whether the row counts; after an early stop no row
+    /// does.
     pub(super) fn take(&mut self, row: &Row) -> bool {
         if !self.tally.take(row) {
             return false;
@@ -189,17 +190,17 @@ impl Gathered {
         true
     }
 
-    /// Whether enough has been flown.
+    /// Returns whether the rule for an early stop is satisfied.
     #[must_use]
     pub(super) fn is_enough(&self) -> bool {
         self.tally.is_enough()
     }
 
-    /// The summary of what was taken.
+    /// Returns the summary of the added rows.
     #[must_use]
     pub(super) fn finish(self, campaign: &Campaign) -> Summary {
         let Self { intervals, tally, laws, keys } = self;
-        // Tests of pairs hold for a number of runs that was fixed beforehand.
+        // Tests of pairs need a number of runs that was fixed beforehand.
         let has_pairs = intervals == Intervals::ClopperPearson && campaign.splitting().is_none();
         let pairs = if has_pairs { pairs(campaign.laws(), &laws) } else { Vec::new() };
         let laws = std::iter::zip(campaign.laws(), tally.counts()).zip(laws);
@@ -257,10 +258,10 @@ impl LawNumbers {
         }
     }
 
-    /// Keeps a flight that is among the worst. Of equal flights the first is worse.
+    /// Keeps a flight that is among the worst. Of equal flights the first one is worse.
     fn take_worst(&mut self, run: u64, flight: &FlightSummary) {
         let (Some(min_m), Some(clearance_m)) = (flight.min_m, flight.clearance_m()) else { return };
-        // A violation, which may be of an obstacle's clearance, is worse than none.
+        // A violation, which may be of an obstacle's clearance, is worse than any flight without one.
         let rank = |outcome: Outcome| outcome != Outcome::Violated;
         let own = (rank(flight.outcome), clearance_m);
         let place = self.worst.partition_point(|worse| (rank(worse.outcome), worse.clearance_m) <= own);
@@ -323,20 +324,20 @@ fn pairs(laws: &[Law], numbers: &[LawNumbers]) -> Vec<Pair> {
     (0..laws.len()).flat_map(|first| (first + 1..laws.len()).map(move |second| pair(first, second))).collect()
 }
 
-/// A flight to look at.
+/// One of the worst flights.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worst {
     /// Number of the run.
     pub run: u64,
-    /// How it went.
+    /// Outcome of the flight.
     pub outcome: Outcome,
     /// Smallest separation less delta \[m\].
     pub clearance_m: f64,
     /// Smallest separation \[m\].
     pub min_m: f64,
-    /// When that was \[s\].
+    /// Time of the smallest separation \[s\].
     pub min_at_s: Option<f64>,
-    /// Which two.
+    /// Vehicles of the smallest separation.
     pub min_pair: Option<[usize; 2]>,
     /// Whether the formation was reached.
     pub reached: bool,

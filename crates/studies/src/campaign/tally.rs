@@ -1,4 +1,4 @@
-//! Counts of rows in their order, up to the decision to stop, and shares over the values of varied keys.
+//! Counts of rows up to an early stop, and shares over the values of varied keys.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -9,24 +9,23 @@ use super::vary::Variation;
 use crate::Question;
 use crate::statistics::{CONFIDENCE, Proportion, anytime};
 
-/// Runs after which it is first asked whether enough has been flown; then after twice as many, and so on.
+/// Number of runs at the first look for an early stop; each later look has twice the number.
 const FIRST_LOOK: u64 = 100;
 
-/// Which intervals are taken.
+/// Kind of the intervals of shares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Intervals {
-    /// Of Clopper and Pearson, for a number of runs that was fixed beforehand.
+    /// Clopper and Pearson, for a number of runs that was fixed beforehand.
     ClopperPearson,
-    /// A confidence sequence, which holds whenever one stops.
+    /// A confidence sequence, which holds at every stop.
     ConfidenceSequence,
-    /// None: the runs are all the points of grids, and no sample of anything.
+    /// No interval: the runs are all points of the grids, not a sample.
     Exact,
 }
 
 impl Intervals {
-    /// The share of `count` of so many. What is not known of `unknown` more widens its interval: at the lower end they count as
-    /// not, at the upper end as well.
+    /// Returns the share of `count` in `of`. `unknown` more count only at the upper end of the interval.
     #[must_use]
     pub fn share(self, count: u64, unknown: u64, of: u64) -> Proportion {
         let at = |count: u64| match self {
@@ -41,7 +40,7 @@ impl Intervals {
         Proportion { high, ..at(count) }
     }
 
-    /// Returns the bound that the share of `count` of `of` is below, where `unknown` more may count; none of grids and of nothing.
+    /// Returns the upper bound of the share of `count` plus `unknown` in `of`; `None` for grids and for `of` = 0.
     #[must_use]
     pub fn upper_bound(self, count: u64, unknown: u64, of: u64) -> Option<UpperBound> {
         let count = count.saturating_add(unknown).min(of);
@@ -55,45 +54,45 @@ impl Intervals {
     }
 }
 
-/// Bound that a share is below, with the confidence of [`crate::statistics::CONFIDENCE`].
+/// Upper bound of a share, with the confidence [`crate::statistics::CONFIDENCE`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct UpperBound {
     /// The bound, from 0 to 1.
     pub share: f64,
-    /// How often such a bound is above the true share.
+    /// Probability that the bound is above the true share.
     pub confidence: f64,
-    /// Which bound it is.
+    /// Kind of the bound.
     pub kind: BoundKind,
 }
 
-/// Which bound a share has.
+/// Kind of an upper bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BoundKind {
-    /// The one-sided bound of Clopper and Pearson, for a number of runs that was fixed beforehand.
+    /// One-sided bound of Clopper and Pearson, for a number of runs that was fixed beforehand.
     OneSided,
-    /// The upper end of a confidence sequence.
+    /// Upper end of a confidence sequence.
     ConfidenceSequence,
 }
 
-/// How many flights of a law showed what.
+/// Counts of the flights of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Flown.
+    /// Flights.
     pub flown: u64,
-    /// Not flown.
+    /// Runs that cannot be flown.
     pub not_flown: u64,
-    /// Clear to the end.
+    /// Flights that are clear to the end.
     pub clear: u64,
-    /// With a violation.
+    /// Flights with a violation.
     pub violated: u64,
-    /// Neither is known.
+    /// Flights whose separation is unknown.
     pub unknown: u64,
-    /// Reached and kept.
+    /// Flights that reached the formation and kept it.
     pub reached: u64,
-    /// Passed.
+    /// Flights that pass.
     pub pass: u64,
-    /// Closer than their law's certificate.
+    /// Flights with a separation below the certified one.
     pub certificates_broken: u64,
 }
 
@@ -113,7 +112,7 @@ impl Counts {
         self.pass += u64::from(row.flight.as_ref().is_some_and(|flight| flight.pass));
     }
 
-    /// The share that shows what is asked.
+    /// Returns the share of flights that show a verdict.
     #[must_use]
     pub fn share(&self, question: Question, intervals: Intervals) -> Proportion {
         match question {
@@ -123,20 +122,20 @@ impl Counts {
         }
     }
 
-    /// Returns the bound that the share with a violation is below.
+    /// Returns the upper bound of the share with a violation.
     #[must_use]
     pub fn violated_below(&self, intervals: Intervals) -> Option<UpperBound> {
         intervals.upper_bound(self.violated, self.unknown, self.flown)
     }
 
-    /// The share with a violation.
+    /// Returns the share of flights with a violation.
     #[must_use]
     pub fn violated(&self, intervals: Intervals) -> Proportion {
         intervals.share(self.violated, self.unknown, self.flown)
     }
 }
 
-/// Rows counted in the order of their runs.
+/// Counts of rows in the order of runs.
 #[derive(Clone, Debug)]
 pub struct Tally {
     stop: Option<Stop>,
@@ -147,13 +146,13 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Nothing counted, of so many laws.
+    /// Returns empty counts for a number of laws.
     #[must_use]
     pub fn new(laws: usize, stop: Option<Stop>) -> Self {
         Self { stop, counts: vec![Counts::default(); laws], runs: 0, next_look: FIRST_LOOK, is_enough: false }
     }
 
-    /// Counts a row, unless enough has been flown before it; says whether it was.
+    /// Counts a row unless the rule for an early stop is satisfied. Returns whether the row counts.
     pub fn take(&mut self, row: &Row) -> bool {
         if self.is_enough {
             return false;
@@ -180,64 +179,64 @@ impl Tally {
         })
     }
 
-    /// Whether enough has been flown.
+    /// Returns whether the rule for an early stop is satisfied.
     #[must_use]
     pub fn is_enough(&self) -> bool {
         self.is_enough
     }
 
-    /// Runs that were counted under every law.
+    /// Returns the number of runs that were counted under every law.
     #[must_use]
     pub fn runs(&self) -> u64 {
         self.runs
     }
 
-    /// Counts of each law.
+    /// Returns the counts of each law.
     #[must_use]
     pub fn counts(&self) -> &[Counts] {
         &self.counts
     }
 }
 
-/// Intervals that the values of a continuous key are put into.
+/// Number of intervals for the values of a continuous key.
 const INTERVALS: usize = 10;
-/// Most single values that are told apart.
+/// Largest number of values with bins of their own.
 const MOST_VALUES: usize = 40;
 
-/// What flights showed over a varied key.
+/// Results over a varied key.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Varied {
     /// The key.
     pub key: String,
-    /// Whether it is drawn uniformly in its logarithm.
+    /// Whether the key is drawn uniformly in its logarithm.
     pub logarithmic: bool,
-    /// Its values, or intervals of them, in increasing order.
+    /// Bins of its values, in increasing order.
     pub bins: Vec<Bin>,
 }
 
-/// Flights with one value of a key, or within an interval of its values.
+/// Flights with one value of a key, or within an interval of values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// The value as it is written, or the interval.
+    /// Label: the value as written, or the interval.
     pub said: String,
-    /// Its lower end; the value itself; none of words.
+    /// Lower end of the interval, or the value; `None` for words.
     pub low: Option<f64>,
-    /// Its upper end; the value itself; none of words.
+    /// Upper end of the interval, or the value; `None` for words.
     pub high: Option<f64>,
-    /// What flights of each law showed, in the order of the laws.
+    /// Shares of each law, in the order of the laws.
     pub laws: Vec<BinShares>,
 }
 
-/// What flights of a law showed within a bin.
+/// Shares of a law within a bin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BinShares {
-    /// With a violation. Flights of which it is not known count at the upper end of the interval.
+    /// Flights with a violation. Unknown flights count at the upper end of the interval.
     pub violated: Proportion,
-    /// With the formation reached and kept.
+    /// Flights that reached the formation and kept it.
     pub reached: Proportion,
 }
 
-/// The values of a key as they come, with what each flight showed.
+/// Accumulator of the values of a key, with the result of each flight.
 #[derive(Debug)]
 pub(super) struct KeyColumn {
     key: String,
@@ -257,7 +256,7 @@ struct Flight {
 }
 
 impl KeyColumn {
-    /// Nothing yet, of a key that so many laws fly.
+    /// Returns an empty accumulator for a number of laws.
     #[must_use]
     pub(super) fn new(key: &str, variation: &Variation, laws: usize) -> Self {
         Self {
@@ -270,14 +269,14 @@ impl KeyColumn {
         }
     }
 
-    /// Takes a flight.
+    /// Adds a flight.
     pub(super) fn take(&mut self, law: usize, value: &Value, known: Known, reached: bool) {
         if !self.is_seed && !matches!(known, Known::NotFlown | Known::Estimated) {
             self.flights.push(Flight { law, value: value.clone(), known, reached });
         }
     }
 
-    /// What they showed; none of seeds, and of nothing flown.
+    /// Returns the results over the key; `None` for seeds, and without flights.
     #[must_use]
     pub(super) fn finish(self, intervals: Intervals) -> Option<Varied> {
         if self.flights.is_empty() {
@@ -288,7 +287,7 @@ impl KeyColumn {
         Some(Varied { key: self.key, logarithmic: self.is_logarithmic, bins })
     }
 
-    /// Whether its values are numbers, and more than are told apart.
+    /// Returns whether the values are numbers, and too many for bins of their own.
     fn has_many_numbers(&self) -> bool {
         let mut numbers: Vec<_> = self.flights.iter().filter_map(|flight| flight.value.as_f64()).collect();
         let are_numbers = numbers.len() == self.flights.len();

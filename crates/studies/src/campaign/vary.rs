@@ -1,4 +1,4 @@
-//! What differs from run to run: a key of the scenario, and how its value is drawn.
+//! Variations of a campaign: distributions and grids of the values of a key.
 
 use std::f64::consts::TAU;
 
@@ -9,13 +9,13 @@ use sha2::{Digest as _, Sha256};
 
 use super::spec::in_words;
 
-/// Seeds that are drawn have this many bits, so that every reader of a table keeps them whole.
+/// Number of bits of drawn seeds; a double holds them exactly.
 const SEED_BITS: u32 = 53;
 
-/// The word that draws a seed by run.
+/// Word for a seed that each run draws.
 const BY_RUN: &str = "run";
 
-/// How the value of a key is drawn.
+/// Distribution or grid of the values of a key.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Variation {
@@ -27,11 +27,11 @@ pub enum Variation {
     LogUniform([f64; 2]),
     /// Normal with this mean and standard deviation.
     Normal([f64; 2]),
-    /// A whole number between two, both included, each as likely as any other.
+    /// Uniform integer in a range, both ends included.
     Integer([i64; 2]),
-    /// One of these, each as likely as any other.
+    /// Uniform choice from a list.
     List(Vec<toml::Value>),
-    /// These in turn, crossed with every other grid.
+    /// Values in turn, crossed with every other grid.
     Grid(Grid),
 }
 
@@ -39,15 +39,15 @@ pub enum Variation {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Grid {
-    /// As they are listed.
+    /// Listed values.
     Listed(Vec<toml::Value>),
-    /// Evenly spaced, both ends included.
+    /// Evenly spaced values, both ends included.
     Spaced {
-        /// The first.
+        /// First value.
         from: f64,
-        /// The last.
+        /// Last value.
         to: f64,
-        /// How many.
+        /// Number of values.
         count: u64,
     },
 }
@@ -109,19 +109,19 @@ impl Variation {
         }
     }
 
-    /// Whether its values were listed one by one.
+    /// Returns whether the values are listed.
     #[must_use]
     pub fn is_listed(&self) -> bool {
         matches!(self, Self::List(_) | Self::Grid(_))
     }
 
-    /// How many values it flies in turn; none for what is drawn.
+    /// Returns the number of values of a grid; `None` for drawn values.
     #[must_use]
     pub fn grid_len(&self) -> Option<u64> {
         if let Self::Grid(grid) = self { Some(grid.len()) } else { None }
     }
 
-    /// Values that show whether the key takes what may be drawn: the ends, or everything that is listed.
+    /// Returns values that show whether the key takes all values: the ends of a range, or all listed values.
     #[must_use]
     pub fn samples(&self) -> Vec<toml::Value> {
         let ends = |[low, high]: [f64; 2]| vec![toml::Value::Float(low), toml::Value::Float(high)];
@@ -135,8 +135,8 @@ impl Variation {
         }
     }
 
-    /// The value of a run: drawn from the campaign's seed, the key and the run's number alone, or the one of a grid with this
-    /// number.
+    /// Returns the value of a run: drawn from the campaign's seed, the key and the run's number only, or the value of a
+    /// grid with index `place`.
     #[must_use]
     pub fn value(&self, seed: u64, key: &str, run: u64, place: u64) -> toml::Value {
         let mut random = Random::of(seed, key, run);
@@ -165,7 +165,7 @@ fn between(low: f64, high: f64, part: f64) -> f64 {
     ((1.0 - part) * low + part * high).clamp(low, high)
 }
 
-/// `ChaCha8` words of a key and a run: no other key and no other run has a part in them.
+/// `ChaCha8` stream of a key and a run, independent of all others.
 struct Random(ChaCha8Rng);
 
 impl Random {
@@ -180,13 +180,13 @@ impl Random {
         self.0.next_u64()
     }
 
-    /// Uniform in \[0, 1), a multiple of 2^-53.
+    /// Draws a number uniform in \[0, 1), a multiple of 2^-53.
     fn unit(&mut self) -> f64 {
         const SCALE: f64 = 1.0 / (1_u64 << SEED_BITS) as f64;
         (self.word() >> (u64::BITS - SEED_BITS)) as f64 * SCALE
     }
 
-    /// Below `end`; words that would favour the smaller numbers are drawn again.
+    /// Draws an integer below `end`. Words that would favour small results are rejected.
     fn below(&mut self, end: u64) -> u64 {
         let fair = u64::MAX - u64::MAX % end.max(1);
         loop {
@@ -197,7 +197,7 @@ impl Random {
         }
     }
 
-    /// Of mean 0 and variance 1, by Box and Muller.
+    /// Draws a normal number with mean 0 and variance 1, by Box and Muller.
     fn normal(&mut self) -> f64 {
         let radius = (-2.0 * libm::log(1.0 - self.unit())).sqrt();
         radius * libm::cos(TAU * self.unit())
@@ -208,13 +208,13 @@ impl Random {
 mod tests {
     use super::*;
 
-    fn said(text: &str) -> Result<Variation, String> {
+    fn parse(text: &str) -> Result<Variation, String> {
         let table: toml::Table = text.parse().expect("TOML");
         Variation::read(&table["key"])
     }
 
     fn numbers(text: &str, count: u64) -> Vec<f64> {
-        let variation = said(text).expect("a variation");
+        let variation = parse(text).expect("a variation");
         let value = |run| match variation.value(7, "key", run, run) {
             toml::Value::Float(value) => value,
             toml::Value::Integer(value) => value as f64,
@@ -224,11 +224,11 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_drawn_as_they_say() {
+    fn drawn_numbers_have_the_stated_moments() {
         const COUNT: u64 = 20_000;
         let mean =
             |values: &[f64], of: &dyn Fn(f64) -> f64| values.iter().map(|&value| of(value)).sum::<f64>() / COUNT as f64;
-        // Five standard deviations of a mean of so many.
+        // Five standard deviations of the mean of `COUNT` numbers.
         let near = |found: f64, expected: f64, variance: f64| {
             assert!((found - expected).abs() < 5.0 * (variance / COUNT as f64).sqrt(), "{found} for {expected}");
         };
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn another_key_another_run_and_another_seed_draw_other_numbers() {
+    fn keys_runs_and_seeds_have_independent_numbers() {
         let uniform = Variation::Uniform([0.0, 1.0]);
         let drawn = [(7, "a", 0), (7, "b", 0), (7, "a", 1), (8, "a", 0)]
             .map(|(seed, key, run)| uniform.value(seed, key, run, 0).as_float().expect("a number").to_bits());
@@ -287,7 +287,7 @@ mod tests {
             "key = { grid = { from = 0.0, to = 1.0, count = 1 } }",
             "key = { grid = { from = 1.0, to = 0.0, count = 3 } }",
         ] {
-            assert!(said(wrong).is_err(), "{wrong}");
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

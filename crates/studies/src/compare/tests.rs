@@ -23,15 +23,15 @@ fn interrupted_after(steps: u64, threads: usize) -> Option<Comparison> {
 }
 
 #[test]
-fn an_interrupted_comparison_has_the_starts_that_were_flown_under_every_law() {
-    // 360 steps a flight: the third, of the second start, is under way.
+fn an_interrupted_comparison_keeps_complete_starts() {
+    // 360 steps per flight: the third flight, of the second start, is interrupted.
     let found = interrupted_after(360 * 2 + 100, 1).expect("a comparison");
     assert_eq!((found.runs, found.runs_asked), (1, 3));
     assert!(found.laws.iter().all(|law| law.flights.len() == 1 && law.flights[0].seed == 3));
     assert!(found.laws.iter().all(|law| law.flights[0].steps == 360), "whole flights");
-    assert!(found.notes()[0].starts_with("interrupted: of 3 starts, 1 were flown"), "{:?}", found.notes());
+    assert!(found.notes()[0].starts_with("interrupted: the comparison has 1 of 3 starts"), "{:?}", found.notes());
     assert!(interrupted_after(100, 1).is_none());
-    // Two threads, each with a law of the second start: the law that has finished it keeps its start.
+    // Two threads, each with a law of the second start: a law that has finished the start keeps it.
     let paired = interrupted_after(360 * 3 + 200, 2).expect("a comparison");
     assert!(paired.laws[0].flights.iter().zip(&paired.laws[1].flights).all(|(one, other)| one.seed == other.seed));
     assert!(paired.laws.iter().all(|law| law.flights.len() as u64 == paired.runs && law.name == law.kind));
@@ -41,7 +41,7 @@ fn an_interrupted_comparison_has_the_starts_that_were_flown_under_every_law() {
 }
 
 #[test]
-fn unknown_laws_and_laws_named_twice_are_refused() {
+fn unknown_and_repeated_laws_are_refused() {
     let refused = |laws: &[&str]| {
         let flown = batch(1, &mut |batch| options(laws, 1).fly(&pentagon(), batch));
         flown.map_err(|failure: Failure| failure.code()).expect_err("refused")
@@ -51,7 +51,7 @@ fn unknown_laws_and_laws_named_twice_are_refused() {
     assert_eq!(refused(&["none"]), "scenario/unknown-choice");
 }
 
-/// A mission whose first leg is cut off, and whose second is reached.
+/// Mission whose first leg is cut off and whose second leg is reached.
 const CUT_SHORT: &str = r#"
 [start]
 positions_m = [[0.0, 0.0], [4.0, 0.1], [8.0, 0.0]]
@@ -70,7 +70,7 @@ start_s = START_S
 "#;
 
 #[test]
-fn times_to_reach_are_of_flights_that_reached_alone() {
+fn times_to_reach_exclude_flights_that_did_not_reach() {
     let of = |start_s: &str| {
         let text = CUT_SHORT.replace("START_S", start_s);
         let base = base(Source::Text { name: "t".to_owned(), text }, &[]);

@@ -1,6 +1,6 @@
-//! The search finds where an answer turns, and says what it looked at.
+//! Bisection, and margins of flights.
 
-use super::{Found, Margin, Options, Range, search};
+use super::{Bisection, Margin, Options, Range, search};
 use crate::Question;
 use crate::study::{Experiment as _, Study as _};
 use crate::tests::{base, batch, pair};
@@ -9,7 +9,7 @@ fn range(from: f64, to: f64, scan: usize, halvings: u32) -> Range {
     Range { from, to, scan, halvings, logarithmic: false }
 }
 
-fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
+fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Bisection>, usize) {
     let mut asked = 0;
     let found = search(range, false, &mut |value| {
         asked += 1;
@@ -19,10 +19,10 @@ fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Found>, usize) {
 }
 
 #[test]
-fn the_bracket_holds_the_turn_and_is_as_narrow_as_its_halvings_say() {
+fn the_bracket_contains_the_turn_and_each_halving_halves_it() {
     for (from, to) in [(0.0, 4.0), (4.0, 0.0)] {
         let (turn, asked) = found(range(from, to, 5, 10), &|value| value < 1.2345);
-        let Some(Found::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
+        let Some(Bisection::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
         assert_eq!((was, turns, asked), (from < to, 1, 15));
         assert!((before - 1.2345) * (after - 1.2345) <= 0.0, "{before} {after}");
         assert_eq!((after - before).abs(), 2.0_f64.powi(-10));
@@ -40,18 +40,18 @@ fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
     for (value, exact) in asked.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
         assert!((value / exact - 1.0).abs() < 1e-12, "{value} {exact}");
     }
-    assert!(matches!(found, Ok(Some(Found::Turn { was: true, .. }))), "{found:?}");
+    assert!(matches!(found, Ok(Some(Bisection::Turn { was: true, .. }))), "{found:?}");
 }
 
 #[test]
-fn whole_numbers_are_looked_at_once_each_and_the_bracket_ends_at_neighbours() {
+fn integers_are_probed_at_most_once_and_bracketed_by_neighbours() {
     for (from, to, logarithmic) in [(1.0, 40.0, false), (40.0, 1.0, false), (1.0, 40.0, true), (5.0, 7.0, false)] {
         let mut asked = Vec::new();
         let found = search(Range { logarithmic, ..range(from, to, 9, 60) }, true, &mut |value: f64| {
             asked.push(value);
             Ok::<_, ()>(Some(value < 6.5))
         });
-        let Ok(Some(Found::Turn { before, after, .. })) = found else { panic!("{found:?}") };
+        let Ok(Some(Bisection::Turn { before, after, .. })) = found else { panic!("{found:?}") };
         assert_eq!((before.min(after), before.max(after)), (6.0, 7.0));
         assert!(asked.iter().all(|value| value.fract() == 0.0), "{asked:?}");
         asked.sort_by(f64::total_cmp);
@@ -60,15 +60,15 @@ fn whole_numbers_are_looked_at_once_each_and_the_bracket_ends_at_neighbours() {
 }
 
 #[test]
-fn an_answer_that_never_turns_is_said_to_be_even_and_one_that_turns_twice_to_turn_twice() {
-    assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Found::Even(true)), 5));
+fn constant_answers_are_even_and_two_turns_are_counted() {
+    assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Bisection::Even(true)), 5));
     let (twice, _) = found(range(0.0, 1.0, 11, 20), &|value| !(0.33..0.77).contains(&value));
-    let Some(Found::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
+    let Some(Bisection::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
     assert!(before < 0.33 && after >= 0.33 && after - before < 1e-6, "{before} {after}");
 }
 
 #[test]
-fn a_search_that_is_broken_off_says_only_what_it_knows() {
+fn an_interrupted_search_returns_only_known_brackets() {
     let broken = |after: usize| {
         let mut asked = 0;
         search(range(0.0, 1.0, 3, 8), false, &mut |value| {
@@ -78,7 +78,7 @@ fn a_search_that_is_broken_off_says_only_what_it_knows() {
     };
     assert_eq!(broken(0), Ok(None));
     assert_eq!(broken(1), Ok(None), "one value is no bracket");
-    let Ok(Some(Found::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
+    let Ok(Some(Bisection::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
     assert_eq!((before, after), (0.0, 0.5));
 }
 
@@ -96,7 +96,7 @@ fn margin_of(options: &Options) -> Margin {
 }
 
 #[test]
-fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
+fn a_formation_is_reached_if_the_duration_suffices() {
     let margin = margin_of(&options("time.duration_s", range(1.5, 40.0, 3, 6), Question::Reached, 1, 0));
     let turn = margin.turn.expect("it takes time to arrive");
     assert!(!turn.holds_below, "{turn:?}");
@@ -109,7 +109,7 @@ fn a_formation_is_reached_from_where_there_is_time_to_fly_there() {
 }
 
 #[test]
-fn a_key_that_takes_integers_only_is_halved_at_whole_numbers() {
+fn an_integer_key_is_halved_at_integers() {
     let margin = |key| margin_of(&options(key, range(1.0, 8.0, 3, 2), Question::Clear, 1, 0));
     let any = margin("time.record_hz");
     assert!(any.probes.iter().any(|probe| probe.value.fract() != 0.0), "record_hz takes any number");
@@ -119,7 +119,7 @@ fn a_key_that_takes_integers_only_is_halved_at_whole_numbers() {
 }
 
 #[test]
-fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
+fn several_runs_have_seeds_and_jitter() {
     let margin = margin_of(&options("law.alpha", range(0.5, 1.0, 2, 1), Question::Clear, 3, 7));
     assert!(margin.turn.is_none() && margin.holds_everywhere() && margin.jittered);
     for probe in &margin.probes {
@@ -132,7 +132,7 @@ fn several_runs_have_seeds_and_a_start_without_randomness_is_moved() {
 }
 
 #[test]
-fn ranges_that_are_none_and_values_that_cannot_be_flown_are_refused() {
+fn wrong_ranges_and_refused_values_are_refused() {
     let refused = |key: &str, range: Range| {
         let options = options(key, range, Question::Pass, 1, 0);
         let flown = options.check().and_then(|()| batch(1, &mut |batch| options.fly(&base(pair(), &[]), batch)));

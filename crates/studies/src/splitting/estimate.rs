@@ -1,4 +1,4 @@
-//! The probability that a flight is violated: its settings, one estimate, several of them, and violated flights flown again.
+//! Probability that a flight is violated: settings, one estimate, the mean of several, and replays of violated flights.
 
 use std::ops::ControlFlow;
 
@@ -12,20 +12,20 @@ use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
 
-/// Flights from which on estimates seldom end with nothing.
+/// Number of flights from which on estimates seldom end without a survivor.
 const ENOUGH: usize = 100;
-/// Estimates below which Student's interval of what is skewed is too optimistic to go without a word.
+/// Number of estimates below which Student's interval of a skewed distribution is too narrow.
 const MANY: usize = 20;
 
 /// Settings of an estimate: the keys of `[splitting]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Flights at a time, n: at least 2, better 100 or more.
+    /// Number of simultaneous flights, n: at least 2; 100 or more is recommended.
     pub flights: usize,
     /// Smallest number of flights that a round ends, k, less than n. 1 is the most accurate for the steps flown.
     pub kill: usize,
-    /// Most bad flights that are kept of an estimate.
+    /// Largest number of violated flights that an estimate keeps.
     pub keep: usize,
 }
 
@@ -36,7 +36,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Refuses numbers that leave no flight to end or to copy.
+    /// Refuses numbers of flights with which no round can end or copy a flight.
     ///
     /// # Errors
     /// [`Failure`] `campaign/splitting`.
@@ -56,58 +56,61 @@ impl Settings {
         Ok(())
     }
 
-    /// What is to be said before so few flights are flown.
+    /// Returns the warning of a small number of flights.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         (self.flights < ENOUGH).then(|| warning(self.flights as u64)).flatten()
     }
 }
 
-/// What is to be said of so few flights.
+/// Returns the warning of a small number of flights.
 fn warning(flights: u64) -> Option<String> {
     (flights < ENOUGH as u64).then(|| {
         format!(
-            "{flights} flights at a time are few: where the event is rare, most estimates end at 0 and a few far above the truth, \
-             so that their mean is right only over very many of them; take {ENOUGH} or more"
+            "{flights} flights at a time are few: for a rare event most estimates are 0, and their mean is \
+             unreliable; take {ENOUGH} or more"
         )
     })
 }
 
-/// An estimate of the probability that a flight is violated.
+/// Estimate of the probability that a flight is violated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Splitting {
-    /// Its number under its seed.
+    /// Number of the estimate under its seed.
     pub repetition: u64,
-    /// The estimate, without bias; a single one says nothing of how far off it is: [`Repetitions`] does.
+    /// Unbiased estimate. Its error is unknown from a single estimate; [`Repetitions`] has an interval.
     pub probability: f64,
-    /// Flights at a time.
+    /// Number of simultaneous flights.
     pub flights: u64,
-    /// At least so many were ended in a round.
+    /// Smallest number of flights that a round ended.
     pub kill: u64,
-    /// Rounds.
+    /// Number of rounds.
     pub iterations: u64,
-    /// Whether all flights were ended at once, which makes the estimate 0.
+    /// Whether a round ended all flights; the estimate is then 0.
     pub extinct: bool,
-    /// Steps flown.
+    /// Number of steps flown.
     pub steps: u64,
-    /// Some of the flights that were violated in the end. Each stands for as large a part of all that would be, so none is
-    /// likelier than another; those of different first ancestors come first, which have the least in common.
+    /// Some of the flights that were violated at the end, each equally likely. Flights with different first ancestors
+    /// come first, because they have the least in common.
     pub bad: Vec<BadFlight>,
 }
 
-/// Estimates the probability that a flight of this scenario is violated, over its noise: from its start, which stays the same.
+/// Estimates the probability, over the noise and from the scenario's start, that a flight is violated.
 ///
-/// A flight is violated where two vehicles come nearer than delta, or one nearer to an obstacle than its clearance, between steps
-/// too, as its judge says; its score is the largest of -clearance so far ([`Simulation::least_clearance_m`]). A flight that ends
-/// early, such as at its law's barrier, is violated if the judge found it so by then, and not for its end.
+/// A flight is violated if its judge finds two vehicles closer than delta, or a vehicle closer to an obstacle than its
+/// clearance, also between steps. The score is the largest -clearance so far ([`Simulation::least_clearance_m`]). A
+/// flight that ends early, such as at the barrier of its law, is violated only if the judge found a violation before
+/// its end.
 ///
-/// The answer depends on the scenario, the settings, `seed` and `repetition` alone. None where `carry_on`, which is asked after each
-/// step with the number of all steps, ends it. Memory holds at most ten states a flight ([`Saved`]): 30 kB
-/// each for three vehicles, 0.3 MB for a hundred, so that a hundred flights of a hundred vehicles take 0.3 GB.
+/// The result depends only on the scenario, the settings, `seed` and `repetition`. `carry_on` is called after each step
+/// with the number of all steps; if it breaks, the result is `None`.
+///
+/// Memory holds at most ten states of each flight ([`Saved`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
+/// flights of 100 vehicles take 0.3 GB.
 ///
 /// # Errors
-/// [`Failure`] for settings that leave nothing to split, for a scenario without noise from step to step, and for a law or a judge
-/// that cannot be built.
+/// [`Failure`] for wrong settings, for a scenario without noise from step to step, and for a law or a judge that cannot
+/// be built.
 pub fn estimate(
     scenario: &Scenario,
     settings: &Settings,
@@ -124,10 +127,10 @@ pub fn estimate(
     Ok(Some(Splitting { repetition, probability, flights, kill, iterations, extinct, steps, bad }))
 }
 
-/// Refuses what [`estimate`] refuses before it flies.
+/// Refuses what [`estimate`] refuses before its first flight.
 ///
 /// # Errors
-/// [`Failure`] `campaign/splitting` for settings that leave nothing to split, and for a scenario without noise from step to step.
+/// [`Failure`] `campaign/splitting` for wrong settings, and for a scenario without noise from step to step.
 pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), Failure> {
     settings.check()?;
     if is_noisy(scenario) {
@@ -135,13 +138,13 @@ pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), Failure> {
     }
     Err(Failure::input(
         "campaign/splitting",
-        "nothing in this flight is random from step to step, and splitting needs two flights from one state to differ",
-        "add turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses or jitter of \
-         messages (network.loss, network.jitter_s)",
+        "nothing in this flight is random from step to step, as splitting requires",
+        "add turbulence (wind.dryden), errors of measurement (sensing.position_noise_m and sensing.rate_hz), or losses \
+         or jitter of messages (network.loss, network.jitter_s)",
     ))
 }
 
-/// Whether two flights from one state differ: errors that last are drawn once.
+/// Returns whether two flights from one state can differ. Constant errors are drawn once, so they do not count.
 fn is_noisy(scenario: &Scenario) -> bool {
     let Scenario { wind, sensing, network, .. } = scenario;
     let errs = sensing.position_noise_m > 0.0 || sensing.velocity_noise_m_s > 0.0;
@@ -149,7 +152,7 @@ fn is_noisy(scenario: &Scenario) -> bool {
     wind.turbulence.is_some() || errs || is_lossy || network.jitter_s > 0.0
 }
 
-/// A flight under way.
+/// Running flight.
 struct Running<'a> {
     scenario: &'a Scenario,
     simulation: Simulation,
@@ -167,7 +170,7 @@ impl Path for Running<'_> {
     fn step(&mut self) -> bool {
         let goes_on = self.simulation.ending().is_none();
         self.simulation.step();
-        // What happened is told when the flight is flown again.
+        // The replay of a flight reports its events.
         drop(self.simulation.events());
         goes_on
     }
@@ -185,7 +188,7 @@ impl Path for Running<'_> {
     }
 }
 
-/// So many of the flights that were violated, those of different first ancestors first.
+/// Returns up to `keep` of the violated flights, those with different first ancestors first.
 fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFlight> {
     let hit: Vec<_> = split.lineages.iter().filter(|lineage| lineage.score() > 0.0).collect();
     let ancestor = |lineage: &Lineage<_>| lineage.genealogy().noise_seed;
@@ -209,20 +212,21 @@ fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<Bad
     .collect()
 }
 
-/// A flight that was violated.
+/// Violated flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BadFlight {
-    /// How it is flown again.
+    /// Random numbers that repeat the flight.
     pub genealogy: Genealogy,
-    /// The step in which it was violated, from 1; 0 is the start.
+    /// Step of the violation, from 1; 0 is the start.
     pub violated_at_step: u64,
-    /// The smallest clearance up to there \[m\], below 0.
+    /// Smallest clearance up to this step \[m\], less than 0.
     pub clearance_m: f64,
-    /// SHA-256 over time, positions, velocities and commands after that step, as [`tautline_core::record::StateHash`] has it.
+    /// SHA-256 over time, positions, velocities and commands after this step, as in
+    /// [`tautline_core::record::StateHash`].
     pub state_hash: String,
 }
 
-/// Hash over the state after one step, as [`BadFlight::state_hash`] has it.
+/// Hash over the state after one step, as in [`BadFlight::state_hash`].
 #[derive(Clone, Debug)]
 pub struct StateAt {
     step: u64,
@@ -231,13 +235,13 @@ pub struct StateAt {
 }
 
 impl StateAt {
-    /// Of the step in which a flight was violated.
+    /// Returns the hasher for the step at which a flight was violated.
     #[must_use]
     pub fn violation_of(flight: &BadFlight) -> Self {
         Self { step: flight.violated_at_step, seen: 0, hash: None }
     }
 
-    /// The hash, once the step has been flown.
+    /// Returns the hash; `None` before the step has been flown.
     #[must_use]
     pub fn hash(&self) -> Option<&str> {
         self.hash.as_deref()
@@ -263,12 +267,10 @@ impl Sink for StateAt {
     }
 }
 
-/// Flies a flight again to its end, with the same bits, and hands what is recorded to `sink`.
-///
-/// The scenario must be the one that was split.
+/// Repeats a flight to its end, with the same bits, and records it in `sink`. The scenario must be the split one.
 ///
 /// # Errors
-/// [`SimError`] where law or judge do not exist, or the recording cannot be kept.
+/// [`SimError`] if the law or the judge cannot be built, or `sink` cannot record.
 pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -> Result<Flight, SimError> {
     let mut simulation = begun(scenario, genealogy.noise_seed)?;
     let mut branches = genealogy.branches.iter().peekable();
@@ -282,31 +284,31 @@ pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -
     fly_on(simulation, sink, &mut take_over)
 }
 
-/// The scenario at its start, with the noise of a seed.
+/// Returns the scenario at its start, with a seed of noise.
 fn begun(scenario: &Scenario, noise_seed: u64) -> Result<Simulation, SimError> {
     Simulation::new(&Scenario { noise_seed, ..scenario.clone() })
 }
 
-/// The mean of independent estimates of one probability, with its interval.
+/// Mean of independent estimates of one probability.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repetitions {
     /// Number of estimates.
     pub repetitions: u64,
-    /// Their mean, which has no bias, with Student's interval, cut off at 0 and 1. It is that of normal values, and estimates
-    /// are skewed, the more the fewer flights each has: `advice` says where that matters.
+    /// Mean, without bias, with Student's interval limited to 0 and 1. The interval assumes normal values; estimates
+    /// are skewed, more so with fewer flights. `advice` states where this matters.
     pub probability: Estimate,
     /// [`CONFIDENCE`].
     pub confidence: f64,
-    /// Estimates that ended with nothing, at 0.
+    /// Estimates without a survivor, which are 0.
     pub extinct: Proportion,
-    /// Steps flown for all of them.
+    /// Steps flown for all estimates.
     pub steps: u64,
-    /// What is to be said with the interval, if anything.
+    /// Warnings about the interval, a sentence each.
     pub advice: Vec<String>,
 }
 
 impl Repetitions {
-    /// Of repetitions under one seed, each of another number.
+    /// Returns the mean of repetitions under one seed, each with another number.
     #[must_use]
     pub fn new(estimates: &[Splitting]) -> Self {
         let probabilities: Vec<_> = estimates.iter().map(|estimate| estimate.probability).collect();
@@ -314,20 +316,20 @@ impl Repetitions {
         let all_extinct = extinct == estimates.len();
         let Estimate { value, low, high } = Estimate::mean(&probabilities);
         let low = low.map(|low| low.max(0.0));
-        // Where no estimate has found anything there is no spread to tell how much more there may be.
+        // If all estimates are 0, their spread does not bound the probability.
         let high = high.map(|high| high.min(1.0)).filter(|_| !all_extinct);
         let fewest = estimates.iter().map(|estimate| estimate.flights).min();
         let mut advice: Vec<_> = fewest.and_then(warning).into_iter().collect();
         if extinct > 0 {
             advice.push(format!(
-                "{extinct} of {} estimates ended with no flight left, at 0: {}; fly more at a time",
+                "{extinct} of {} estimates ended without a survivor, at 0: {}; fly more at a time",
                 estimates.len(),
-                if all_extinct { "there is no upper bound" } else { "the mean rests on the others" }
+                if all_extinct { "there is no upper bound" } else { "the mean comes from the others" }
             ));
         }
         if estimates.len() < MANY {
             advice.push(format!(
-                "the interval of {} estimates is that of normal values, which estimates are not; {MANY} or more make it near that",
+                "the interval assumes normal values, which {} estimates do not justify; take {MANY} or more",
                 estimates.len()
             ));
         }
@@ -360,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn estimates_are_told_with_what_is_to_be_said_of_them() {
+    fn repetitions_have_an_interval_and_warnings() {
         let many = Repetitions::new(&vec![[estimate(0.25, 100), estimate(0.75, 100)]; 10].concat());
         assert_eq!((many.advice.as_slice(), many.steps, many.probability.value), ([].as_slice(), 200, Some(0.5)));
         // s = 0.2565, t = 2.093 for 19 degrees of freedom.
@@ -371,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_found_is_no_bound() {
+    fn estimates_of_zero_have_no_upper_bound() {
         let none = Repetitions::new(&vec![estimate(0.0, 100); 30]);
         assert_eq!((none.probability.value, none.probability.high), (Some(0.0), None));
         assert!(none.advice[0].contains("no upper bound"));

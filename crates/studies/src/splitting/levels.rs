@@ -1,4 +1,4 @@
-//! The algorithm: paths, levels and the random choices between them.
+//! Splitting of a random path: levels, rounds and the random choice of survivors.
 
 use std::ops::ControlFlow;
 
@@ -7,83 +7,84 @@ use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 use super::lineage::{Crossing, Lineage, StepCounter};
 
-/// A random path that is made step by step, one at a time in the same place.
+/// Random path that advances step by step. One value holds one path at a time.
 pub trait Path {
-    /// Everything of it at one instant, random numbers included.
+    /// Complete state at a step, random number generators included.
     type Saved;
-    /// Why a path cannot be begun.
+    /// Reason why a path cannot begin.
     type Error;
 
-    /// Begins anew, with random numbers of a seed.
+    /// Begins a new path with a seed of noise.
     ///
     /// # Errors
-    /// Where there is no such path.
+    /// If the path cannot begin.
     fn begin(&mut self, noise_seed: u64) -> Result<(), Self::Error>;
 
-    /// Goes on by a step; false, and nothing else, where it is at its end.
+    /// Advances by a step. Returns `false`, without a change, at the end of the path.
     fn step(&mut self) -> bool;
 
-    /// How near the event it has come so far: the larger, the nearer. It never falls.
+    /// Returns the score: larger is closer to the event. It never decreases along a path.
     fn score(&self) -> f64;
 
-    /// Everything as it is now.
+    /// Returns the complete state.
     fn save(&self) -> Self::Saved;
 
-    /// Becomes what was saved and goes on with the same bits as if it had never been left; with a `noise_seed`, all that is drawn
-    /// from now on is drawn from it and nothing else changes.
+    /// Restores a saved state and continues with the same bits. With a `noise_seed`, all later random numbers come from
+    /// this seed; nothing else changes.
     fn restore(&mut self, saved: &Self::Saved, noise_seed: Option<u64>);
 }
 
-/// What is split, and how.
+/// Parameters of a splitting.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
-    /// Paths at a time, n.
+    /// Number of simultaneous paths, n.
     pub flights: usize,
-    /// The level is the k-th smallest score; at least 1, and less than n.
+    /// The level is the k-th smallest score; k is at least 1 and less than n.
     pub kill: usize,
     /// The event is a score above this.
     pub target: f64,
-    /// Whether a score is one from which a copy may go on past a level. Without bias it is whether it is larger.
+    /// Whether a copy may branch off at a score, given the level. `score > level` is without bias.
     pub is_past: fn(score: f64, level: f64) -> bool,
 }
 
 impl Rule {
-    /// Copies go on from where they are above the level.
+    /// Returns the rule whose copies branch off above the level.
     #[must_use]
     pub fn new(flights: usize, kill: usize, target: f64) -> Self {
         Self { flights, kill, target, is_past: |score, level| score > level }
     }
 }
 
-/// What came of it.
+/// Result of a splitting.
 pub struct Split<S> {
-    /// Of the event.
+    /// Estimated probability of the event.
     pub probability: f64,
-    /// Rounds in which paths were ended.
+    /// Number of rounds that ended paths.
     pub iterations: u64,
-    /// Whether all paths were ended at once, which makes the estimate 0.
+    /// Whether a round ended all paths; the estimate is then 0.
     pub extinct: bool,
-    /// Steps that were made, those that were made again included.
+    /// Number of steps, repeated steps included.
     pub steps: u64,
-    /// The paths at the end.
+    /// Paths at the end.
     pub lineages: Vec<Lineage<S>>,
 }
 
-/// The probability that a path comes past the target:
+/// Estimates the probability that a path comes above the target:
 ///
 /// ```text
-/// repeat   Z = the k-th smallest of the scores S;   stop where Z > target
-///          end all K with S <= Z, ties too;   all of them: the estimate is 0
-///          each becomes a copy of one of the others, drawn at random, up to its first step with a score above Z
+/// repeat   Z = the k-th smallest of the scores S;   stop if Z > target
+///          end all K paths with S <= Z, ties included;   if all end, the estimate is 0
+///          replace each by a copy of a random survivor, up to the survivor's first step with a score above Z
 /// estimate = product of (1 - K/n) over the rounds, times the share of S > target at the end
 /// ```
 ///
-/// It depends on `seed` and `repetition` alone; repetitions under one seed are independent. Between rounds memory holds at most nine states
-/// a path and 16 bytes for each step of it, and one state more a path while a round lasts. None where `carry_on`, which is
-/// asked after each step with the number of all steps, ends it.
+/// The result depends only on the path, the rule, `seed` and `repetition`; repetitions under one seed are independent.
+/// Between rounds memory holds at most nine states of each path and 16 bytes for each of its steps; during a round one
+/// more state of each path. `carry_on` is called after each step with the number of all steps; if it breaks, the result
+/// is `None`.
 ///
 /// # Errors
-/// That of a path that cannot be begun.
+/// The error of a path that cannot begin.
 pub fn split<P: Path>(
     path: &mut P,
     rule: Rule,
@@ -126,7 +127,7 @@ pub fn split<P: Path>(
                     found => found.and_then(ControlFlow::continue_value),
                 };
             }
-            // A survivor has been past the level.
+            // A survivor has been above the level.
             let Some(crossing) = &crossings[parent] else { continue };
             match lineages[parent].branch(path, crossing, noise_seed, target, &mut watch) {
                 ControlFlow::Continue(child) => lineages[index] = child,
@@ -139,14 +140,14 @@ pub fn split<P: Path>(
     Ok(Some(Split { probability: product * share, iterations, extinct, steps: watch.steps, lineages }))
 }
 
-/// The k-th smallest score.
+/// Returns the k-th smallest score.
 fn level<S>(lineages: &[Lineage<S>], k: usize) -> f64 {
     let mut scores: Vec<_> = lineages.iter().map(Lineage::score).collect();
     scores.sort_by(f64::total_cmp);
     scores.get(k.saturating_sub(1)).copied().unwrap_or(f64::INFINITY)
 }
 
-/// Seeds of noise and choices of survivors, of one repetition under a seed; those of others are independent.
+/// Random numbers of one repetition under a seed: seeds of noise and choices of survivors.
 #[derive(Clone, Debug)]
 struct Draws(ChaCha8Rng);
 
@@ -157,15 +158,15 @@ impl Draws {
         Self(random)
     }
 
-    /// A seed that a scenario file can hold.
+    /// Draws a seed that a scenario file can hold.
     fn noise_seed(&mut self) -> u64 {
         self.0.next_u64() >> 1
     }
 
-    /// One of 0, 1, ... below `count`, each as likely; 0 of none.
+    /// Draws uniformly from 0 to `count - 1`; 0 if `count` is 0.
     fn below(&mut self, count: usize) -> usize {
         let count = (count as u64).max(1);
-        // Words beyond the last whole multiple would favour the first ones.
+        // Numbers beyond the last multiple of `count` would favour the smallest results.
         let whole = u64::MAX - u64::MAX % count;
         loop {
             let word = self.0.next_u64();

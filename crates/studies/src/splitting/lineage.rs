@@ -1,4 +1,4 @@
-//! A path, the random numbers that it was made of, and what it takes to branch off from it.
+//! History of a path: its random numbers, and the states from which copies branch off.
 
 use std::ops::ControlFlow;
 use std::rc::Rc;
@@ -7,44 +7,44 @@ use serde::{Deserialize, Serialize};
 
 use super::levels::Path;
 
-/// Most states that are kept of a path besides the one that it began with.
+/// Largest number of kept states of a path besides its first.
 const KEPT: usize = 8;
 
-/// Steps between two states that are kept, at first.
+/// Initial number of steps between two kept states.
 const FIRST_APART: u64 = 16;
 
-/// The random numbers that a path was made of, as they came one after the other: with them it can be made again.
+/// Seeds of noise of a path in order, which repeat the path.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Genealogy {
-    /// Its seed of noise at the start.
+    /// Seed of noise at the start.
     pub noise_seed: u64,
-    /// Where other random numbers took over, in the order of steps.
+    /// Changes of the seed, in the order of steps.
     pub branches: Vec<Branch>,
 }
 
-/// Where a path left the one that it is a copy of.
+/// Step at which a copy leaves its original.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Branch {
-    /// The last step that both have in common, from 1; 0 is the start.
+    /// Last common step, from 1; 0 is the start.
     pub step: u64,
-    /// The seed of noise from there on.
+    /// Seed of noise after this step.
     pub noise_seed: u64,
 }
 
 impl Genealogy {
-    /// Of a path that is no copy.
+    /// Returns the history of a path that is not a copy.
     pub(super) fn new(noise_seed: u64) -> Self {
         Self { noise_seed, branches: Vec::new() }
     }
 
-    /// Of a copy up to a step.
+    /// Returns the history of a copy up to a step.
     pub(super) fn branched(&self, branch: Branch) -> Self {
         let branches = self.branches.iter().copied().chain([branch]).collect();
         Self { noise_seed: self.noise_seed, branches }
     }
 }
 
-/// Counts steps, and calls `carry_on` after each.
+/// Counts steps and calls `carry_on` after each.
 pub(super) struct StepCounter<'a> {
     pub(super) steps: u64,
     pub(super) carry_on: &'a mut dyn FnMut(u64) -> ControlFlow<()>,
@@ -57,35 +57,36 @@ impl StepCounter<'_> {
     }
 }
 
-/// A path that was made to its end: its score, and where it was the first time past each lower one.
+/// Path that was run to its end: its score, and each step at which the score rose.
 ///
-/// A path can be branched off wherever its score was higher than ever before. Of these steps it keeps number and score (16 bytes
-/// each), and of some of them the state, at most nine: the others are made again from the one before, to the same bits.
+/// A copy can branch off at any step whose score is higher than all before, called a record. For each record the
+/// lineage keeps step number and score (16 bytes), and for at most nine of them the state. Other states are recomputed,
+/// with the same bits, from the kept state before them.
 pub struct Lineage<S> {
     genealogy: Genealogy,
     score: f64,
     records: Vec<Record>,
-    /// The first is not after the first record.
+    /// Kept states; the first is not after the first record.
     states: Vec<State<S>>,
-    /// Steps between two states, at least.
+    /// Smallest number of steps between two kept states.
     apart: u64,
 }
 
-/// A step at which the score was higher than ever before.
+/// Step at which the score was higher than at all steps before.
 #[derive(Clone, Copy)]
 struct Record {
     step: u64,
     score: f64,
 }
 
-/// A path at a step; with a seed, other random numbers take over from there.
+/// State at a step; with a seed, later random numbers come from this seed.
 struct State<S> {
     step: u64,
     saved: Rc<S>,
     noise_seed: Option<u64>,
 }
 
-/// Where a path was past a level for the first time.
+/// First step above a level.
 pub(super) struct Crossing<S> {
     step: u64,
     score: f64,
@@ -93,19 +94,19 @@ pub(super) struct Crossing<S> {
 }
 
 impl<S> Lineage<S> {
-    /// Its largest score; of one that is past the target, the first that is.
+    /// Returns the largest score; for a path above the target, the first score above it.
     #[must_use]
     pub fn score(&self) -> f64 {
         self.score
     }
 
-    /// The random numbers that it was made of.
+    /// Returns the random numbers of the path.
     #[must_use]
     pub fn genealogy(&self) -> &Genealogy {
         &self.genealogy
     }
 
-    /// A path from its start, to its end or past the target.
+    /// Runs a path from its start to its end or above the target.
     pub(super) fn begin<P: Path<Saved = S>>(
         path: &mut P,
         noise_seed: u64,
@@ -124,7 +125,7 @@ impl<S> Lineage<S> {
         Ok(lineage.grow(path, 0, target, watch))
     }
 
-    /// A copy up to a crossing, with fresh noise from there.
+    /// Runs a copy: the path up to a crossing, then with fresh noise.
     pub(super) fn branch<P: Path<Saved = S>>(
         &self,
         path: &mut P,
@@ -145,7 +146,7 @@ impl<S> Lineage<S> {
         lineage.grow(path, step, target, watch)
     }
 
-    /// Goes on from a step with the path as it is there.
+    /// Continues from a step, whose state `path` has.
     fn grow<P: Path<Saved = S>>(
         mut self,
         path: &mut P,
@@ -163,7 +164,7 @@ impl<S> Lineage<S> {
         ControlFlow::Continue(self)
     }
 
-    /// Notes where the path is, where it is nearer than ever before.
+    /// Adds a record if the score is higher than before.
     fn observe<P: Path<Saved = S>>(&mut self, path: &P, step: u64) {
         let score = path.score();
         if score > self.score {
@@ -180,7 +181,7 @@ impl<S> Lineage<S> {
         }
     }
 
-    /// Forgets what lies before the first record of which `is_past` holds: nothing will branch off there any more.
+    /// Drops all records before the first that satisfies `is_past`: no copy branches off there any more.
     pub(super) fn forget_before(&mut self, is_past: impl Fn(f64) -> bool) {
         self.records.drain(..self.records.partition_point(|record| !is_past(record.score)));
         if let Some(first) = self.records.first() {
@@ -189,7 +190,7 @@ impl<S> Lineage<S> {
         }
     }
 
-    /// Takes the path to the first record of which `is_past` holds, if there is one.
+    /// Moves `path` to the first record that satisfies `is_past`. Returns `None` without such a record.
     pub(super) fn crossing<P: Path<Saved = S>>(
         &self,
         path: &mut P,
@@ -203,7 +204,7 @@ impl<S> Lineage<S> {
         })
     }
 
-    /// Takes the path to its last record, and says which step that is.
+    /// Moves `path` to its last record and returns the step.
     pub(super) fn last<P: Path<Saved = S>>(&self, path: &mut P) -> Option<u64> {
         let step = self.records.last()?.step;
         let reached =
@@ -211,7 +212,7 @@ impl<S> Lineage<S> {
         reached.is_continue().then_some(step)
     }
 
-    /// Makes the path again up to a step, from the last state that is kept before it.
+    /// Recomputes the path up to a step, from the last kept state before it.
     fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut StepCounter<'_>) -> ControlFlow<()> {
         if let Some(state) = self.states.iter().rev().find(|state| state.step <= step) {
             path.restore(&state.saved, state.noise_seed);
@@ -228,7 +229,7 @@ impl<S> Lineage<S> {
 mod tests {
     use super::*;
 
-    /// A path that comes a step nearer with each step, and remembers where it has been restored.
+    /// Path whose score rises by 1 at each step, up to 10,000.
     struct Climb(u64);
 
     impl Path for Climb {
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn few_states_are_kept_and_every_record_is_found_again() {
+    fn few_states_are_kept_and_every_record_is_recomputed() {
         let mut carry_on = |_| ControlFlow::Continue(());
         let mut watch = StepCounter { steps: 0, carry_on: &mut carry_on };
         let mut path = Climb(0);

@@ -1,12 +1,15 @@
-//! Events too rare to be met by chance: adaptive multilevel splitting.
+//! Adaptive multilevel splitting: the probability of events too rare for plain sampling.
 //!
-//! So many flights are flown. Those that came least near to the event are ended; each is flown again as a copy of one that came
-//! nearer, up to the step at which that one was past where the best of the ended had come, and from there on with fresh noise. What
-//! each round leaves of the flights multiplies to the probability of the event ([`split`]), without bias for any number of flights
-//! (Brehier, Gazeau, Goudenege, Lelievre and Rousset, Annals of Applied Probability 26(6), 2016).
+//! A number of flights is flown. Each round ends the flights with the lowest scores, and replaces each of them by a
+//! copy of a surviving flight. The level of the round is the largest score that it ended. A copy follows the survivor
+//! up to its first step above the level, and has fresh noise from there on.
 //!
-//! [`estimate`] asks for the probability that a flight is violated, [`Repetitions`] gives the interval of several estimates, and
-//! [`replay`] flies a bad flight again.
+//! The product of the surviving fractions of all rounds estimates the probability of the event ([`split`]). The
+//! estimate is without bias for any number of flights. Source: Brehier, Gazeau, Goudenege, Lelievre and Rousset, Annals
+//! of Applied Probability 26(6), 2016.
+//!
+//! [`estimate`] returns the probability that a flight is violated, [`Repetitions`] the interval of several estimates,
+//! and [`replay`] repeats a violated flight.
 
 mod estimate;
 mod levels;

@@ -1,4 +1,4 @@
-//! Flights that are split: against plain flights, and flown again to the same bits.
+//! Splitting against plain flights, and replays with the same bits.
 
 mod walk;
 
@@ -9,37 +9,38 @@ use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use tautline_sim::scenario::{Scenario, Source};
 use tautline_sim::sim::Simulation;
 
-/// Three vehicles in a turbulent wind, each in an air of its own, that stay where they are as well as they can, with more keys.
+/// Returns three vehicles that hold their places, each in its own turbulence, with additional keys.
 fn windy(law: &str, speed_m_s: f64, more: &str) -> Scenario {
     let text = format!(
         "[start]\npositions_m = [[0.0, 0.0], [3.0, 0.0], [6.0, 0.0]]\n[formation]\nshape = \"line\"\nspacing_m = 3.0\n\
          [law]\nkind = \"{law}\"\ndelta_m = 2.0\n[vehicle]\ndrag_per_s = 0.5\n\
-         [wind]\nmean_m_s = [2.0, 0.0]\nshared = false\ndryden = {{ speed_20ft_m_s = {speed_m_s:.1}, height_m = 10.0 }}\n\
-         [time]\nduration_s = 3.0\n{more}"
+         [wind]\nmean_m_s = [2.0, 0.0]\nshared = false\n\
+         dryden = {{ speed_20ft_m_s = {speed_m_s:.1}, height_m = 10.0 }}\n[time]\nduration_s = 3.0\n{more}"
     );
     let mut scenario = Scenario::read(&Source::Text { name: "windy".to_owned(), text }, &[]).expect("a scenario");
     (scenario.time.dt_s, scenario.time.record_hz) = (0.04, 25.0);
     scenario
 }
 
-/// Errors of measurement, those that last too.
-const SENSING: &str = "[sensing]\nposition_noise_m = 0.1\nposition_bias_m = 0.1\nvelocity_noise_m_s = 0.1\nrate_hz = 5.0\nlatency_s = 0.1\n";
+/// Errors of measurement, constant errors included.
+const SENSING: &str = "[sensing]\nposition_noise_m = 0.1\nposition_bias_m = 0.1\nvelocity_noise_m_s = 0.1\n\
+                       rate_hz = 5.0\nlatency_s = 0.1\n";
 
-/// And what becomes of messages.
+/// Losses and delays of messages.
 const NETWORK: &str = "[network]\nloss = 0.2\nloss_burst = 2.0\njitter_s = 0.05\nlatency_s = 0.02\nrate_hz = 10.0\n";
 
-/// The law that lets nobody come near, where it knows all, under all that can be random in a flight.
+/// Returns a law with avoidance and all kinds of randomness of a flight.
 fn all_random() -> Scenario {
     windy("displacement", 14.0, &[SENSING, NETWORK].concat())
 }
 
 fn split(scenario: &Scenario, settings: &Settings, repetition: u64) -> Splitting {
     let split = estimate(scenario, settings, [7, repetition], &mut |_| ControlFlow::Continue(()));
-    split.expect("an estimate").expect("nobody ends it")
+    split.expect("an estimate").expect("no interruption")
 }
 
-/// Whether in a flight with this noise two vehicles come too near each other, and one to an obstacle. The clearance that splitting
-/// looks at says so exactly where the judge does.
+/// Returns whether a flight with this noise violates delta, and the clearance of an obstacle. Asserts that the score of
+/// splitting and the judge agree.
 fn violations(scenario: &Scenario, noise_seed: u64) -> [bool; 2] {
     let mut simulation = Simulation::new(&Scenario { noise_seed, ..scenario.clone() }).expect("a simulation");
     let mut least_m = f64::INFINITY;
@@ -56,8 +57,8 @@ fn violations(scenario: &Scenario, noise_seed: u64) -> [bool; 2] {
     violations
 }
 
-/// Both are without bias, and at some per cent both see it: the mean of estimates and the share of plain flights are within three
-/// standard errors of their difference.
+/// Both estimators are unbiased. At a few per cent, the mean of estimates and the share of plain flights differ by less
+/// than three standard errors.
 #[test]
 fn splitting_agrees_with_plain_flights() {
     let is_long = std::env::var_os("TAUTLINE_LONG").is_some();
@@ -71,21 +72,21 @@ fn splitting_agrees_with_plain_flights() {
     let squares = estimates.iter().map(|estimate| (estimate.probability - mean).powi(2)).sum::<f64>();
     let variance = squares / (repetitions - 1) as f64 / repetitions as f64;
     let error = (variance + share * (1.0 - share) / runs as f64).sqrt();
-    assert!(estimates.iter().all(|estimate| estimate.iterations > 0), "some are ended in each");
-    assert!((0.02..0.2).contains(&share) && 4.0 * error < share, "the check can tell it from nothing");
+    assert!(estimates.iter().all(|estimate| estimate.iterations > 0), "each estimate ends flights");
+    assert!((0.02..0.2).contains(&share) && 4.0 * error < share, "the share is significant");
     assert!((mean - share).abs() < 3.0 * error, "{mean} for {share}, {error}");
 }
 
-/// Obstacles count, and what the score says is what the judge says.
+/// Violations of obstacles count, and the score agrees with the judge.
 #[test]
-fn a_flight_too_near_an_obstacle_is_violated_too() {
+fn obstacles_count_as_violations() {
     let post = "[[obstacle]]\nname = \"post\"\nball = { radius_m = 1.0 }\nat_m = [0.0, -2.1, 0.0]\nclearance_m = 1.0\n";
     let scenario = windy("laplacian", 3.0, post);
     let flown: Vec<_> = (0..60).map(|seed| violations(&scenario, seed)).collect();
     assert!(flown.contains(&[false, true]) && flown.contains(&[false, false]), "{flown:?}");
 }
 
-/// What a flight is after each step, and all that was recorded of it.
+/// State after each step, and everything that was recorded.
 #[derive(Default)]
 struct Seen {
     after: Vec<String>,
@@ -117,10 +118,10 @@ fn seen(scenario: &Scenario, genealogy: &Genealogy) -> Seen {
     seen
 }
 
-/// Bad flights were flown in pieces: as copies of copies, from states that were saved or made again. In one piece they have the
-/// same bits, and each is its ancestor up to the branch and another flight after it.
+/// Violated flights consist of copies of copies, from saved or recomputed states. A replay in one piece has the same
+/// bits, and equals its ancestor up to the branch only.
 #[test]
-fn a_bad_flight_is_flown_again_to_the_same_bits() {
+fn a_violated_flight_is_replayed_with_the_same_bits() {
     for scenario in [windy("laplacian", 3.0, ""), all_random()] {
         let settings = Settings { flights: 30, kill: 3, keep: 4 };
         let bad: Vec<_> = (0..2).flat_map(|repetition| split(&scenario, &settings, repetition).bad).collect();
@@ -143,13 +144,13 @@ fn a_bad_flight_is_flown_again_to_the_same_bits() {
     }
 }
 
-/// Otherwise what the copy does from the branch on would not go with what it did up to there.
+/// Held measurements must not change at the branch.
 #[test]
-fn fresh_noise_leaves_what_was_measured_as_it_is() {
+fn fresh_noise_keeps_held_measurements() {
     let mut scenario = windy("displacement", 5.0, SENSING);
     scenario.wind.turbulence = None;
     let mut straight = Simulation::new(&scenario).expect("a simulation");
-    // At 1.04 s vehicles hold what they measured at 0.8 s, and from 1.1 s on what they measured at 1 s.
+    // At 1.04 s vehicles hold their measurements of 0.8 s, from 1.1 s on those of 1 s.
     (0..26).for_each(|_| straight.step());
     let mut fresh = straight.clone();
     fresh.load(&straight.save(), Some(9));
@@ -176,7 +177,7 @@ fn an_estimate_is_the_same_for_the_same_seed_and_can_be_ended() {
 }
 
 #[test]
-fn what_cannot_be_split_is_refused_with_what_to_do() {
+fn scenarios_that_cannot_be_split_are_refused_with_a_remedy() {
     let refused = |scenario: &Scenario, flights: usize, kill: usize| {
         let settings = Settings { flights, kill, keep: 1 };
         estimate(scenario, &settings, [1, 0], &mut |_| ControlFlow::Break(())).expect_err("refused").to_string()
@@ -185,7 +186,7 @@ fn what_cannot_be_split_is_refused_with_what_to_do() {
     assert!(refused(&windy, 1, 1).starts_with("splitting.flights: must be at least 2, got 1 "));
     assert!(refused(&windy, 10, 0).starts_with("splitting.kill: must be from 1 to 9, got 0 "));
     assert!(refused(&windy, 10, 10).starts_with("splitting.kill: must be from 1 to 9, got 10 "));
-    // Errors that last are drawn once: two flights from one state are the same.
+    // Constant errors are drawn once: two flights from one state are equal.
     let mut still = windy.clone();
     still.wind.turbulence = None;
     for bias_m in [0.0, 0.1] {

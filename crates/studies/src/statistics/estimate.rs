@@ -1,23 +1,24 @@
-//! Means and quantiles of what was measured.
+//! Means and quantiles of measured values.
 
 use serde::Serialize;
 use statrs::distribution::{Binomial, ContinuousCDF as _, DiscreteCDF as _, StudentsT};
 
 use super::TAIL;
 
-/// An estimate with its interval; a bound that so few values do not give is none.
+/// Estimate with its interval. A bound is `None` if too few values determine it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Of the values at hand; none of none.
+    /// Estimate; `None` without values.
     pub value: Option<f64>,
-    /// The true one is at least this.
+    /// Lower bound of the true value.
     pub low: Option<f64>,
-    /// And at most this.
+    /// Upper bound of the true value.
     pub high: Option<f64>,
 }
 
 impl Estimate {
-    /// The mean with Student's interval: exact for normal values, near it for many; none of fewer than two values.
+    /// Returns the mean with Student's interval: exact for normal values, approximate for many values; no interval for
+    /// fewer than two values.
     #[must_use]
     pub fn mean(values: &[f64]) -> Self {
         let count = values.len() as f64;
@@ -31,12 +32,11 @@ impl Estimate {
         Self { value: Some(mean), low: half.map(|half| mean - half), high: half.map(|half| mean + half) }
     }
 
-    /// The value that a part `p` of all is not above, between 0 and 1: 0.5 is the median. Where it falls between two values it
-    /// is their mean.
+    /// Returns the `p` quantile, 0 < p < 1: 0.5 is the median. Between two values it is their mean.
     ///
-    /// The interval is that of order statistics, for any continuous distribution: the number of values below the true one
-    /// is binomial. A bound is none where there are too few values for it: six give both of the median, 72 those of the
-    /// 95th percentile.
+    /// The interval is that of order statistics, for any continuous distribution: the number of values below the true
+    /// quantile is binomial. A bound is `None` if there are too few values: both bounds need six values for the median
+    /// and 72 for the 95th percentile.
     #[must_use]
     pub fn quantile(values: &[f64], p: f64) -> Self {
         let mut sorted = values.to_vec();
@@ -52,9 +52,9 @@ impl Estimate {
     }
 }
 
-/// The mean of the two values on either side of a part `p`, or the one that is on both.
+/// Returns the `p` quantile of sorted values: one value, or the mean of the two on either side.
 fn middle(sorted: &[f64], p: f64) -> Option<f64> {
-    /// Products of a part and a number are whole to this.
+    /// Tolerance within which the product of `p` and a length counts as an integer.
     const ROUNDING: f64 = 1e-9;
     let rank = p * sorted.len() as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quantile_has_the_interval_of_order_statistics() {
+    fn quantiles_have_the_interval_of_order_statistics() {
         let upto = |n: u32| (1..=n).map(f64::from).collect::<Vec<_>>();
         let median = |n| Estimate::quantile(&upto(n), 0.5);
         assert_eq!(median(20), Estimate { value: Some(10.5), low: Some(6.0), high: Some(15.0) });
@@ -98,14 +98,15 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_of_order_statistics_covers_as_it_says_and_not_much_more() {
+    fn intervals_of_order_statistics_are_the_narrowest_that_cover() {
         for n in [6_u64, 20, 72, 200] {
             for p in [0.5, 0.95] {
                 let values: Vec<_> = (1..=n).map(|rank| rank as f64).collect();
                 let Estimate { low, high, .. } = Estimate::quantile(&values, p);
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "ranks")]
                 let rank = |bound: Option<f64>| bound.map(|bound| bound as u64);
-                // The true one is below the lower bound where fewer values than its rank are below the true one.
+                // The quantile is below the lower bound if fewer values than the rank of the bound are below the
+                // quantile.
                 let too_low = rank(low).map_or(0.0, |low| binomial_up_to(low - 1, n, p));
                 let too_high = rank(high).map_or(0.0, |high| 1.0 - binomial_up_to(high - 1, n, p));
                 assert!(too_low <= TAIL && too_high <= TAIL, "{n}, {p}: {too_low}, {too_high}");

@@ -1,8 +1,12 @@
-//! What some runs say of all that could have been flown: shares, means, quantiles and differences with 95 % intervals.
+//! Shares, means, quantiles and differences of pairs, with 95 % intervals.
 //!
-//! [`Proportion::new`], [`Estimate`] and [`Paired`] are two-sided, with at most 2.5 % on either side, and for a number of runs that was
-//! fixed beforehand. [`Proportion::upper_bound`] is one-sided, with at most 5 % above. Whoever wants to stop where the answer is known takes [`anytime`] and [`ConfidenceSequence`], which hold at
-//! every number of runs at once. `coverage` measures how often each of them holds the truth.
+//! | interval | holds for | error probability |
+//! | --- | --- | --- |
+//! | [`Proportion::new`], [`Estimate`], [`Paired`] | a number of runs fixed beforehand | at most 2.5 % on either side |
+//! | [`Proportion::upper_bound`] | a number of runs fixed beforehand | at most 5 % above |
+//! | [`anytime`], [`ConfidenceSequence`] | every number of runs at once, for early stops | at most 5 % |
+//!
+//! The tests of this module measure how often each interval contains the truth.
 
 mod estimate;
 mod proportion;
@@ -12,10 +16,10 @@ pub use estimate::Estimate;
 pub use proportion::{Paired, Proportion};
 pub use sequence::{ConfidenceSequence, anytime, looks};
 
-/// How often an interval holds the true value.
+/// Probability with which an interval contains the true value.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Probability that an interval leaves out on either side.
+/// Error probability on either side of an interval.
 const TAIL: f64 = 0.5 * (1.0 - CONFIDENCE);
 
 #[cfg(test)]

@@ -5,43 +5,43 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _}
 
 use super::{CONFIDENCE, TAIL};
 
-/// So many of so many, with the interval of their share.
+/// `count` of `of`, with a confidence interval of the share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Proportion {
-    /// How many.
+    /// Number of runs that count.
     pub count: u64,
-    /// Of how many.
+    /// Number of all runs.
     pub of: u64,
-    /// One over the other, from 0 to 1; none of none.
+    /// `count / of`, from 0 to 1; `None` if `of` is 0.
     pub share: Option<f64>,
-    /// The true share is at least this.
+    /// Lower bound of the true share.
     pub low: f64,
-    /// And at most this.
+    /// Upper bound of the true share.
     pub high: f64,
     /// [`CONFIDENCE`].
     pub confidence: f64,
 }
 
 impl Proportion {
-    /// `count` of `of`, with the interval of Clopper and Pearson (Biometrika 26, 1934): the shares that are not rejected by
-    /// either one-sided binomial test. It never covers less than [`CONFIDENCE`], and holds for 0 and for all of them. A count
-    /// beyond `of` is taken for `of`.
+    /// Returns `count` of `of` with the interval of Clopper and Pearson (Biometrika 26, 1934): the shares that neither
+    /// one-sided binomial test rejects. It never covers less than [`CONFIDENCE`], also for counts of 0 and `of`. A
+    /// count above `of` is reduced to `of`.
     #[must_use]
     pub fn new(count: u64, of: u64) -> Self {
         Self::between(count, of, clopper_pearson(count, of, TAIL))
     }
 
-    /// Returns the one-sided upper bound of the share, of Clopper and Pearson: the largest share in which `count` of `of` or fewer are met
-    /// with a probability of 1 - [`CONFIDENCE`]. A one-sided bound leaves out all of that on one side, and the interval of
-    /// [`Proportion::new`] half of it on either side. For a count of 0 it is `1 - (1 - CONFIDENCE)^(1 / of)`. A count beyond `of` is taken
-    /// for `of`.
+    /// Returns the one-sided upper bound of Clopper and Pearson: the largest share with which `count` or fewer of `of`
+    /// have a probability of 1 - [`CONFIDENCE`]. All of the error probability is on one side; [`Proportion::new`] has
+    /// half of it on either side. For a count of 0 the bound is `1 - (1 - CONFIDENCE)^(1 / of)`. A count above `of` is
+    /// reduced to `of`.
     #[must_use]
     pub fn upper_bound(count: u64, of: u64) -> f64 {
         let [_, high] = clopper_pearson(count, of, 1.0 - CONFIDENCE);
         high
     }
 
-    /// `count` of `of` with the bounds of another interval; a count beyond `of` is taken for `of`.
+    /// Returns `count` of `of` with the bounds of another interval. A count above `of` is reduced to `of`.
     pub(super) fn between(count: u64, of: u64, [low, high]: [f64; 2]) -> Self {
         let count = count.min(of);
         let share = (of > 0).then(|| count as f64 / of as f64);
@@ -49,7 +49,8 @@ impl Proportion {
     }
 }
 
-/// The bounds of Clopper and Pearson that leave out `tail` on either side; a count beyond `of` is taken for `of`.
+/// Returns the bounds of Clopper and Pearson with an error probability of `tail` on either side. A count above `of` is
+/// reduced to `of`.
 pub(super) fn clopper_pearson(count: u64, of: u64, tail: f64) -> [f64; 2] {
     let count = count.min(of);
     let (hits, misses) = (count as f64, (of - count) as f64);
@@ -58,44 +59,45 @@ pub(super) fn clopper_pearson(count: u64, of: u64, tail: f64) -> [f64; 2] {
     [low.unwrap_or(0.0), high.unwrap_or(1.0)]
 }
 
-/// Where the distribution function of Beta(a, b) reaches p.
+/// Returns the `p` quantile of Beta(a, b).
 fn beta_quantile(a: f64, b: f64, p: f64) -> Option<f64> {
     Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok()
 }
 
-/// Pairs of runs that differ in one thing alone, such as the law, and of each run whether something happened.
+/// Pairs of runs that differ in one thing, such as the law, and in each run whether an event occurred.
 ///
-/// Pairs in which it happened to both or to neither say nothing of which is the more likely; the others are discordant.
+/// Pairs in which the event occurred in both runs or in neither are concordant; the others are discordant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Paired {
-    /// Pairs in which it happened to the first alone.
+    /// Pairs in which it occurred in the first run only.
     pub only_first: u64,
-    /// Pairs in which it happened to the second alone.
+    /// Pairs in which it occurred in the second run only.
     pub only_second: u64,
-    /// All pairs.
+    /// Number of all pairs.
     pub of: u64,
-    /// The two-sided p-value of the exact test of `McNemar` (Psychometrika 12, 1947): how likely discordant pairs are at least as uneven
-    /// where each favours either with the same probability. 1 where there are none.
+    /// Two-sided p-value of the exact test of `McNemar` (Psychometrika 12, 1947): the probability of discordant pairs
+    /// at least this uneven if each favours either run equally. 1 without discordant pairs.
     pub p_value: f64,
-    /// The share of discordant pairs that are `only_first`, with the interval of Clopper and Pearson given their number.
+    /// Share of `only_first` in the discordant pairs, with the interval of Clopper and Pearson given their number.
     pub first_of_discordant: Proportion,
-    /// Probability of the first less that of the second, from -1 to 1; none of none.
+    /// Probability of the event in the first run less that in the second, from -1 to 1; `None` without pairs.
     pub difference: Option<f64>,
-    /// The true difference is at least this.
+    /// Lower bound of the true difference.
     pub low: f64,
-    /// And at most this.
+    /// Upper bound of the true difference.
     pub high: f64,
     /// [`CONFIDENCE`].
     pub confidence: f64,
 }
 
 impl Paired {
-    /// What is known of `of` pairs; more discordant ones than pairs are taken for that many pairs.
+    /// Returns the statistics of `of` pairs. An `of` below the number of discordant pairs is raised to it.
     ///
-    /// The difference of the two probabilities is psi (2 theta - 1), with psi the probability of a discordant pair and theta that
-    /// of one that favours the first. Its interval is conservative: intervals of Clopper and Pearson at 1 - alpha/2 for psi, of all
-    /// pairs, and for theta, of the discordant ones given their number, hold both at once with probability 1 - alpha at least
-    /// (Bonferroni), and the bounds are the least and the largest product within.
+    /// The difference of the two probabilities is psi (2 theta - 1): psi is the probability of a discordant pair, theta
+    /// that of one that favours the first. The interval is conservative: psi (of all pairs) and theta (of the
+    /// discordant pairs, given their number) have the intervals of Clopper and Pearson at 1 - alpha/2. Both hold
+    /// together with a probability of at least 1 - alpha (Bonferroni). The bounds are the smallest and the largest
+    /// product within them.
     #[must_use]
     pub fn new(only_first: u64, only_second: u64, of: u64) -> Self {
         let discordant = only_first.saturating_add(only_second);
@@ -117,7 +119,7 @@ impl Paired {
     }
 }
 
-/// Twice the probability of at most the `fewer` of two kinds that are as likely.
+/// Returns twice the probability of at most `fewer` of `of` for two equally likely kinds, at most 1.
 fn p_value(fewer: u64, of: u64) -> f64 {
     if of == 0 {
         return 1.0;
@@ -145,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_one_sided_bound_leaves_out_a_twentieth_on_its_side() {
+    fn a_one_sided_bound_has_an_error_probability_of_5_percent() {
         for of in [1_u64, 20, 200, 1000, 10_000] {
             near(Proportion::upper_bound(0, of), 1.0 - 0.05_f64.powf(1.0 / of as f64), 1e-9);
         }
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn its_bounds_are_where_the_one_sided_tests_turn() {
+    fn bounds_are_where_the_one_sided_tests_turn() {
         for of in [1_u64, 2, 7, 20, 60, 300] {
             for count in 0..=of {
                 let Proportion { low, high, .. } = Proportion::new(count, of);
@@ -188,9 +190,9 @@ mod tests {
         }
     }
 
-    /// Under the null hypothesis a p-value is at most alpha with a probability of alpha at most.
+    /// Under the null hypothesis a p-value is at most alpha with a probability of at most alpha.
     #[test]
-    fn it_rejects_equal_laws_no_more_often_than_it_says() {
+    fn equal_laws_are_rejected_at_most_at_the_stated_rate() {
         let law = |count: u64, of: u64| {
             binomial_up_to(count, of, 0.5) - if count == 0 { 0.0 } else { binomial_up_to(count - 1, of, 0.5) }
         };
@@ -204,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_difference_is_mirrored_by_exchanging_both_and_is_within_its_bounds() {
+    fn the_difference_is_antisymmetric_and_within_its_bounds() {
         for (first, second, of) in [(10, 0, 100), (3, 8, 40), (0, 0, 20), (7, 7, 14), (500, 100, 10_000)] {
             let (one, other) = (Paired::new(first, second, of), Paired::new(second, first, of));
             near(one.low, -other.high, 1e-12);
@@ -221,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn ten_to_nothing_tell_two_laws_apart_and_five_to_nothing_do_not() {
+    fn ten_to_zero_is_significant_and_five_to_zero_is_not() {
         let ten = Paired::new(10, 0, 100);
         assert!(ten.low > 0.0 && ten.p_value < 0.05 && ten.first_of_discordant.low > 0.5);
         let five = Paired::new(5, 0, 100);

@@ -1,26 +1,29 @@
-//! Intervals that hold however often they are looked at.
+//! Confidence sequences: intervals that hold at every number of runs at once.
 
 use super::CONFIDENCE;
 use super::proportion::Proportion;
 
-/// Both parameters of the beta mixture, Jeffreys' prior. Against 1 it has a third less to say against few: 0 of 10,000 bound the
-/// share by 0.00082 and not by 0.00122, and a campaign looks for what seldom happens; near one half it is 2 % wider.
+/// Both parameters of the beta mixture: Jeffreys' prior. With 1 instead, bounds of small counts are a third wider: for
+/// 0 of 10,000 the upper bound is 0.00122 instead of 0.00082. Near a share of 0.5, Jeffreys' prior is 2 % wider.
 const PRIOR: f64 = 0.5;
 
-/// Runs of the first look; each further one has twice as many.
+/// Number of runs of the first look; each further look has twice the number.
 const FIRST_LOOK: u64 = 100;
 
-/// `count` of the first `of` runs, with an interval that may be looked at after every run: the true share is in all of those from
-/// the first run to the last, whenever one stops and why, with probability [`CONFIDENCE`].
+/// Returns `count` of the first `of` runs with an interval of a confidence sequence.
 ///
-/// It is the beta-mixture confidence sequence (Robbins, Annals of Mathematical Statistics 41, 1970):
+/// With probability [`CONFIDENCE`] the intervals of all numbers of runs contain the true share at once, for any rule by
+/// which the campaign stops.
+///
+/// The sequence is the beta mixture (Robbins, Annals of Mathematical Statistics 41, 1970):
 ///
 /// ```text
 /// { p : B(a + k, a + n - k) / [B(a, a) p^k (1 - p)^(n - k)] < 1/alpha },   a = 1/2
 /// ```
 ///
-/// The ratio is a martingale under p that begins with 1, and by Ville's inequality it ever comes to 1/alpha with a probability of
-/// alpha at most. Bounds are the first numbers outside. A count beyond `of` is taken for `of`.
+/// The ratio is a martingale under p that begins with 1. By Ville's inequality it ever reaches 1/alpha with a
+/// probability of at most alpha. The bounds are the first numbers outside the set. A count above `of` is reduced to
+/// `of`.
 #[must_use]
 pub fn anytime(count: u64, of: u64) -> Proportion {
     let count = count.min(of);
@@ -29,7 +32,7 @@ pub fn anytime(count: u64, of: u64) -> Proportion {
     Proportion::between(count, of, [low, high])
 }
 
-/// The number next to the sequence that it leaves out, between the share and `out`, which is left out.
+/// Returns the first number outside the interval, by bisection between the share and `out`, which is outside.
 fn bound(count: u64, of: u64, mut out: f64) -> f64 {
     let (hits, misses) = (count as f64, (of - count) as f64);
     let mixture = ln_beta(PRIOR + hits, PRIOR + misses) - ln_beta(PRIOR, PRIOR);
@@ -39,7 +42,7 @@ fn bound(count: u64, of: u64, mut out: f64) -> f64 {
     let mut within = hits / (hits + misses);
     loop {
         let middle = f64::midpoint(out, within);
-        // Neighbouring numbers have nothing between them.
+        // `out` and `within` are adjacent numbers.
         if middle == out || middle == within {
             return out;
         }
@@ -47,37 +50,38 @@ fn bound(count: u64, of: u64, mut out: f64) -> f64 {
     }
 }
 
-/// Logarithm of the beta function, by `libm` alone: whether a campaign stops is the same on every machine.
+/// Returns the logarithm of the beta function with `libm` only, so that a campaign stops at the same run on every
+/// machine.
 fn ln_beta(a: f64, b: f64) -> f64 {
     libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b)
 }
 
-/// The numbers of runs at which a campaign of at most `runs` looks at its answer: 100, 200, 400, ... and `runs`.
+/// Returns the numbers of runs at which a campaign of at most `runs` considers a stop: 100, 200, 400, ... and `runs`.
 pub fn looks(runs: u64) -> impl Iterator<Item = u64> {
     let doubled = std::iter::successors(Some(FIRST_LOOK), |look| look.checked_mul(2));
     doubled.take_while(move |&look| look < runs).chain((runs > 0).then_some(runs))
 }
 
-/// What is left of the share after several looks: what all of their [`anytime`] intervals have in common.
+/// Intersection of the [`anytime`] intervals of several looks.
 ///
-/// All of them hold the true share at once with probability [`CONFIDENCE`], and so does what they have in common. It depends on
-/// which looks are taken, so these are fixed beforehand: [`looks`].
+/// All intervals contain the true share at once with probability [`CONFIDENCE`], and so does their intersection. It
+/// depends on the looks, which are therefore fixed beforehand: [`looks`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ConfidenceSequence {
     bounds: Option<[f64; 2]>,
 }
 
 impl ConfidenceSequence {
-    /// Before the first look.
+    /// Returns the sequence before the first look.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes a look, `count` of the first `of` runs, and says what is left.
+    /// Adds a look, `count` of the first `of` runs, and returns the intersection.
     ///
-    /// Where nothing is left, which happens only where one of the looks does not hold the true share, this look alone counts from
-    /// here on.
+    /// An empty intersection means that one of the intervals misses the true share. The sequence then restarts with
+    /// this look.
     pub fn look(&mut self, count: u64, of: u64) -> Proportion {
         let now = anytime(count, of);
         let [low, high] = self.bounds.unwrap_or([0.0, 1.0]);
@@ -93,7 +97,7 @@ mod tests {
     use super::super::tests::near;
     use super::*;
 
-    /// The same ratio by its product, run by run: all hits first.
+    /// Returns the ratio by its product over the runs, all hits first.
     fn ratio(count: u64, of: u64, p: f64) -> f64 {
         let hit = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + k as f64) / p;
         let miss = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + (count + k) as f64) / (1.0 - p);
@@ -101,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn its_bounds_are_where_the_ratio_comes_to_twenty() {
+    fn bounds_are_where_the_ratio_reaches_20() {
         for of in [1, 7, 100, 400] {
             for count in (0..=of).step_by(usize::try_from(of).expect("few").div_ceil(20)) {
                 let Proportion { low, high, share, .. } = anytime(count, of);
@@ -116,22 +120,22 @@ mod tests {
     }
 
     #[test]
-    fn it_is_monotone_in_the_count_mirrored_and_wider_than_one_for_a_fixed_number() {
+    fn the_interval_is_monotone_symmetric_and_wider_than_for_a_fixed_number() {
         for of in [1, 10, 100, 5_000] {
             let all: Vec<_> = (0..=of).map(|count| anytime(count, of)).collect();
             assert!(all.windows(2).all(|next| next[0].low < next[1].low && next[0].high < next[1].high), "{of}");
             for (one, count) in all.iter().zip(0..) {
                 let fixed = Proportion::new(count, of);
-                // Of one run both leave the same out.
+                // For one run both intervals have the same bounds.
                 assert!(one.low <= fixed.low + 1e-12 && fixed.high <= one.high + 1e-12, "{count} of {of}");
                 near(one.low, 1.0 - anytime(of - count, of).high, 1e-14);
             }
         }
     }
 
-    /// What the choice of the prior rests on: bounds with 1 in its place, where the ratio has a closed form.
+    /// Bounds with 1 as the prior, where the ratio has a closed form, justify the choice of the prior.
     #[test]
-    fn jeffreys_prior_bounds_what_never_happens_a_third_lower() {
+    fn jeffreys_prior_gives_a_third_lower_bound_for_a_count_of_zero() {
         let uniform = |of: f64| -libm::expm1(-libm::log(20.0 * (of + 1.0)) / of);
         near(anytime(0, 10_000).high, 0.000_817, 1e-6);
         near(uniform(10_000.0), 0.001_220, 1e-6);
@@ -139,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn great_numbers_have_narrow_bounds() {
+    fn many_runs_have_narrow_bounds() {
         let half = anytime(500_000_000, 1_000_000_000);
         near(half.high - half.low, 1.6e-4, 1e-5);
         near(1e12 * anytime(0, 1_000_000_000_000).high, 17.38, 0.05);
@@ -147,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn looks_double_and_end_with_the_last_run() {
+    fn looks_double_up_to_the_last_run() {
         assert_eq!(looks(1000).collect::<Vec<_>>(), [100, 200, 400, 800, 1000]);
         assert_eq!(looks(400).collect::<Vec<_>>(), [100, 200, 400]);
         assert_eq!(looks(7).collect::<Vec<_>>(), [7]);
@@ -156,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_looks_have_in_common_never_grows_but_where_nothing_is_left() {
+    fn the_intersection_shrinks_unless_it_is_empty() {
         let mut sequence = ConfidenceSequence::new();
         let first = sequence.look(50, 100);
         assert_eq!(first, anytime(50, 100));

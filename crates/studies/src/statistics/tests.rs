@@ -1,7 +1,8 @@
-//! How often intervals hold the truth: 10,000 repetitions of each, with seeds of their own.
+//! Coverage of intervals: how often each contains the truth, over 10,000 repetitions with their own seeds.
 //!
-//! Intervals of counts (Clopper and Pearson, the confidence sequence, the difference of pairs) never cover less than they say, and
-//! mostly more, since a count is a whole number. Those of normal means and of quantiles of many values cover what they say.
+//! Intervals of counts (Clopper and Pearson, the confidence sequence, the difference of pairs) never cover less than
+//! stated, and mostly more, because counts are integers. Intervals of normal means and of quantiles of many values
+//! cover as stated.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
@@ -10,7 +11,7 @@ use super::{ConfidenceSequence, Estimate, Paired, Proportion, anytime, looks};
 
 const REPETITIONS: u32 = 10_000;
 
-/// What a coverage may be. Its standard error over the repetitions is 0.22 % at 95 %.
+/// Admitted coverage. Its standard error over the repetitions is 0.22 % at 95 %.
 #[derive(Clone, Copy, Debug)]
 enum Claim {
     /// From 94 to 97 %.
@@ -42,13 +43,13 @@ impl Draws {
         (-2.0 * (1.0 - self.unit()).ln()).sqrt() * (std::f64::consts::TAU * self.unit()).cos()
     }
 
-    /// Share of repetitions in which something holds.
+    /// Returns the share of repetitions in which `holds` is true.
     fn share(&mut self, holds: &mut dyn FnMut(&mut Self) -> bool) -> f64 {
         f64::from((0..REPETITIONS).map(|_| u32::from(holds(self))).sum::<u32>()) / f64::from(REPETITIONS)
     }
 }
 
-/// How many of n runs have what each has with probability p, drawn by one uniform number.
+/// Binomial counts of n runs with probability p, each drawn with one uniform number.
 struct Counts(Vec<f64>);
 
 impl Counts {
@@ -71,7 +72,7 @@ impl Counts {
     }
 }
 
-/// Whether each count of n is in an interval with p, asked once.
+/// Returns for each count of n whether its interval contains p.
 fn held(n: u64, p: f64, interval: impl Fn(u64, u64) -> [f64; 2]) -> Vec<bool> {
     let holds = |count| {
         let [low, high] = interval(count, n);
@@ -100,7 +101,7 @@ fn of_counts(n: u64, p: f64, interval: impl Fn(u64, u64) -> [f64; 2]) -> f64 {
 }
 
 #[test]
-fn counts_are_drawn_as_often_as_they_are_likely() {
+fn drawn_counts_have_the_binomial_mean() {
     for (n, p) in [(20_u64, 0.3), (1000, 0.001), (1000, 0.999)] {
         let (counts, mut draws) = (Counts::new(n, p), Draws::new(3));
         let drawn: Vec<_> = (0..REPETITIONS).map(|_| counts.draw(&mut draws) as f64).collect();
@@ -118,12 +119,12 @@ fn a_share_is_covered() {
             assert!(Claim::Conservative.holds(covered), "{covered} for {p} of {n}");
         }
     }
-    // Many of them are covered as often as is said.
+    // For many runs the coverage is the stated one.
     let covered = of_counts(5000, 0.5, fixed);
     assert!(Claim::Exact.holds(covered), "{covered}");
 }
 
-/// The same check finds the interval of the textbook out: normal, with the error of the share that was seen.
+/// The same check rejects the textbook interval: normal, with the standard error of the observed share.
 #[test]
 fn walds_interval_does_not_cover_a_small_share() {
     let wald = |count: u64, of: u64| {
@@ -148,7 +149,7 @@ fn the_mean_of_normal_values_is_covered() {
     }
 }
 
-/// Quantiles of the exponential law. Where ranks are few, or near the last value, the interval is conservative.
+/// Quantiles of the exponential distribution. For few ranks, or near the largest value, the interval is conservative.
 #[test]
 fn a_quantile_is_covered() {
     let cases = [
@@ -159,7 +160,7 @@ fn a_quantile_is_covered() {
     ];
     for (n, p, claim) in cases {
         let truth = -(1.0_f64 - p).ln();
-        // Of whole numbers from 0 the bounds are the places of the values that they are.
+        // For the integers from 0, each bound equals its rank.
         let places: Vec<_> = (0..n).map(f64::from).collect();
         let Estimate { low, high, .. } = Estimate::quantile(&places, p);
         let [low, high] = [low, high].map(|bound| places.iter().position(|&place| Some(place) == bound));
@@ -172,7 +173,7 @@ fn a_quantile_is_covered() {
     }
 }
 
-/// How often an interval holds p at every one of these looks of one campaign.
+/// Returns how often an interval contains p at every look of a campaign.
 fn at_all_looks(p: f64, looks: &[u64], interval: impl Fn(u64, u64) -> [f64; 2]) -> f64 {
     let mut before = 0;
     let stages: Vec<_> =
@@ -186,7 +187,7 @@ fn at_all_looks(p: f64, looks: &[u64], interval: impl Fn(u64, u64) -> [f64; 2]) 
     })
 }
 
-/// Whoever stops at the worst look is still right: the interval holds the truth at all of them at once.
+/// A stop at the worst look is still covered: the interval holds at all looks at once.
 #[test]
 fn a_confidence_sequence_covers_at_all_looks_at_once() {
     let of_campaign: Vec<_> = looks(6400).collect();
@@ -199,9 +200,9 @@ fn a_confidence_sequence_covers_at_all_looks_at_once() {
     }
 }
 
-/// An interval for a number of runs that was fixed beforehand does not hold at every look.
+/// An interval for a fixed number of runs does not hold at every look.
 #[test]
-fn a_share_that_is_looked_at_again_and_again_is_not_covered() {
+fn a_fixed_interval_is_not_covered_at_repeated_looks() {
     let of_campaign: Vec<_> = looks(6400).collect();
     let covered = at_all_looks(0.5, &of_campaign, fixed);
     assert!(!Claim::Conservative.holds(covered) && covered < 0.9, "{covered}");
@@ -210,9 +211,9 @@ fn a_share_that_is_looked_at_again_and_again_is_not_covered() {
     assert!(covered < 0.85, "{covered}");
 }
 
-/// What looks have in common holds the truth where all of them do, and is narrower at the end than the last alone.
+/// The intersection contains the truth if all intervals do, and is narrower at the end than the last interval.
 #[test]
-fn what_looks_have_in_common_is_covered_too() {
+fn the_intersection_of_looks_is_covered() {
     let all: Vec<_> = looks(800).collect();
     let mut before = 0;
     let stages: Vec<_> = all.iter().map(|&n| Counts::new(n - std::mem::replace(&mut before, n), 0.1)).collect();
@@ -249,9 +250,9 @@ fn a_difference_of_pairs_is_covered() {
     }
 }
 
-/// Where all discordant pairs favour the first, the difference is their share of all pairs, which is not known.
+/// If all discordant pairs favour the first run, the difference is the unknown share of discordant pairs.
 #[test]
-fn a_difference_that_takes_the_discordant_share_for_known_is_not_covered() {
+fn a_difference_with_a_fixed_discordant_share_is_not_covered() {
     let counts = Counts::new(100, 0.1);
     let covered = Draws::new(100).share(&mut |draws| {
         let discordant = counts.draw(draws);
@@ -265,7 +266,7 @@ pub(super) fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
 }
 
-/// Share of `Binomial(n, p)` up to and with k, by its sum from the side where it does not begin with nothing.
+/// Returns P(X <= k) for X ~ Binomial(n, p), summed from the smaller tail.
 pub(super) fn binomial_up_to(k: u64, n: u64, p: f64) -> f64 {
     if p > 0.5 {
         return if k >= n { 1.0 } else { 1.0 - binomial_up_to(n - k - 1, n, 1.0 - p) };

@@ -36,9 +36,9 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=0:1:0", "the count `0`"),
         ("law.alpha=0:1:2.5", "the count `2.5`"),
         ("law.alpha=0:1:999999", "the count `999999`"),
-        ("law.alpha=1:1:3", "3 values from 1 to 1"),
-        ("law.alpha=0:1:1", "1 values from 0 to 1"),
-        ("law.alpha=0:inf:3", "3 values from 0 to inf"),
+        ("law.alpha=1:1:3", "got 3 from 1 to 1"),
+        ("law.alpha=0:1:1", "got 1 from 0 to 1"),
+        ("law.alpha=0:inf:3", "got 3 from 0 to inf"),
         ("law.alpha=0,inf", "is not finite"),
         ("law.alpha=nan,1", "NaN is not finite"),
         ("law.alpha=1,2,1", "1 is given twice"),
@@ -96,7 +96,7 @@ fn two_keys_make_a_heat_map_and_refused_points_are_shown_with_their_reason() {
 }
 
 #[test]
-fn swept_seeds_and_jitters_are_those_of_the_grid() {
+fn swept_seeds_and_jitters_override_the_defaults() {
     let sweep = swept(&options(&["start.jitter_m=0,0.2"], 2));
     let [still, moved] = &sweep.points[..] else { panic!("two points") };
     assert_eq!(still.flights[0].state_hash, still.flights[1].state_hash, "a jitter of 0 moves nothing");
@@ -104,7 +104,7 @@ fn swept_seeds_and_jitters_are_those_of_the_grid() {
     assert!(sweep.jitter_m.is_none());
     let seeds = swept(&options(&["start.seed=1,2", "start.jitter_m=0.2"], 1));
     assert_ne!(seeds.points[0].flights[0].state_hash, seeds.points[1].flights[0].state_hash);
-    // Two runs of one seed are one flight, which must not count twice.
+    // Two runs of one seed are the same flight, which must not count twice.
     let equal = options(&["start.seed=1,2", "start.jitter_m=0.2"], 2);
     let refused = batch(1, &mut |batch| equal.fly(&base(pair(), &[]), batch)).expect_err("equal runs");
     assert_eq!(refused.code(), "request/equal-runs");
@@ -136,7 +136,7 @@ fn wrong_grids_are_refused() {
 }
 
 #[test]
-fn an_interrupted_sweep_has_the_points_that_were_flown() {
+fn an_interrupted_sweep_keeps_the_flown_points() {
     let options = options(&["law.alpha=0.5,1,2"], 2);
     let fly = |steps: u64| {
         let monitor = InterruptAfter::new(steps);
@@ -146,5 +146,5 @@ fn an_interrupted_sweep_has_the_points_that_were_flown() {
     let steps = base(pair(), &[]).own().time.steps();
     let sweep = fly(3 * steps).expect("a point");
     assert!(sweep.interrupted && !sweep.is_good() && sweep.points.len() == 1, "{}", sweep.points.len());
-    assert_eq!(sweep.notes()[0], "interrupted: of 3 points 1 were flown");
+    assert_eq!(sweep.notes()[0], "interrupted: 1 of 3 points were flown");
 }

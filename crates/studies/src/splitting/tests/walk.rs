@@ -1,4 +1,4 @@
-//! Splitting where the truth is known: a Gaussian random walk, seen at its steps, and how seldom it comes above a height.
+//! Splitting of a Gaussian random walk, whose probability of exceeding a height is known.
 
 use std::convert::Infallible;
 use std::ops::ControlFlow;
@@ -10,7 +10,7 @@ use crate::splitting::{Path, Rule, split};
 
 const STEPS: u32 = 200;
 
-/// A walk of steps of mean 0 and variance 1.
+/// Walk with steps of mean 0 and variance 1.
 #[derive(Clone)]
 struct Walk {
     random: ChaCha8Rng,
@@ -21,15 +21,15 @@ struct Walk {
     sight: Sight,
 }
 
-/// What of a walk is its score.
+/// Score of a walk.
 #[derive(Clone, Copy)]
 enum Sight {
-    /// Its height.
+    /// The height.
     Height,
-    /// The last multiple of this that its height is not below.
+    /// The height, rounded down to a multiple of this number.
     Grains(f64),
-    /// How near this height it is in units of what it may still go, which tells better how likely it will come above: the spread of
-    /// estimates at 1e-6 is about a quarter. Above 0 where it is above.
+    /// Distance to this height in standard deviations of the remaining walk, negated; positive above the height. It
+    /// predicts the event well: the relative spread of estimates at 1e-6 is about 0.25.
     Chance(f64),
 }
 
@@ -55,7 +55,7 @@ impl Walk {
             Sight::Height => self.place,
             Sight::Grains(grain) => (self.place / grain).floor() * grain,
             Sight::Chance(height) if self.place > height => self.place - height,
-            // A walk that is seen at its steps is above 0.58 later than one in continuous time.
+            // A walk in discrete time exceeds `height` as often as one in continuous time exceeds `height + 0.58`.
             Sight::Chance(height) => -(height - self.place + 0.58) / f64::from(STEPS - self.steps).sqrt(),
         };
         self.highest = self.highest.max(seen);
@@ -98,7 +98,7 @@ impl Path for Walk {
     }
 }
 
-/// Places and weights of Gauss and Legendre on \[-1, 1\], by Newton's method.
+/// Returns nodes and weights of Gauss-Legendre quadrature on \[-1, 1\], by Newton's method.
 fn gauss(count: u32) -> Vec<[f64; 2]> {
     let root = |k: u32| {
         let mut x = (std::f64::consts::PI * (f64::from(k) + 0.75) / (f64::from(count) + 0.5)).cos();
@@ -117,10 +117,12 @@ fn gauss(count: u32) -> Vec<[f64; 2]> {
     (0..count).map(root).collect()
 }
 
-/// Probability that the walk is above `height` at one of its steps, by recursion over the density of the walks that never were:
-/// on panels of length 1 below the height down to -`depth`, with so many places each.
+/// Returns the probability that the walk exceeds `height` at one of its steps.
+///
+/// The recursion is over the density of the walks that have not yet exceeded `height`, on panels of length 1 from
+/// `height` down to -`depth` with `places` nodes each.
 fn above(height: f64, depth: f64, places: u32) -> f64 {
-    /// In panels, farther than a step ever goes: 2e-33 of all.
+    /// Reach of a step in panels; a longer step has a probability of 2e-33.
     const REACH: u32 = 13;
     let density = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     let beyond = |x: f64| 0.5 * libm::erfc(x * std::f64::consts::FRAC_1_SQRT_2);
@@ -132,7 +134,7 @@ fn above(height: f64, depth: f64, places: u32) -> f64 {
             on_panel.iter().map(move |[x, weight]| [height - f64::from(panel) - 0.5 * (1.0 - x), 0.5 * weight])
         })
         .collect();
-    // Panels are in order, so whoever is near is a run of nodes.
+    // Panels are in order, so the nodes within reach are contiguous.
     let reach = (REACH * places) as usize;
     let near = |index: usize| index.saturating_sub(reach)..(index + reach).min(nodes.len());
     let kernel: Vec<Vec<f64>> = (0..nodes.len())
@@ -149,7 +151,7 @@ fn above(height: f64, depth: f64, places: u32) -> f64 {
     probability
 }
 
-/// The same of a walk in continuous time, by reflection.
+/// Returns the probability for a walk in continuous time, by reflection.
 fn reflected(height: f64) -> f64 {
     libm::erfc(height / f64::from(2 * STEPS).sqrt())
 }
@@ -158,15 +160,16 @@ fn estimates(walk: &Walk, rule: Rule, repetitions: u64) -> Vec<f64> {
     let mut walk = walk.clone();
     let one = |repetition: u64| {
         let Ok(split) = split(&mut walk, rule, [2016, repetition], &mut |_| ControlFlow::Continue(()));
-        let split = split.expect("nobody ends it");
+        let split = split.expect("no interruption");
         assert_eq!(split.extinct, split.probability == 0.0);
         split.probability
     };
     (0..repetitions).map(one).collect()
 }
 
-/// How many standard errors the mean of estimates is above a value. The estimates of 100 walks at 1e-9, with a score that
-/// tells much, have a skewness below 2, so that of the mean of 200 is 0.14 and it is as good as normal within three standard errors.
+/// Returns the difference between the mean of estimates and a value, in standard errors. Estimates of 100 walks at 1e-9
+/// with a good score have a skewness below 2. The skewness of the mean of 200 is then 0.14, normal enough within three
+/// standard errors.
 fn errors_above(estimates: &[f64], value: f64) -> f64 {
     let count = estimates.len() as f64;
     let mean = estimates.iter().sum::<f64>() / count;
@@ -178,7 +181,7 @@ fn repetitions() -> u64 {
     if std::env::var_os("TAUTLINE_LONG").is_some() { 2000 } else { 200 }
 }
 
-/// The truth does not depend on how it is computed, and plain walks agree with it.
+/// The truth does not depend on the quadrature, and plain walks agree with it.
 #[test]
 fn the_recursion_converges_and_agrees_with_plain_walks() {
     for height in [HEIGHT_1E6, HEIGHT_1E9] {
@@ -200,8 +203,8 @@ fn the_recursion_converges_and_agrees_with_plain_walks() {
 const HEIGHT_1E6: f64 = 68.5;
 const HEIGHT_1E9: f64 = 85.5;
 
-/// Mean over the truth, its standard error in the same units, and how many of these the mean is off.
-fn told(estimates: &[f64], truth: f64) -> String {
+/// Describes the mean relative to the truth, its standard error, and the difference in standard errors.
+fn described(estimates: &[f64], truth: f64) -> String {
     let mean = estimates.iter().sum::<f64>() / estimates.len() as f64;
     let off = errors_above(estimates, truth);
     format!(
@@ -217,29 +220,29 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
         let truth = above(height, 45.0, 6);
         assert!((0.5..2.0).contains(&(truth / near)), "{truth}");
         let estimates = estimates(&Walk::new(Sight::Chance(height)), Rule::new(100, 1, 0.0), repetitions());
-        assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
-        // The continuous formula is a fifth and a quarter too high, and the same check sees it.
+        assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
+        // The formula of continuous time is 20 % and 25 % too high, and the same check detects it.
         let reflected = reflected(height);
         assert!((1.19..1.27).contains(&(reflected / truth)), "{}", reflected / truth);
-        assert!(errors_above(&estimates, reflected) < -3.0, "{}", told(&estimates, reflected));
+        assert!(errors_above(&estimates, reflected) < -3.0, "{}", described(&estimates, reflected));
     }
 }
 
-/// A score that tells little costs spread, but no bias. By height, estimates of 100 walks have a skewness near 5, with which the mean
-/// of even 2000 is not normal enough for this check; those of 400 have one near 1. Of 100, 20,000 estimates gave 0.997 of the truth with a
-/// standard error of 0.011.
+/// A poor score widens the spread without bias. With the height as score, estimates of 100 walks have a skewness near
+/// 5: even the mean of 2000 is not normal enough for this check. Estimates of 400 walks have a skewness near 1. For 100
+/// walks, 20,000 estimates gave 0.997 of the truth with a standard error of 0.011.
 #[test]
 fn estimates_by_height_alone_have_no_bias_and_a_larger_spread() {
     let truth = above(HEIGHT_1E6, 45.0, 6);
     let estimates = estimates(&Walk::new(Sight::Height), Rule::new(400, 20, HEIGHT_1E6), repetitions() / 4);
-    assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", told(&estimates, truth));
+    assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
 }
 
-/// Heights in whole numbers: many walks are as high as each other.
+/// With integer heights many walks have equal scores.
 #[test]
-fn ties_leave_no_bias_and_branching_at_the_level_instead_of_above_it_does() {
+fn ties_are_unbiased_and_branching_at_the_level_is_biased() {
     let height = 40.0;
-    // Whole numbers above 40 are walks at 41 and more.
+    // Integers above 40 are heights of 41 and more.
     let truth = above(height + 1.0, 45.0, 6);
     let right = Rule::new(100, 1, height);
     let wrong = Rule { is_past: |score, level| score >= level, ..right };
@@ -253,7 +256,7 @@ fn ties_leave_no_bias_and_branching_at_the_level_instead_of_above_it_does() {
 }
 
 #[test]
-fn an_estimate_depends_on_seed_and_repetition_alone_and_ends_where_it_is_told() {
+fn an_estimate_depends_only_on_seed_and_repetition_and_can_be_ended() {
     let rule = Rule::new(20, 3, 30.0);
     let one = |seed, repetition, most: u64| {
         let carry_on = &mut |steps: u64| if steps < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
@@ -270,9 +273,9 @@ fn an_estimate_depends_on_seed_and_repetition_alone_and_ends_where_it_is_told() 
     }
 }
 
-/// Where all walks are as high as each other nothing is left, and where all are past the target nothing is ended.
+/// Without a survivor the estimate is 0; if all walks exceed the target it is 1.
 #[test]
-fn nothing_left_is_an_estimate_of_0_and_nothing_ended_one_of_1() {
+fn no_survivor_gives_0_and_no_ended_walk_gives_1() {
     let coarse = Walk::new(Sight::Grains(1e6));
     assert!(estimates(&coarse, Rule::new(10, 1, 5.0), 3).iter().all(|&estimate| estimate == 0.0));
     assert!(estimates(&coarse, Rule::new(10, 1, -2e6), 3).iter().all(|&estimate| estimate == 1.0));
