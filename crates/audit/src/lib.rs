@@ -24,7 +24,7 @@
 //! use tautline_audit::{Auditor, Status};
 //! use tautline_core::swarm::Rows;
 //!
-//! Head-on past each other in one step: 10 m apart at both ends, 1 m apart in between.
+//! // Head-on past each other in one step: 10 m apart at both ends, 1 m apart in between.
 //! let mut auditor = Auditor::new(2, 2.0)?;
 //! auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, 1.0, 0.0]))?;
 //! let finding = auditor.step(1.0, &Rows::from_row_slice(&[5.0, 0.0, 0.0, -5.0, 1.0, 0.0]))?;

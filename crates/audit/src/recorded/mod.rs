@@ -26,7 +26,7 @@
 //! use tautline_audit::recorded::{Settings, audit};
 //! use tautline_core::track::{Item, Sample};
 //!
-//! Past each other in one second: 10 m apart in every sample, 1 m apart in between.
+//! // Past each other in one second: 10 m apart in every sample, 1 m apart in between.
 //! let seen = |vehicle, time_s, x, y| {
 //!     let position_m = Vector3::new(x, y, 0.0);
 //!     Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })

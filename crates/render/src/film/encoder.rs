@@ -1,16 +1,16 @@
-//! What every format of films does.
+//! Common interface of film encoders.
 
 use crate::error::RenderError;
 use crate::picture::Picture;
 
-/// That the encoder of a format failed.
+/// Returns the error of a failed encoder.
 pub(super) fn failed(format: &str, error: impl std::fmt::Display) -> RenderError {
     RenderError::Film(format!("the {format} encoder failed: {error}"))
 }
 
-/// Writes pictures of one size as a film.
+/// Encodes pictures of one size as a film.
 pub(super) trait FilmEncoder: Send {
-    /// Adds pictures in order. What can be done to each by itself is done side by side.
+    /// Adds pictures in order. Work on single pictures runs in parallel.
     fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError>;
 
     /// Writes the end of the film.

@@ -1,4 +1,4 @@
-//! What a picture is made of, as plain data.
+//! Draw list: the content of a picture as plain data.
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::camera::Camera;
 use super::colour::Colour;
 
-/// A ball. A solid one is lit; a shell lets through what is within and behind it.
+/// Ball. A solid ball is lit; a shell is transparent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Ball {
@@ -18,7 +18,7 @@ pub struct Ball {
     pub colour: Colour,
 }
 
-/// A flat disc that lets light through, such as what a rotor sweeps.
+/// Transparent flat disc, for example the disc swept by a rotor.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Disc {
@@ -26,13 +26,13 @@ pub struct Disc {
     pub centre_m: [f32; 3],
     /// Radius \[m\].
     pub radius_m: f32,
-    /// Unit vector across it.
+    /// Unit normal.
     pub normal: [f32; 3],
-    /// Colour; the opacity is that of its rim.
+    /// Colour; the opacity is that of the rim.
     pub colour: Colour,
 }
 
-/// A straight line of the same width near and far.
+/// Straight line of constant width in pixels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Line {
@@ -45,107 +45,107 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line of one colour.
+    /// Creates a line of one colour.
     pub(super) fn new(ends_m: [Vector3<f64>; 2], colour: Colour, width_px: f32) -> Self {
         Self { ends_m: ends_m.map(single), colours: [colour; 2], width_px }
     }
 }
 
-/// Something flat in the picture; lengths in pixels from the top left corner.
+/// Flat element of a picture; lengths in pixels from the top left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Annotation {
-    /// Words on one line.
+    /// Text on one line.
     Words {
-        /// Where the words are.
+        /// Position.
         at_px: [f32; 2],
-        /// Which part of the words is there: 0 left or top, 0.5 middle, 1 right or bottom.
+        /// Part of the text at that position: 0 left or top, 0.5 middle, 1 right or bottom.
         anchor: [f32; 2],
         /// Height of a line \[pixels\].
         size_px: f32,
-        /// Their colour.
+        /// Colour.
         colour: Colour,
-        /// The words.
+        /// Text.
         text: String,
     },
-    /// A filled box.
+    /// Filled box.
     Box {
-        /// Top left and bottom right.
+        /// Top left and bottom right corner.
         corners_px: [[f32; 2]; 2],
-        /// Its colour.
+        /// Colour.
         colour: Colour,
-        /// Radius of its corners.
+        /// Radius of the corners.
         round_px: f32,
     },
-    /// The outline of a box, drawn inside it.
+    /// Outline of a box, drawn inside it.
     Outline {
-        /// Top left and bottom right.
+        /// Top left and bottom right corner.
         corners_px: [[f32; 2]; 2],
-        /// Its colour.
+        /// Colour.
         colour: Colour,
-        /// Its width.
+        /// Width.
         width_px: f32,
     },
-    /// A box whose colours run from left to right.
+    /// Box with colours from left to right.
     Scale {
-        /// Top left and bottom right.
+        /// Top left and bottom right corner.
         corners_px: [[f32; 2]; 2],
         /// Colours at even distances.
         colours: Vec<Colour>,
     },
-    /// A straight line.
+    /// Straight line.
     Stroke {
-        /// Its ends.
+        /// Ends.
         ends_px: [[f32; 2]; 2],
-        /// Its colour.
+        /// Colour.
         colour: Colour,
-        /// Its width.
+        /// Width.
         width_px: f32,
     },
-    /// A ring.
+    /// Ring.
     Ring {
-        /// Its centre.
+        /// Centre.
         at_px: [f32; 2],
-        /// Its radius.
+        /// Radius.
         radius_px: f32,
-        /// Its colour.
+        /// Colour.
         colour: Colour,
-        /// Its width.
+        /// Width.
         width_px: f32,
     },
 }
 
-/// Everything that is in a picture.
+/// Complete content of a picture.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Where it is seen from.
+    /// Camera.
     pub camera: Camera,
-    /// Nearest and farthest that anything is from the camera \[m\].
+    /// Smallest and largest depth of the content \[m\].
     pub depth_m: [f64; 2],
-    /// What nothing is drawn on.
+    /// Background colour.
     pub background: Colour,
-    /// Vehicles.
+    /// Vehicles and round obstacles.
     pub balls: Vec<Ball>,
-    /// Rotors of those that are quadrotors, farthest first.
+    /// Rotors of quadrotors, farthest first.
     pub discs: Vec<Disc>,
-    /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
+    /// Keep-out shells in drawing order: see [`Scene::compose`].
     pub shells: Vec<Ball>,
-    /// Height of shells over their width.
+    /// Ratio of height to width of shells.
     pub shell_ratio: f32,
-    /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors: a later one is drawn over those before it.
+    /// Ground, trails, start marks, goal slots, edges, pairs and arms of quadrotors; later ones cover earlier ones.
     pub lines: Vec<Line>,
-    /// Words and legends.
+    /// Text and legends.
     pub annotations: Vec<Annotation>,
 }
 
 impl Scene {
-    /// Nothing, seen by this camera.
+    /// Creates an empty scene with this camera.
     pub(super) fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
         let (balls, discs, shells, lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (shell_ratio, annotations) = (1.0, Vec::new());
         Self { camera, depth_m, background, balls, discs, shells, shell_ratio, lines, annotations }
     }
 
-    /// A picture of nothing.
+    /// Creates an empty scene with the default camera.
     #[cfg(feature = "window")]
     pub(crate) fn blank(size_px: [u32; 2]) -> Self {
         use super::{camera::CameraSpec, colour::Theme};
@@ -153,13 +153,13 @@ impl Scene {
     }
 }
 
-/// A vector in single precision.
+/// Converts a vector to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
 pub(super) fn single(v: Vector3<f64>) -> [f32; 3] {
     [v.x as f32, v.y as f32, v.z as f32]
 }
 
-/// A place in the picture in single precision.
+/// Converts pixel numbers to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "pixels")]
 pub(super) fn pixels<const N: usize>(numbers: [f64; N]) -> [f32; N] {
     numbers.map(|x| x as f32)
