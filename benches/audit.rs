@@ -1,6 +1,6 @@
-//! One step of the audit, against the plain sweep of all pairs.
+//! Time of one audit step, compared with a plain sweep of all pairs.
 //!
-//! A square lattice of spacing 5 m and delta = 2 m drifts apart and together again by 1 cm a step (240 Hz: 2.4 m/s).
+//! A square lattice with a spacing of 5 m and delta = 2 m drifts apart and back by 1 cm per step (240 Hz: 2.4 m/s).
 
 use std::hint::black_box;
 
@@ -11,11 +11,11 @@ use tautline::swarm::{Rows, row};
 const DELTA_M: f64 = 2.0;
 const SPACING_M: f64 = 5.0;
 const STEP_M: f64 = 0.01;
-/// Steps from one turn to the next.
+/// Number of steps between two turns.
 const LEG: usize = 100;
 
-/// The lattice, and where it is after each step of one lap to and fro; every vehicle goes its own way.
-fn lap(n: usize) -> Vec<Rows> {
+/// Returns the positions of the lattice after each step of one lap. Every vehicle has its own heading.
+fn positions_of_lap(n: usize) -> Vec<Rows> {
     let side = n.isqrt().max(1);
     let at = |step: usize| {
         let way = STEP_M * step.min(2 * LEG - step) as f64;
@@ -28,10 +28,10 @@ fn lap(n: usize) -> Vec<Rows> {
     (0..2 * LEG).map(at).collect()
 }
 
-fn judged_step(criterion: &mut Criterion) {
+fn audit_step(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("audit step");
     for n in [5, 100, 1000] {
-        let lap = lap(n);
+        let lap = positions_of_lap(n);
         let mut auditor = Auditor::new(n, DELTA_M).expect("delta is in range");
         auditor.start(0.0, &lap[0]).expect("the start is finite");
         let mut step = 0;
@@ -49,11 +49,11 @@ fn judged_step(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The floor for a judge that looks at every pair: the closed form alone, no list and no second detector.
+/// Lower bound for an audit of all pairs: the closed form alone, without list and second detector.
 fn plain_sweep(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("plain sweep of all pairs");
     for n in [5, 100, 1000] {
-        let lap = lap(n);
+        let lap = positions_of_lap(n);
         let mut step = 0;
         group.bench_function(BenchmarkId::from_parameter(n), |bencher| {
             bencher.iter(|| {
@@ -80,5 +80,5 @@ fn smallest_squared(from: &Rows, to: &Rows) -> f64 {
     smallest
 }
 
-criterion_group!(benches, judged_step, plain_sweep);
+criterion_group!(benches, audit_step, plain_sweep);
 criterion_main!(benches);

@@ -1,4 +1,4 @@
-//! Runs of a campaign beside a bare loop of the same flights, on one thread and on two. Their ratio says what the campaign costs.
+//! Overhead of a campaign: the same flights in a campaign and in a plain loop, on one thread and on two.
 
 use std::hint::black_box;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Time of one evaluation of each law, its energy and its certificate, on one core unless threads are named.
 //!
 //! Run with `cargo bench --bench law`. The throughput of a control is in directed pairs (twice the edges), so its
-//! inverse is the time a directed pair takes; that of the displacement law is in vehicles, and its time holds the look for near
-//! pairs as it is in a flight: `cargo bench --bench law -- displacement`.
+//! inverse is the time per directed pair. That of the displacement law is in vehicles; its time includes the search for
+//! near pairs, as in a flight: `cargo bench --bench law -- displacement`.
 
 use std::hint::black_box;
 
@@ -17,7 +17,7 @@ use tautline::observation::Observation;
 use tautline::space::KeptPairs;
 use tautline::swarm::{Rows, Swarm};
 
-/// Vehicles on a sphere with about two metres to their neighbours, at rest lengths of about one.
+/// Returns vehicles on a sphere, about two metres from their neighbours, with rest lengths of about one metre.
 fn swarm(count: usize) -> (Formation, Swarm) {
     let radius_m = (count as f64).sqrt();
     let formation = Formation::sphere(count, 0.5 * radius_m);
@@ -75,8 +75,9 @@ fn laws(criterion: &mut Criterion) {
     }
 }
 
-/// A square grid of 2 m, moved by a third of a metre at most, on its way to one of 1.6 m. Neighbours are moved as if at random,
-/// so that about the same share of them (5.5 to 7 in a hundred) is near enough to push, however many there are.
+/// Contraction of a square grid from 2 m to 1.6 m, with displacements of at most a third of a metre. The displacements
+/// of neighbours are nearly independent. The share of neighbours near enough to push (5.5 to 7 %) therefore does not
+/// depend on the size of the grid.
 fn displacement(criterion: &mut Criterion) {
     const DELTA_M: f64 = 1.0;
     for count in [1000, 10_000, 100_000] {

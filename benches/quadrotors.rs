@@ -1,8 +1,8 @@
-//! A second of flight of a hundred Crazyflies, on one core: times real time is one over the seconds that it takes.
+//! Time of one second of flight of a hundred Crazyflies on one core; the real-time factor is its inverse.
 //!
-//! Run with `cargo bench --bench quadrotors`. The swarm is a square lattice of spacing 0.8 m that contracts to 0.7 m under the
-//! edge-tension law on the complete graph, asked a hundred times a second, delta = 0.4 m, with the audit; beside it the
-//! vehicles alone, without law and audit.
+//! Run with `cargo bench --bench quadrotors`. The swarm is a square lattice that contracts from 0.8 m to 0.7 m. The
+//! edge-tension law on the complete graph runs at 100 Hz with delta = 0.4 m and the audit. The vehicles alone, without
+//! law and audit, are measured too.
 
 use std::ops::ControlFlow;
 
@@ -17,7 +17,7 @@ use tautline::vehicle::{self, Airframe, MODELS, Quadrotor};
 
 const COUNT: usize = 100;
 
-/// A second of it at a physics rate \[Hz\].
+/// Returns one second of the flight at a physics rate \[Hz\].
 fn lattice(physics_hz: f64) -> Scenario {
     let start = Swarm::at_rest(Formation::grid(COUNT, 0.8).slots_m);
     let mut scenario = Scenario::new("lattice", start, Formation::grid(COUNT, 0.7), 0.4, 1.0);

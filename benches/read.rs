@@ -1,6 +1,6 @@
-//! How fast recordings are read, on one core, and how much memory a file of two gigabytes takes.
+//! Speed of reading recordings on one core, and memory for a file of two gigabytes.
 //!
-//! Reading is everything: opening, looking whether rows are in order of time, and all items.
+//! Reading includes opening, the check of the order of times, and all items.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -11,19 +11,19 @@ use tautline::read::{self, ReadOptions};
 
 const VEHICLES: u64 = 20;
 
-/// Size of the files that are timed \[bytes\].
+/// Size of the timed files \[bytes\].
 const TIMED_BYTES: u64 = 32 * 1024 * 1024;
 
-/// Size of the file that is read for its memory \[bytes\].
+/// Size of the file for the measurement of memory \[bytes\].
 const LARGE_BYTES: u64 = 2 * 1024 * 1024 * 1024;
 
-/// Coordinates of a vehicle at a time, with all the digits of a double.
+/// Returns the coordinates of a vehicle at a time, with all digits of a double.
 fn position(k: u64, vehicle: u64) -> [f64; 3] {
     let phase = k as f64 / 50.0 + vehicle as f64;
     [20.0 * phase.sin() + vehicle as f64, 20.0 * phase.cos(), 10.0 + phase.sin() * 0.1]
 }
 
-/// A table of so many bytes: long with all digits, long with millimetres, or wide.
+/// Writes a table of about this size: long with all digits, long with millimetres, or wide.
 fn table(path: &Path, shape: &str, bytes: u64) {
     let mut out = BufWriter::new(File::create(path).expect("a file"));
     let header = match shape {
@@ -68,7 +68,7 @@ fn read_all(path: &Path) -> u64 {
     count
 }
 
-/// The largest memory that the process has had \[bytes\], where the system tells.
+/// Returns the peak memory of the process \[bytes\], if the system reports it.
 fn peak_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

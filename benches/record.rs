@@ -1,4 +1,4 @@
-//! What one recorded sample costs: written to `run.mcap`, hashed, and read back.
+//! Cost of one recorded sample: writing to `run.mcap`, hashing, and reading back.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -9,7 +9,7 @@ use tautline::record::{Sample, Sink, StateHash};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
 const RECORD_HZ: f64 = 60.0;
-/// Samples per measured file: five seconds of flight, so that chunks are closed by time and by size.
+/// Number of samples per measured file: five seconds of flight, so that chunks are closed by time and by size.
 const SAMPLES: u32 = 300;
 
 struct State {

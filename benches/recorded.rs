@@ -1,7 +1,8 @@
-//! The judge of recordings against the straightforward sweep of every pair over every interval, on the same items.
+//! Audit of recordings, compared with a direct sweep of every pair over every interval of the same items.
 //!
-//! The show: vehicles stand on a grid 2.5 m apart, take off row by row, bend into half a cylinder that breathes, unroll into
-//! a wall that waves, and land again, on smooth paths seen at 10 Hz. Neighbours stay neighbours, most pairs are far apart.
+//! The recording is a drone show. Vehicles stand on a grid with 2.5 m spacing, take off row by row, and form half a
+//! cylinder that changes its radius. They unroll into a wavy wall and land again, on smooth paths sampled at 10 Hz.
+//! Neighbours stay neighbours, and most pairs are far apart.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -13,19 +14,19 @@ use nalgebra::Vector3;
 use tautline::audit::recorded::{Approach, ObjectPair, Settings, audit};
 use tautline::track::{Item, Sample};
 
-/// The show keeps this.
+/// Safety distance that the show keeps.
 const DELTA_M: f64 = 1.5;
-/// It does not keep this.
-const TOO_MUCH_M: f64 = 2.2;
+/// Safety distance that the show violates.
+const VIOLATED_DELTA_M: f64 = 2.2;
 const COLUMNS: usize = 40;
 const SAMPLES: usize = 2000;
 const RATE_HZ: f64 = 10.0;
-/// An interval longer than this is a gap \[s\].
+/// Longest interval without a gap \[s\].
 const LONGEST_INTERVAL_S: f64 = 1.5 / RATE_HZ;
-/// Closest pairs that are listed.
+/// Number of listed closest pairs.
 const KEPT: usize = 10;
 
-/// From 0 to 1 between two times, with no speed at either.
+/// Returns a smooth transition from 0 to 1 between two times, with zero speed at both.
 fn smooth(time_s: f64, from_s: f64, to_s: f64) -> f64 {
     let x = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
     x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
@@ -60,7 +61,7 @@ fn show(vehicles: usize) -> Vec<Item> {
         .collect()
 }
 
-/// What both answer: the ten closest pairs, when pairs were below delta, and how often somebody was away.
+/// Result of both methods: ten closest pairs, times below delta, and number of gaps.
 #[derive(Debug)]
 struct Answer {
     gaps: usize,
@@ -75,7 +76,7 @@ struct Closest {
     time_s: f64,
 }
 
-fn ours(names: &[String], items: &[Item], delta_m: f64) -> Answer {
+fn audited(names: &[String], items: &[Item], delta_m: f64) -> Answer {
     let outcome = audit(names, items, Settings::delta(delta_m)).expect("a show can be judged");
     let pair = |who: ObjectPair| match who {
         ObjectPair::Vehicles(pair) => (pair.first(), pair.second()),
@@ -89,9 +90,9 @@ fn ours(names: &[String], items: &[Item], delta_m: f64) -> Answer {
     Answer { gaps: outcome.gaps.len(), closest: outcome.closest.iter().map(closest).collect(), below }
 }
 
-/// Every pair over every interval, of vehicles that are in every sample; there is no second detector. Numbers must be
-/// finite and times increase, and gaps are counted: without that nothing is proved.
-fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
+/// Sweeps every pair over every interval, for vehicles that are in every sample, without a second detector. A proof
+/// also needs finite numbers, increasing times and no gaps, so these are checked.
+fn swept_directly(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
     let mut places: Vec<Vector3<f64>> = Vec::with_capacity(items.len());
     let mut times_s = Vec::with_capacity(items.len() / vehicles);
     let mut last_s = vec![None; vehicles];
@@ -125,7 +126,7 @@ fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
                     least[pair] = (squared, from_s + length_s * at);
                 }
                 if squared < delta_m * delta_m {
-                    // Both times at which the line through the interval is delta away.
+                    // Both times at which the line over the interval is at a distance of delta.
                     let foot = -start.dot(&by) / length;
                     let half = ((delta_m * delta_m - (start + by * foot).norm_squared()) / length).sqrt();
                     let span = [foot - half, foot + half].map(|u| from_s + length_s * u.clamp(0.0, 1.0));
@@ -147,11 +148,11 @@ fn straightforward(vehicles: usize, items: &[Item], delta_m: f64) -> Answer {
     Answer { gaps, closest, below }
 }
 
-/// Largest difference of two distances \[m\] or two times \[s\]: both are rounded in their own order.
+/// Largest difference of two distances \[m\] or two times \[s\] that rounding explains.
 const ROUNDING: f64 = 1e-9;
 
-/// Pairs that are equally close may be listed in any order, each at any of the times at which it is.
-fn agree(mine: &Answer, theirs: &Answer) {
+/// Compares two results. Equally close pairs may be listed in any order, and at any of their closest times.
+fn assert_equal(mine: &Answer, theirs: &Answer) {
     assert_eq!(mine.gaps, theirs.gaps);
     assert_eq!(mine.closest.len(), theirs.closest.len());
     for (a, b) in mine.closest.iter().zip(&theirs.closest) {
@@ -170,7 +171,7 @@ fn agree(mine: &Answer, theirs: &Answer) {
     }
 }
 
-/// How far apart two are at a time, on straight lines between samples.
+/// Returns the separation of a pair at a time, on straight lines between samples.
 fn distance_m((i, j): (usize, usize), time_s: f64) -> f64 {
     let from = (time_s * RATE_HZ).floor();
     let apart_m = |k: f64| place(j, k / RATE_HZ) - place(i, k / RATE_HZ);
@@ -188,24 +189,24 @@ fn recorded(criterion: &mut Criterion) {
             let answer = work();
             (answer, start.elapsed().as_secs_f64())
         };
-        let (mine, mine_s) = timed(&|| ours(&names, &items, DELTA_M));
-        let (theirs, theirs_s) = timed(&|| straightforward(vehicles, &items, DELTA_M));
-        agree(&mine, &theirs);
+        let (mine, mine_s) = timed(&|| audited(&names, &items, DELTA_M));
+        let (theirs, theirs_s) = timed(&|| swept_directly(vehicles, &items, DELTA_M));
+        assert_equal(&mine, &theirs);
         println!(
             "{vehicles} vehicles x {SAMPLES} samples: min {:.6} m, first run {:.1} times as fast",
             mine.closest[0].distance_m,
             theirs_s / mine_s
         );
         if vehicles <= 100 {
-            let too_close = ours(&names, &items, TOO_MUCH_M);
-            agree(&too_close, &straightforward(vehicles, &items, TOO_MUCH_M));
-            println!("{} pairs are below {TOO_MUCH_M} m", too_close.below.len());
+            let too_close = audited(&names, &items, VIOLATED_DELTA_M);
+            assert_equal(&too_close, &swept_directly(vehicles, &items, VIOLATED_DELTA_M));
+            println!("{} pairs are below {VIOLATED_DELTA_M} m", too_close.below.len());
         }
         group.bench_function(BenchmarkId::new("judge", vehicles), |bencher| {
-            bencher.iter(|| black_box(ours(&names, black_box(&items), DELTA_M)));
+            bencher.iter(|| black_box(audited(&names, black_box(&items), DELTA_M)));
         });
         group.bench_function(BenchmarkId::new("straightforward", vehicles), |bencher| {
-            bencher.iter(|| black_box(straightforward(vehicles, black_box(&items), DELTA_M)));
+            bencher.iter(|| black_box(swept_directly(vehicles, black_box(&items), DELTA_M)));
         });
     }
     group.finish();

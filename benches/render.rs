@@ -1,6 +1,7 @@
-//! Draw lists, frames with read-back, and PNG, over the number of vehicles.
+//! Time of draw lists, frames with read-back, and PNG, over the number of vehicles.
 //!
-//! Frames are drawn by the best adapter of the machine; its name is printed first. Without one, lists alone are measured.
+//! The best adapter of the machine draws the frames; its name is printed first. Without an adapter only draw lists are
+//! measured.
 
 use std::hint::black_box;
 
@@ -15,7 +16,7 @@ use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, row, set_row};
 
 const SAMPLES: u32 = 200;
 
-/// A grid of vehicles in a plane that wave for twenty seconds.
+/// Returns a grid of vehicles in a plane that wave for twenty seconds.
 fn timeline(count: usize) -> Timeline {
     let formation = Formation::grid(count, 3.0);
     let start = Swarm::at_rest(formation.slots_m.clone());

@@ -1,4 +1,4 @@
-//! Time of a search for the pairs within a range, against the full sweep of all pairs.
+//! Time of a search for the pairs within a range, compared with a sweep of all pairs.
 //!
 //! Run with `cargo bench --bench space`; compare within one run.
 
@@ -8,10 +8,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use tautline::space::NearPairs;
 use tautline::swarm::{Rows, separation};
 
-/// Range in units of the distance at which points spread evenly would keep.
+/// Range \[m\]; evenly spread points are 1 m apart.
 const RANGE_M: f64 = 1.3;
 
-/// Points spread over a square, or over a cube, one a square or cubic metre.
+/// Returns random points in a square or a cube, one per square or cubic metre.
 fn spread(count: u32, axes: i32) -> Rows {
     let side_m = f64::from(count).powf(1.0 / f64::from(axes));
     let place = |k: u32| {

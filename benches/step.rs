@@ -1,9 +1,8 @@
-//! The whole step of the loop (law, engine, audit) against the engine's step alone with the same bodies.
+//! Time of a whole simulation step (law, engine, audit), compared with the engine's step alone on the same bodies.
 //!
-//! Run with `cargo bench --bench step`. The swarm is a square lattice of spacing 4 m that contracts to 3 m under the
-//! edge-tension law on the complete graph, delta = 2 m; larger ones under the displacement law:
-//! `cargo bench --bench step -- displacement`. Compare times within one run only: `whole / bare` is the price of control and
-//! proof.
+//! Run with `cargo bench --bench step`. The swarm is a square lattice that contracts from 4 m to 3 m under the
+//! edge-tension law on the complete graph, delta = 2 m. Larger swarms use the displacement law: `cargo bench --bench
+//! step -- displacement`. Compare times within one run only: `whole / bare` is the cost of law and audit.
 
 use std::ops::ControlFlow;
 
@@ -16,10 +15,10 @@ use tautline::sim::{self, Simulation};
 use tautline::swarm::{Rows, Swarm};
 
 const DELTA_M: f64 = 2.0;
-/// Steps in one measured flight. Setting it up is measured with neither.
+/// Number of steps in one measured flight; the setup is not measured.
 const STEPS: u16 = 240;
 
-/// A lattice that contracts for so many steps.
+/// Returns a lattice that contracts for a number of steps.
 fn lattice(count: usize, steps: u16) -> Scenario {
     let start = Swarm::at_rest(Formation::grid(count, 4.0).slots_m);
     Scenario::new("lattice", start, Formation::grid(count, 3.0), DELTA_M, f64::from(steps) / 240.0)

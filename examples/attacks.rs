@@ -1,4 +1,4 @@
-//! Prints the tables of docs/attack.md: CMA-ES beside random search, and with `laws` the worst start found for each law.
+//! Prints the tables of docs/attack.md: CMA-ES and random search, and with `laws` the worst start found for each law.
 //!
 //! `cargo run --release --example attacks [laws]`
 

@@ -1,4 +1,5 @@
-//! Prints the tables of docs/campaigns.md: how each law fares from random starts, and the leader star over a lossy radio.
+//! Prints the tables of docs/campaigns.md: results of each law from random starts, and the leader star over a lossy
+//! radio.
 //!
 //! `cargo run --release --example campaigns [MOST_RUNS]`
 

@@ -1,4 +1,4 @@
-//! A film of the built-in circle, flown and filmed without a file in between: `cargo run --release --example film`
+//! Films the built-in circle directly from its flight, without a recording: `cargo run --release --example film`
 
 use std::error::Error;
 use std::fs::File;
@@ -14,7 +14,7 @@ use tautline::scenario::{Override, Scenario, Source};
 use tautline::sim::{self, Parts};
 
 const FPS: u32 = 25;
-/// Seconds of the flight in a second of the film.
+/// Seconds of flight per second of film.
 const SPEED: f64 = 6.0;
 
 fn main() -> Result<(), Box<dyn Error>> {

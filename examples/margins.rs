@@ -1,4 +1,4 @@
-//! Prints the table of docs/margins.md: how much of each imperfection points and Crazyflies survive.
+//! Prints the table of docs/margins.md: how much of each imperfection points and Crazyflies tolerate.
 //!
 //! `cargo run --release --example margins`
 

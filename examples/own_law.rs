@@ -1,7 +1,7 @@
-//! A control law of your own, flown in Rapier and judged like the built-in ones.
+//! Your own control law, flown in Rapier and audited like the built-in ones.
 //!
-//! Each vehicle is pulled to its slot and pushed away from every other vehicle by 1/r^3, with damping. Nothing proves
-//! that this law keeps vehicles apart; the audit says whether it did on this flight.
+//! Each vehicle is pulled to its slot and repelled by every other vehicle with 1/r^3, with damping. No proof bounds the
+//! separations of this law; the audit measures them for this flight.
 //!
 //! Run with `cargo run --release --example own_law`.
 

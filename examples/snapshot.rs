@@ -1,4 +1,4 @@
-//! A picture of a recorded flight: `cargo run --example snapshot -- out/pentagon/run.mcap 2.15 closest.png`
+//! Draws a picture of a recorded flight: `cargo run --example snapshot -- out/pentagon/run.mcap 2.15 closest.png`
 
 use std::error::Error;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Judges positions of your own, step by step.
+//! Audits your own positions, step by step.
 
 use std::error::Error;
 

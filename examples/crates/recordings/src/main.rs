@@ -1,4 +1,4 @@
-//! Reads a recording of any origin and judges it: `cargo run -p example-recordings -- RECORDING DELTA_M`.
+//! Reads a recording from any source and audits it: `cargo run -p example-recordings -- RECORDING DELTA_M`.
 
 use std::error::Error;
 use std::path::Path;

@@ -6,9 +6,9 @@ use tautline_report::request::{AuditRequest, RunRequest, ScenarioRequest, Silent
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::temp_dir().join("tautline-example-report");
-    let asked = ScenarioRequest::named("pentagon", &["time.duration_s=60".to_owned()])?;
-    let scenario = asked.read()?;
-    let command = asked.command("run", [], []);
+    let request = ScenarioRequest::named("pentagon", &["time.duration_s=60".to_owned()])?;
+    let scenario = request.read()?;
+    let command = request.command("run", [], []);
     let run = RunRequest { out: Some(folder.clone()), force: true, ..RunRequest::new(&scenario, command) };
     // The second argument draws pictures; `tautline_render::RunPictures` does.
     let flown = run_into(&run, &(), &Silent::default())?;

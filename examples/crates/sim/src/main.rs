@@ -1,4 +1,4 @@
-//! Flies a law of your own in a built-in scenario: springs to the slots, without any repulsion.
+//! Flies your own law in a built-in scenario: springs to the slots, without repulsion.
 
 use std::error::Error;
 
