@@ -64,7 +64,8 @@ fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
         &page,
         DESKTOP,
         "const words = name => doc.querySelector('.replay-' + name).textContent;
-         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+           willReadFrequently: true });
          [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
          const colours = () => {
            root.player.draw(); pen.drawImage(view, 0, 0);
@@ -121,11 +122,14 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
         &["audit", "two.csv", "--radius", "0.5", "--quiet", "--html", "two.html"],
         "two.html",
     );
-    let script = "for (const box of doc.querySelectorAll('input[type=checkbox]')) { box.checked = false; box.dispatchEvent(new win.Event('change')); }
-         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+    let script = "for (const box of doc.querySelectorAll('input[type=checkbox]')) { box.checked = false;
+      box.dispatchEvent(new win.Event('change')); }
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+           willReadFrequently: true });
          [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
          const shots = [];
-         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4, [-0.5, 0.7, 0.8]]]) {
+         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4,
+           [-0.5, 0.7, 0.8]]]) {
            const camera = root.player.look({ yaw, pitch, distance, target, t: 0.5 });
            pen.drawImage(view, 0, 0);
            const all = pen.getImageData(0, 0, view.width, view.height).data, corner = all.slice(0, 3);
@@ -134,7 +138,8 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
              // Four rays half a pixel around the centre, with a margin for the shading of the edge.
              const hits = new Set();
              for (const [dx, dy] of [[0.5, 0.5], [-0.4, -0.4], [1.4, -0.4], [-0.4, 1.4], [1.4, 1.4]]) {
-               const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height, v = (1 - (y + dy) / view.height * 2) * camera.tangent;
+               const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height,
+                 v = (1 - (y + dy) / view.height * 2) * camera.tangent;
                const ray = [0, 1, 2].map(k => camera.right[k] * u + camera.up[k] * v - camera.back[k]);
                hits.add([0].some(ball => {
                  const at = camera.place(ball), to = [0, 1, 2].map(k => at[k] - camera.eye[k]);
@@ -168,11 +173,14 @@ fn a_replay_fits_a_phone_in_light_and_dark_and_runs_in_a_sandbox() {
             folder.path(),
             &page,
             (360, dark),
-            "const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+            "const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+              willReadFrequently: true });
              root.player.draw(); pen.drawImage(view, 0, 0);
-             const sticking = [...doc.querySelectorAll('.replay *')].filter(e => e.getBoundingClientRect().right > win.innerWidth + 8.5).length;
+             const sticking = [...doc.querySelectorAll('.replay *')].filter(e =>
+               e.getBoundingClientRect().right > win.innerWidth + 8.5).length;
              return { wide: doc.documentElement.scrollWidth, sticking, paper: pen.getImageData(3, 60, 1, 1).data[0],
-               named: [...doc.querySelectorAll('.replay button, .replay select, .replay input, .replay-view')].every(e =>
+               named: [...doc.querySelectorAll(
+                 '.replay button, .replay select, .replay input, .replay-view')].every(e =>
                  e.textContent.trim() || e.getAttribute('aria-label') || e.closest('label')) };",
         );
         assert!(said.is_empty(), "{said:?}");
@@ -208,7 +216,8 @@ fn only_the_replay_script_runs_and_missing_webgl_is_reported() {
     let page = fly(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
     let html = fs::read_to_string(&page).expect("a page");
     assert_eq!(html.matches("script-src 'sha256-").count() + html.matches("script-src &#39;sha256-").count(), 1);
-    let state = "return { state: root.dataset.state ?? 'none yet', none: doc.querySelector('.replay-none')?.textContent ?? '', ran: win.ran ?? false };";
+    let state = "return { state: root.dataset.state ?? 'none yet',
+      none: doc.querySelector('.replay-none')?.textContent ?? '', ran: win.ran ?? false };";
     let (found, said) = steer(folder.path(), &page, DESKTOP, state);
     assert!(said.is_empty() && found["state"] == "ready" && found["ran"] == false, "{found} {said:?}");
     fs::write(&page, html.replace("<footer>", "<script>window.ran = true;</script><footer>")).expect("written");
@@ -247,7 +256,8 @@ fn names_are_escaped_and_absent_vehicles_are_not_drawn() {
         folder.path(),
         &page,
         DESKTOP,
-        "const there = t => { const { place } = root.player.look({ yaw: 0, pitch: 0.5, distance: 30, target: [0, 0, 0], t }); return [0, 1].map(k => place(k)[3]); };
+        "const there = t => { const { place } = root.player.look({
+          yaw: 0, pitch: 0.5, distance: 30, target: [0, 0, 0], t }); return [0, 1].map(k => place(k)[3]); };
          return { there: [2, 5.5, 10, 16].map(there), state: doc.querySelector('.replay-state').textContent,
            images: doc.querySelectorAll('img, b').length, ran: win.ran ?? 0 };",
     );
@@ -264,7 +274,8 @@ fn names_are_escaped_and_absent_vehicles_are_not_drawn() {
 fn states(folder: &Path, page: &Path, times_s: &[f64]) -> Vec<String> {
     let script = format!(
         "const scrub = doc.querySelector('input[type=range]');
-         return {times_s:?}.map(t => {{ scrub.value = t; scrub.oninput(); root.player.draw(); return doc.querySelector('.replay-state').textContent; }});"
+         return {times_s:?}.map(t => {{ scrub.value = t; scrub.oninput(); root.player.draw();
+           return doc.querySelector('.replay-state').textContent; }});"
     );
     let (found, said) = steer(folder, page, DESKTOP, &script);
     assert!(said.is_empty(), "{said:?}");
@@ -338,20 +349,25 @@ fn a_replay_recovers_from_lost_graphics_hidden_pages_and_scrolling() {
         folder.path(),
         &page,
         DESKTOP,
-        "const view = doc.querySelector('.replay-view'), picture = () => { root.player.draw(); return view.toDataURL(); };
-         const point = (name, at) => view.dispatchEvent(new win.PointerEvent('pointer' + name, { pointerId: 1, clientX: at, clientY: at }));
+        "const view = doc.querySelector('.replay-view'), picture = () => { root.player.draw();
+          return view.toDataURL(); };
+         const point = (name, at) => view.dispatchEvent(new win.PointerEvent('pointer' + name, {
+           pointerId: 1, clientX: at, clientY: at }));
          view.setPointerCapture = () => {};
-         const still = picture(); point('down', 100); point('move', 160); const turned = picture(); point('cancel', 160);
+         const still = picture(); point('down', 100); point('move', 160); const turned = picture();
+           point('cancel', 160);
          const touch = [still !== turned, still === picture()];
          view.dispatchEvent(new win.Event('webglcontextlost'));
-         const lost = { state: root.dataset.state, none: doc.querySelector('.replay-none').textContent, panel: doc.querySelectorAll('.replay-panel').length };
+         const lost = { state: root.dataset.state, none: doc.querySelector('.replay-none').textContent,
+           panel: doc.querySelectorAll('.replay-panel').length };
          const start = doc.querySelector('.replay-start'); lost.label = start.getAttribute('aria-label');
          let next = () => {}; win.requestAnimationFrame = draw => { next = draw; return 1; };
          start.click();
          doc.querySelector('.replay-play').click();
          [1000, 1020, 9020].forEach(now => next(now));
          const clock = doc.querySelector('.replay-clock').textContent;
-         return { touch, clock, lost, again: root.dataset.state, left: doc.querySelectorAll('.replay-none, .replay-start').length };",
+         return { touch, clock, lost, again: root.dataset.state,
+           left: doc.querySelectorAll('.replay-none, .replay-start').length };",
     );
     assert!(said.is_empty(), "{said:?}");
     assert_eq!(found["touch"], serde_json::json!([true, true]), "{found}");

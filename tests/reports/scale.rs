@@ -22,7 +22,8 @@ fn grid(count: usize, more: &str) -> String {
 }
 
 const ALL: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\n";
-const LED: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\ngraph.kind = \"star\"\nreference = { kind = \"rest\", leader = 1 }\n";
+const LED: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\ngraph.kind = \"star\"\n\
+                   reference = { kind = \"rest\", leader = 1 }\n";
 
 fn read(toml: &str) -> Scenario {
     let source = Source::Text { name: "test".to_owned(), text: toml.to_owned() };

@@ -294,8 +294,8 @@ mod tests {
             }
             let outcome = auditor.finish();
             let swept = |way: &[[f64; 3]], obstacle: &Obstacle| {
-                let steps = way.windows(2);
-                steps.map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into())).fold(f64::INFINITY, f64::min)
+                let steps = way.windows(2).map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into()));
+                steps.fold(f64::INFINITY, f64::min)
             };
             let all: Vec<_> = ways.iter().flat_map(|way| obstacles.iter().map(|o| swept(way, o))).collect();
             let margins = all.iter().enumerate().map(|(k, m)| m - limit_m(k % obstacles.len()));

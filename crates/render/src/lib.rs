@@ -1,8 +1,13 @@
 //! Pictures, films and an interactive window of a flight.
 //!
-//! The data flow: a [`Timeline`] holds a flight with its log, [`scene`] turns any time of it into a draw list, [`gpu`]
-//! draws the list off-screen into a [`Picture`], and [`Film`] encodes pictures. Only [`gpu`] and the window depend on
-//! wgpu.
+//! The data flow:
+//!
+//! 1. [`Timeline`] holds a flight with its log.
+//! 2. [`scene`] turns any time of it into a draw list.
+//! 3. [`gpu`] draws the list off-screen into a [`Picture`].
+//! 4. [`Film`] encodes pictures.
+//!
+//! Only [`gpu`] and the window depend on wgpu.
 //!
 //! ```no_run
 //! use std::path::Path;

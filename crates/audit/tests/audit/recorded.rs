@@ -410,7 +410,8 @@ proptest! {
         let mut items: Vec<_> = raw.into_iter().map(|(vehicle, piece, [t, x, y, z, w])| {
             let position_m = Vector3::new(x, y, z);
             if piece {
-                Item::Piece(Piece { vehicle, from_s: t, to_s: t + w.abs(), coefficients: vec![position_m, position_m * w] })
+                let coefficients = vec![position_m, position_m * w];
+                Item::Piece(Piece { vehicle, from_s: t, to_s: t + w.abs(), coefficients })
             } else {
                 Item::Sample(Sample { vehicle, time_s: t, position_m, velocity_m_s: None, radius_m: None })
             }

@@ -1,8 +1,8 @@
 //! Rendering of scenes with wgpu, off-screen or in a window.
 //!
-//! A ball is a flat quad. Every pixel computes its point of the sphere, and every sample of a pixel its own edge, so
-//! balls are round at any size and cost only the pixels that they cover. Pictures use four samples per pixel and
-//! blending in linear light; egui draws text and legends on top. A frame is uploaded once and drawn in two passes.
+//! A ball is a flat quad. Every pixel computes its point of the sphere, and every sample of a pixel its own edge. Balls
+//! are round at any size and cost only the pixels that they cover. Pictures use four samples per pixel and blending in
+//! linear light; egui draws text and legends on top. A frame is uploaded once and drawn in two passes.
 //!
 //! The same scene gives the same bytes on the same adapter and driver.
 

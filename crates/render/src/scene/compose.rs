@@ -87,7 +87,7 @@ impl Scene {
     /// Composes the draw list of a frame of a flight; `camera` must have the picture size of the view.
     ///
     /// Shells are ordered by |c|^2 - r^2, the squared distance of the centre less the squared radius, farthest first.
-    /// If balls do not overlap, this is their order along every line of sight: where a line meets a ball, the number is
+    /// If balls do not overlap, this is their order along every line of sight. Where a line meets a ball, the number is
     /// the product of the distances to both points. Shells that overlap are in violation and have one colour, so their
     /// order does not matter. The picture therefore does not flicker while the camera moves. Ellipsoidal shells are
     /// balls in scaled lengths, and are ordered there.

@@ -294,8 +294,8 @@ impl SceneBuilder<'_> {
 /// Smallest radius of a hull that is drawn with arms, in a picture 720 pixels high and in any \[pixels\]. A smaller
 /// hull is drawn as a ball.
 const MIN_HULL_PX: [f64; 2] = [9.0, 6.0];
-/// Lengths relative to the arm: radius of the body and of the mark ahead, distance of the mark, height of the rotors
-/// above the centre of the body, width of an arm.
+/// Lengths relative to the arm: radii of the body and the mark ahead, distance of the mark, height of the rotors above
+/// the body's centre, width of an arm.
 const BODY: f64 = 0.3;
 const NOSE: f64 = 0.13;
 const AHEAD: f64 = 0.72;
