@@ -14,7 +14,8 @@ use tautline_report::flight_log::Frame;
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
-/// Largest height of a flight above z = 0, relative to its extent, at which the ground is drawn at z = 0.
+/// Largest height of the lowest position above z = 0, relative to the extent of the flight, at which the ground is
+/// drawn at z = 0.
 const NEAR_GROUND: f64 = 0.3;
 /// Approximate number of ground lines along the longer side.
 const GROUND_LINES: f64 = 12.0;
