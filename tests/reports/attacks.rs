@@ -1,4 +1,4 @@
-//! `docs/attack.md` says what is flown: a seed and a law of it always, the whole tables with `TAUTLINE_LONG=1`.
+//! Compares `docs/attack.md` with flights: one seed and one law by default, all tables with `TAUTLINE_LONG=1`.
 
 #[path = "../support/attacks.rs"]
 mod tables;
@@ -6,17 +6,17 @@ mod tables;
 use tables::{CASES, Case, SEEDS};
 
 const PAGE: &str = include_str!("../../docs/attack.md");
-/// Seeds of twenty in which CMA-ES has to find less.
-const ENOUGH: u64 = 18;
+/// Number of the twenty seeds for which CMA-ES must find a smaller separation.
+const MIN_BETTER: u64 = 18;
 
-/// The table that a command makes, as the page has it.
+/// Returns the table of a command on the page.
 fn on_page(command: &str) -> &'static str {
     let [begin, end] =
         ["begin", "end"].map(|mark| format!("<!-- {mark}: cargo run --release --example {command} -->\n"));
     PAGE.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)).expect("two marks").0
 }
 
-/// The numbers of a seed: CMA-ES and random search on each case.
+/// Returns the results of a seed: CMA-ES and random search on each case \[m\].
 fn found_m(seed: u64) -> [f64; 2 * CASES.len()] {
     let line = on_page("attacks").lines().find(|line| line.starts_with(&format!("| {seed} |"))).expect("a line");
     let cells: Vec<f64> =
@@ -29,18 +29,18 @@ fn is_long() -> bool {
 }
 
 #[test]
-fn with_as_many_flights_cma_es_finds_less_than_random_search_and_random_search_does_not() {
+fn cma_es_beats_random_search_with_the_same_number_of_flights() {
     for (case, Case { name, .. }) in CASES.iter().enumerate() {
         let count = |less: &dyn Fn(u64) -> bool| (0..SEEDS).filter(|&seed| less(seed)).count() as u64;
         let better = count(&|seed| found_m(seed)[2 * case] < found_m(seed)[2 * case + 1]);
-        assert!(better >= ENOUGH, "{name}: {better} of {SEEDS}");
+        assert!(better >= MIN_BETTER, "{name}: {better} of {SEEDS}");
         let of_itself = count(&|seed| found_m(seed)[2 * case + 1] < found_m((seed + 1) % SEEDS)[2 * case + 1]);
-        assert!(of_itself < ENOUGH, "{name}: {of_itself} of {SEEDS}");
+        assert!(of_itself < MIN_BETTER, "{name}: {of_itself} of {SEEDS}");
     }
 }
 
 #[test]
-fn the_tables_of_the_page_are_what_is_flown() {
+fn the_tables_of_the_page_match_flights() {
     if is_long() {
         for (command, flown) in [("attacks", tables::beside_random()), ("attacks laws", tables::worst_starts())] {
             let page = on_page(command);

@@ -1,16 +1,17 @@
-//! Figures of what else is known of each vehicle: attitude, rotors, wind, age of messages.
+//! Figures of the channels of each vehicle: attitude, rotors, wind, age of messages.
 
 use tautline::figures::{self, Criteria, Figure};
 use tautline::flight_log::FlightLog;
 use tautline::record::{Channel, Sample};
 use tautline::swarm::{Rows, Swarm};
 
-use crate::figures::{CERTIFIED_LINE, Drawing, PLACE};
+use crate::figures::{CERTIFIED_LINE, Drawing, TOLERANCE_PX};
 
-const MOST_N: f64 = 0.12;
+const MAX_THRUST_N: f64 = 0.12;
 const NAMES: [&str; 4] = ["attitude", "rotors", "wind", "message-age"];
 
-/// The channels of vehicles that are tilted about x by 10 degrees times their number; `scale` is that of all numbers.
+/// Returns the channels of vehicles that are tilted about x by 10 degrees times their index; `scale` multiplies all
+/// numbers.
 fn channels(count: usize, scale: f64) -> [Channel; 4] {
     let filled = |name, columns: &[&str], row: &dyn Fn(f64) -> Vec<f64>| {
         let values = (0..count).flat_map(|i| row(i as f64)).collect();
@@ -30,8 +31,8 @@ fn channels(count: usize, scale: f64) -> [Channel; 4] {
     ]
 }
 
-/// Figures of `samples` samples 0.05 s apart; in sample `k` all numbers are those of `channels` times `scale(k)`.
-fn drawn(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> {
+/// Returns the figures of `samples` samples 0.05 s apart; in sample `k` the channels are multiplied by `scale(k)`.
+fn figures_of(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> {
     let mut history = FlightLog::default();
     let (swarm, control) = (Swarm::at_rest(Rows::from_fn(count, |i, axis| (3 * i + axis) as f64)), Rows::zeros(count));
     for k in 0..samples {
@@ -44,7 +45,7 @@ fn drawn(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> 
         shape: None,
         edge_error_m: None,
         disagreement_m_s: None,
-        most_thrust_n: Some(MOST_N),
+        most_thrust_n: Some(MAX_THRUST_N),
     };
     let mut figures = figures::of_run(&history, &criteria);
     assert!(figures.iter().all(|figure| figures::NAMES_OF_RUN.contains(&figure.name.as_str())));
@@ -53,8 +54,8 @@ fn drawn(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Figure> 
 }
 
 #[test]
-fn a_run_with_channels_has_a_figure_of_each_with_a_line_for_each_vehicle() {
-    let figures = drawn(3, 100, |k| if k < 50 { 1.0 } else { 0.5 });
+fn every_channel_has_a_figure_with_a_line_per_vehicle() {
+    let figures = figures_of(3, 100, |k| if k < 50 { 1.0 } else { 0.5 });
     assert_eq!(figures.iter().map(|figure| &*figure.name).collect::<Vec<_>>(), NAMES);
     let labels =
         ["tilt from upright [°]", "largest thrust of a rotor [N]", "wind speed [m/s]", "age of the oldest message [s]"];
@@ -63,18 +64,18 @@ fn a_run_with_channels_has_a_figure_of_each_with_a_line_for_each_vehicle() {
         assert!(drawing.words().iter().any(|word| word == label), "{label}: {:?}", drawing.words());
         let lines = drawing.polylines(("#00936C", "1.5"));
         let (line, [first, last]) = (&lines[0], [third, 0.5 * third].map(|number| drawing.place(true, number)));
-        assert!((line[0].1 - first).abs() <= PLACE, "{}: {line:?}", figure.name);
-        assert!((line[line.len() - 1].1 - last).abs() <= PLACE, "{}: {line:?}", figure.name);
+        assert!((line[0].1 - first).abs() <= TOLERANCE_PX, "{}: {line:?}", figure.name);
+        assert!((line[line.len() - 1].1 - last).abs() <= TOLERANCE_PX, "{}: {line:?}", figure.name);
         let peak = format!("at most {third:.3}");
         assert!(figure.description.contains(&peak), "{}", figure.description);
     }
     let rotors = Drawing::of(&figures[1]);
-    assert!((rotors.level(CERTIFIED_LINE) - rotors.place(true, MOST_N)).abs() <= PLACE);
+    assert!((rotors.level(CERTIFIED_LINE) - rotors.place(true, MAX_THRUST_N)).abs() <= TOLERANCE_PX);
 }
 
 #[test]
 fn an_extreme_of_one_sample_is_in_every_figure() {
-    let figures = drawn(2, 10_000, |k| if k == 7777 { 3.0 } else { 0.1 });
+    let figures = figures_of(2, 10_000, |k| if k == 7777 { 3.0 } else { 0.1 });
     for (figure, peak) in figures.iter().zip(["30.000°", "0.120 N", "15.000 m/s", "0.150 s"]) {
         assert!(figure.description.contains(&format!("at most {peak}.")), "{}", figure.description);
     }
@@ -82,7 +83,7 @@ fn an_extreme_of_one_sample_is_in_every_figure() {
 
 #[test]
 fn the_figures_of_a_large_swarm_are_bounded() {
-    let figures = drawn(3000, 60, |k| 1e-3 * (1.0 + (k as f64).sin()));
+    let figures = figures_of(3000, 60, |k| 1e-3 * (1.0 + (k as f64).sin()));
     assert_eq!(figures.len(), 4);
     for figure in &figures {
         assert!(figure.svg.len() < 60_000, "{}: {} bytes", figure.name, figure.svg.len());
@@ -91,11 +92,11 @@ fn the_figures_of_a_large_swarm_are_bounded() {
 }
 
 #[test]
-fn a_channel_of_other_columns_or_of_other_vehicles_has_no_figure() {
+fn a_channel_with_other_columns_or_vehicles_has_no_figure() {
     let mut history = FlightLog::default();
     let (swarm, control) = (Swarm::at_rest(Rows::zeros(2)), Rows::zeros(2));
     let euler = Channel { values: vec![0.0; 6], ..Channel::new("attitude", &["roll", "pitch", "yaw"]) };
     let [_, rotors, ..] = channels(3, 1.0);
     history.take(&Sample { channels: &[euler, rotors], ..Sample::new(0.0, 0, &swarm, &control) });
-    assert!(figures::channels(&history, Some(MOST_N)).is_empty());
+    assert!(figures::channels(&history, Some(MAX_THRUST_N)).is_empty());
 }

@@ -1,4 +1,4 @@
-//! Figures show what they claim: their SVG is read back and measured against its own axes.
+//! Figures: their SVG is parsed and measured against its own axes.
 
 use roxmltree::{Document, Node};
 use tautline::figures::{self, Criteria, Figure};
@@ -11,15 +11,15 @@ use tautline::record::{Sample, Sink as _};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm, separation, set_row};
 use tautline::target::Leg;
 
-/// Drawings count in tenths of a pixel.
-pub(crate) const PLACE: f64 = 0.2;
+/// Tolerance of coordinates, which are written in tenths of a pixel.
+pub(crate) const TOLERANCE_PX: f64 = 0.2;
 const DELTA_M: f64 = 2.0;
 const CERTIFIED_M: f64 = 2.5;
-/// Stroke and width of the line at delta, as in the drawing.
+/// Stroke and width of the line at delta.
 const DELTA_LINE: (&str, &str) = ("#1B1F24", "2");
 pub(crate) const CERTIFIED_LINE: (&str, &str) = ("#1B1F24", "1.3");
 
-/// A figure read back.
+/// Parsed figure.
 pub(crate) struct Drawing<'a>(Document<'a>);
 
 impl<'a> Drawing<'a> {
@@ -35,7 +35,7 @@ impl<'a> Drawing<'a> {
         self.all("text").iter().map(|node| node.text().unwrap_or("").trim().to_owned()).collect()
     }
 
-    /// Number and place of each tick: of the vertical axis (texts that end at it) or of the horizontal one.
+    /// Returns number and position of each tick: of the vertical axis (texts that end at it) or of the horizontal one.
     fn ticks(&self, vertical: bool) -> Vec<(f64, f64)> {
         let (anchor, dy, along) = if vertical { ("end", "0.35em", "y") } else { ("middle", "0.76em", "x") };
         let texts = self.all("text").into_iter();
@@ -49,14 +49,14 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// Where a number is on an axis.
+    /// Returns the position of a number on an axis.
     pub(crate) fn place(&self, vertical: bool, number: f64) -> f64 {
         let ticks = self.ticks(vertical);
         let [(a, at_a), .., (b, at_b)] = ticks[..] else { panic!("{} ticks", ticks.len()) };
         at_a + (number - a) / (b - a) * (at_b - at_a)
     }
 
-    /// Corners of the polylines of a stroke and a width.
+    /// Returns the corners of the polylines with a stroke and a width.
     pub(crate) fn polylines(&self, (stroke, width): (&str, &str)) -> Vec<Vec<(f64, f64)>> {
         let of_style = |node: &Node<'_, '_>| {
             node.attribute("stroke") == Some(stroke) && node.attribute("stroke-width") == Some(width)
@@ -72,7 +72,7 @@ impl<'a> Drawing<'a> {
         level[0].1
     }
 
-    /// Circles of the plotting area: those of the legend are below all ticks.
+    /// Returns the circles of the plotting area; those of the legend are below all ticks.
     fn rings(&self) -> Vec<(f64, f64)> {
         let lowest = self.ticks(false).len();
         assert!(lowest > 0, "no ticks");
@@ -101,8 +101,8 @@ fn length(line: &[(f64, f64)]) -> f64 {
     line.windows(2).map(|ends| (ends[1].0 - ends[0].0).hypot(ends[1].1 - ends[0].1)).sum()
 }
 
-/// `count` vehicles 3 m apart on the x axis that all move `(0.5, 0.2, rise)` m/s for 10 s; the second one visits the
-/// first for an instant, `near_m` apart, at 4 s.
+/// Passes samples of `count` vehicles 3 m apart on the x axis to `take`. All move at `(0.5, 0.2, rise)` m/s for 10 s.
+/// At 4 s the second vehicle is `near_m` from the first for one sample.
 fn samples(count: usize, rise_m_s: f64, near_m: f64, take: &mut dyn FnMut(&Sample<'_>)) {
     for k in 0..=200_u32 {
         let time_s = f64::from(k) * 0.05;
@@ -152,20 +152,20 @@ fn names(figures: &[Figure]) -> Vec<&str> {
 }
 
 #[test]
-fn the_lines_at_delta_and_at_the_certified_distance_are_at_their_numbers_on_the_axis() {
+fn the_lines_at_delta_and_at_the_certified_distance_are_correct() {
     let history = history(3);
     for delta_m in [1.0, DELTA_M, 2.9] {
         let figure = figures::distances(&history, delta_m, None, "Distances");
         let drawing = Drawing::of(&figure);
         let (found, expected) = (drawing.level(DELTA_LINE), drawing.place(true, delta_m));
-        assert!((found - expected).abs() <= PLACE, "delta {delta_m}: {found}, not {expected}");
+        assert!((found - expected).abs() <= TOLERANCE_PX, "delta {delta_m}: {found}, not {expected}");
         let elsewhere = drawing.place(true, delta_m + 0.1);
-        assert!((found - elsewhere).abs() > PLACE, "a tenth of a metre would not be seen");
+        assert!((found - elsewhere).abs() > TOLERANCE_PX, "a shift of a tenth of a metre must be visible");
     }
     let figure = figures::distances(&history, DELTA_M, Some(CERTIFIED_M), "Distances");
     let drawing = Drawing::of(&figure);
     let expected = drawing.place(true, CERTIFIED_M);
-    assert!((drawing.level(CERTIFIED_LINE) - expected).abs() <= PLACE);
+    assert!((drawing.level(CERTIFIED_LINE) - expected).abs() <= TOLERANCE_PX);
 }
 
 #[test]
@@ -183,11 +183,14 @@ fn every_pair_of_a_small_swarm_has_a_line_and_the_closest_approach_is_marked() {
     let expected = (drawing.place(false, 4.0), drawing.place(true, 2.75));
     let rings = drawing.rings();
     let &[(x, y)] = &rings[..] else { panic!("{rings:?}") };
-    assert!((x - expected.0).abs() <= PLACE && (y - expected.1).abs() <= PLACE, "({x}, {y}), not {expected:?}");
+    assert!(
+        (x - expected.0).abs() <= TOLERANCE_PX && (y - expected.1).abs() <= TOLERANCE_PX,
+        "({x}, {y}), not {expected:?}"
+    );
     assert!(figure.description.contains("2.750 m, vehicles 1 and 2 at 4.00 s"), "{}", figure.description);
-    // The visit lasted one sample of two hundred; the line of the pair reaches down to it.
+    // The approach lasts one sample of two hundred; the line of the pair must reach it.
     let lowest = drawing.polylines((colors[0], "1.5"))[0].iter().map(|&(_, y)| y).fold(0.0, f64::max);
-    assert!((lowest - expected.1).abs() <= PLACE, "{lowest}, not {}", expected.1);
+    assert!((lowest - expected.1).abs() <= TOLERANCE_PX, "{lowest}, not {}", expected.1);
 }
 
 #[test]
@@ -202,20 +205,23 @@ fn paths_have_a_cross_at_each_start_a_ring_at_each_end_and_equal_axes() {
     assert_eq!(rings.len(), 3);
     for (i, (x, y)) in rings.into_iter().enumerate() {
         let expected = (drawing.place(false, 3.0 * i as f64 + 5.0), drawing.place(true, 2.0));
-        assert!((x - expected.0).abs() <= PLACE && (y - expected.1).abs() <= PLACE, "({x}, {y}), not {expected:?}");
+        assert!(
+            (x - expected.0).abs() <= TOLERANCE_PX && (y - expected.1).abs() <= TOLERANCE_PX,
+            "({x}, {y}), not {expected:?}"
+        );
     }
     for (i, color) in ["#0072B2", "#D55E00", "#00936C"].into_iter().enumerate() {
         let paths = drawing.polylines((color, "1.5"));
         let [path] = &paths[..] else { panic!("{} paths", paths.len()) };
         let start = (drawing.place(false, 3.0 * i as f64), drawing.place(true, 0.0));
         assert!(
-            (path[0].0 - start.0).abs() <= PLACE && (path[0].1 - start.1).abs() <= PLACE,
+            (path[0].0 - start.0).abs() <= TOLERANCE_PX && (path[0].1 - start.1).abs() <= TOLERANCE_PX,
             "{:?}, {start:?}",
             path[0]
         );
         let strokes = drawing.polylines((color, "1.6"));
         let at_start =
-            strokes.iter().filter(|stroke| (f64::midpoint(stroke[0].0, stroke[1].0) - start.0).abs() <= PLACE);
+            strokes.iter().filter(|stroke| (f64::midpoint(stroke[0].0, stroke[1].0) - start.0).abs() <= TOLERANCE_PX);
         assert_eq!(at_start.count(), 2, "a cross of two strokes at the start of vehicle {}", i + 1);
     }
     for word in ["1", "2", "3", "start", "end"] {
@@ -240,14 +246,14 @@ fn every_axis_names_its_unit() {
     }
 }
 
-/// Width of a number as it is written, by what most fonts need \[px\].
+/// Returns the width of a number in most fonts \[px\].
 fn width(words: &str) -> f64 {
     words.chars().map(|c| if c == '.' { 4.0 } else { 7.3 }).sum()
 }
 
 #[test]
-fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
-    let mut most = 0.0_f64;
+fn numbers_of_the_axes_do_not_overlap() {
+    let mut widest_px = 0.0_f64;
     for (offset, scale) in [(0.0, 1.0), (0.0, 1e3), (123_456.0, 1.0), (-1e6, 10.0), (0.0, 1e-3), (0.0, 1e7)] {
         let mut history = FlightLog::default();
         samples(3, 0.0, 2.75, &mut |sample| {
@@ -269,10 +275,10 @@ fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
             let ticks = of("end", "0.35em");
             assert!(ticks.len() > 1, "{}", figure.name);
             for (at, (x, _, words)) in ticks.iter().enumerate() {
-                // The label of the axis is read upwards: its letters are 13 px to the left of 24 px.
+                // The axis label is rotated: its letters are 13 px to the left of 24 px.
                 assert!(x - width(words) >= 23.0, "{}, {offset}, {scale}: {words} ends at {x} px", figure.name);
                 assert!(ticks[..at].iter().all(|other| other.2 != *words), "{}: {words} twice", figure.name);
-                most = most.max(width(words));
+                widest_px = widest_px.max(width(words));
             }
             let mut ticks = of("middle", "0.76em");
             ticks.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -282,7 +288,7 @@ fn numbers_of_the_axes_run_neither_into_each_other_nor_into_the_label() {
             }
         }
     }
-    assert!(most > 45.0, "some numbers are wider than the room that most need: {most} px");
+    assert!(widest_px > 45.0, "no number is wide enough for the test: {widest_px} px");
 }
 
 #[test]
@@ -306,7 +312,7 @@ fn a_run_has_the_figures_that_it_has_data_for() {
 }
 
 #[test]
-fn of_a_large_swarm_bands_and_the_closest_pairs_are_drawn() {
+fn a_large_swarm_has_bands_and_the_closest_pairs() {
     let figures = all_of(&history(60), DELTA_M);
     let drawing = Drawing::of(&figures[1]);
     let words = drawing.words();
@@ -319,11 +325,11 @@ fn of_a_large_swarm_bands_and_the_closest_pairs_are_drawn() {
 }
 
 #[test]
-fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
+fn the_size_of_all_figures_is_bounded() {
     let mut history = FlightLog::default();
     let (count, control) = (5000, Rows::from_element(5000, 1.0));
     for k in 0..300_u32 {
-        // Every vehicle goes its own crooked way.
+        // Every vehicle has its own path.
         let place = |i: usize, axis: usize| (i * (axis + 1)) as f64 + 50.0 * f64::from(k * k) * (i as f64 + 1.0).sin();
         let swarm = Swarm::at_rest(Rows::from_fn(count, |i, axis| place(i, axis).sin() * 100.0));
         history.take(&Sample {
@@ -351,7 +357,7 @@ fn the_bytes_of_all_figures_are_bounded_for_any_swarm_and_any_time() {
 }
 
 #[test]
-fn nothing_in_a_recording_makes_a_figure_fail_or_hold_a_number_that_is_none() {
+fn no_recording_makes_a_figure_fail_or_contain_nan() {
     let mut histories = vec![("without samples", FlightLog::default())];
     let mut one = FlightLog::default();
     let mut first = true;
@@ -395,7 +401,7 @@ fn nothing_in_a_recording_makes_a_figure_fail_or_hold_a_number_that_is_none() {
 }
 
 #[test]
-fn a_recording_read_back_gives_the_same_bytes_as_the_run_that_was_watched() {
+fn a_recording_gives_the_same_figures_as_its_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
     let mut recorder = McapRecorder::create(&path, &Header::new("line", "", 3, DELTA_M)).expect("a recording");
@@ -406,7 +412,7 @@ fn a_recording_read_back_gives_the_same_bytes_as_the_run_that_was_watched() {
 }
 
 #[test]
-fn a_figure_escapes_its_title_and_refers_to_nothing() {
+fn a_figure_escapes_its_title_and_is_self_contained() {
     let hostile = "</title><script>alert('1')</script>\u{0} & \"quoted\"";
     let mut figures = all_of(&history(3), DELTA_M);
     figures.push(figures::paths_in_space(&history(3), hostile));
@@ -426,7 +432,7 @@ fn a_figure_escapes_its_title_and_refers_to_nothing() {
 }
 
 #[test]
-fn the_tension_has_its_barrier_and_its_minimum_where_the_formulas_say() {
+fn the_tension_curve_has_the_right_barrier_and_minimum() {
     let (delta_m, k_m) = (0.5, 1.0);
     let rest_m = delta_m + k_m * 1.0_f64.asinh();
     let tension = EdgeTension::new(1.0, delta_m, rest_m).expect("a tension");
@@ -434,15 +440,20 @@ fn the_tension_has_its_barrier_and_its_minimum_where_the_formulas_say() {
     let drawing = Drawing::of(&figure);
     let rings = drawing.rings();
     let &[(x, y)] = &rings[..] else { panic!("{rings:?}") };
-    assert!((x - drawing.place(false, rest_m)).abs() <= PLACE && (y - drawing.place(true, 0.0)).abs() <= PLACE);
+    assert!(
+        (x - drawing.place(false, rest_m)).abs() <= TOLERANCE_PX
+            && (y - drawing.place(true, 0.0)).abs() <= TOLERANCE_PX
+    );
     let curves = drawing.polylines(("#0072B2", "1.8"));
     let curve = curves.iter().max_by(|a, b| length(a).total_cmp(&length(b))).expect("a curve");
     let lowest = curve.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a point");
-    // Near its minimum the curve is flat: a tenth of a pixel of height is some pixels of width.
-    assert!((lowest.0 - x).abs() < 5.0 && (lowest.1 - y).abs() <= PLACE, "{lowest:?}, not ({x}, {y})");
+    // The curve is flat near its minimum: a tenth of a pixel of height is several pixels of width.
+    assert!((lowest.0 - x).abs() < 5.0 && (lowest.1 - y).abs() <= TOLERANCE_PX, "{lowest:?}, not ({x}, {y})");
     let barriers = drawing.polylines(("#1B1F24", "1.6"));
     assert!(
-        barriers.iter().any(|line| (line[0].0 - drawing.place(false, delta_m)).abs() <= PLACE && length(line) > 100.0)
+        barriers
+            .iter()
+            .any(|line| (line[0].0 - drawing.place(false, delta_m)).abs() <= TOLERANCE_PX && length(line) > 100.0)
     );
     assert!(figure.description.contains("Vmin = 2.7956"), "{}", figure.description);
 }

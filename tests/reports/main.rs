@@ -1,4 +1,4 @@
-//! Figures and pages, as files and in a browser.
+//! Tests of figures and pages, as files and in a browser.
 
 #[path = "../support/browser.rs"]
 mod browser;

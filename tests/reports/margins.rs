@@ -1,4 +1,4 @@
-//! `docs/margins.md` says what is flown: one row of it always, the whole table with `TAUTLINE_LONG=1`.
+//! Compares `docs/margins.md` with flights: one row by default, the whole table with `TAUTLINE_LONG=1`.
 
 #[path = "../support/margins.rs"]
 mod table;
@@ -8,7 +8,7 @@ const BEGIN: &str = "<!-- begin: cargo run --release --example margins -->\n";
 const END: &str = "<!-- end: cargo run --release --example margins -->\n";
 
 #[test]
-fn the_table_of_the_page_is_what_is_flown() {
+fn the_table_of_the_page_matches_flights() {
     let page = PAGE.split_once(BEGIN).and_then(|(_, rest)| rest.split_once(END)).expect("two marks").0;
     if std::env::var_os("TAUTLINE_LONG").is_some() {
         let flown = table::table();

@@ -6,8 +6,8 @@ use std::process::Command;
 
 use crate::browser::{check, open, probe};
 
-/// Flies a built-in scenario and gives the path of its page.
-fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {
+/// Flies a built-in scenario and returns the path of its page.
+fn fly(folder: &Path, arguments: &[&str]) -> PathBuf {
     let out = folder.join("run");
     let program = Command::new(env!("CARGO_BIN_EXE_tautline"))
         .arg("run")
@@ -24,7 +24,7 @@ fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {
 #[test]
 fn a_report_fits_every_screen_in_light_and_dark_and_loads_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon"]);
+    let page = fly(folder.path(), &["pentagon"]);
     check(folder.path(), &page, "pentagon", "CLEAR", 6);
 
     let picture = folder.path().join("report.png");
@@ -39,14 +39,14 @@ fn a_report_fits_every_screen_in_light_and_dark_and_loads_nothing() {
 }
 
 #[test]
-fn a_report_of_a_violation_fits_too() {
+fn a_report_of_a_violation_fits_every_screen() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon-laplacian"]);
+    let page = fly(folder.path(), &["pentagon-laplacian"]);
     check(folder.path(), &page, "pentagon-laplacian", "VIOLATION", 6);
 }
 
 #[test]
-fn pages_of_studies_fit_too() {
+fn pages_of_studies_fit_every_screen() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["pentagon", "--set", "time.duration_s=2", "--quiet", "--html"];
     let page = |name: &str, study: &[&str]| {
@@ -64,15 +64,15 @@ fn pages_of_studies_fit_too() {
 }
 
 #[test]
-fn a_page_that_is_too_wide_and_one_that_complains_are_seen() {
+fn the_check_detects_wide_pages_and_console_messages() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
+    let page = fly(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
     let html = fs::read_to_string(&page).expect("a page");
     fs::write(&page, html.replace("<footer>", "<footer><div style=\"width:900px\">wide</div>")).expect("written");
-    let (found, said) = probe(folder.path(), &page, 390, false);
+    let (found, messages) = probe(folder.path(), &page, 390, false);
     assert!(found["scroll_width"].as_u64() > Some(390), "{found}");
-    assert!(said.is_empty(), "{said:?}");
+    assert!(messages.is_empty(), "{messages:?}");
     fs::write(&page, html.replace("<footer>", "<footer><img src=\"elsewhere.png\">")).expect("written");
-    let (_, said) = probe(folder.path(), &page, 390, false);
-    assert!(said.iter().any(|line| line.contains("Content Security Policy")), "{said:?}");
+    let (_, messages) = probe(folder.path(), &page, 390, false);
+    assert!(messages.iter().any(|line| line.contains("Content Security Policy")), "{messages:?}");
 }

@@ -1,5 +1,4 @@
-//! `report.html` escapes what it is given, refers to nothing outside itself, and is the same for every run of a scenario
-//! but for its performance.
+//! `report.html`: escaped, self-contained, and equal for every run of a scenario except for the performance.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -36,12 +35,12 @@ fn hostile_page() -> Page {
     }
 }
 
-/// A page without what may look like a reference and is none.
+/// Removes parts of a page that look like references but are not.
 fn without_namespaces(html: &str) -> String {
     html.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "").replace("href=\"data:,\"", "")
 }
 
-/// A page without its script elements, and their attributes.
+/// Removes the script elements of a page; returns their attributes.
 fn without_scripts(html: &str) -> (String, Vec<String>) {
     let mut parts = html.split("<script");
     let mut plain = parts.next().unwrap_or_default().to_owned();
@@ -61,11 +60,11 @@ fn every_text_of_a_page_is_escaped() {
     }
     let escaped = html.matches("&lt;script&gt;").count();
     assert!(escaped >= 20, "{escaped} texts were found");
-    assert!(html.contains("&amp;amp;"), "an entity in a text is a text");
+    assert!(html.contains("&amp;amp;"), "an entity in a text is escaped");
 }
 
 #[test]
-fn a_table_has_headers_and_a_badge_says_in_words_what_its_colour_says() {
+fn a_table_has_headers_and_a_badge_has_words() {
     let html = hostile_page().render();
     assert!(html.contains("<th scope=\"col\"") && html.contains("<th scope=\"row\"") && html.contains("<caption>"));
     assert!(html.contains(">fail</strong>"));
@@ -84,7 +83,7 @@ fn fly(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn two_runs_give_the_same_page_and_figures_but_for_the_performance() {
+fn two_runs_give_the_same_page_except_for_the_performance() {
     let folder = tempfile::tempdir().expect("a folder");
     let flown = ["circle", "--set", "time.duration_s=20"];
     let runs = ["a", "b"].map(|name| {
@@ -102,7 +101,7 @@ fn two_runs_give_the_same_page_and_figures_but_for_the_performance() {
 }
 
 #[test]
-fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_nothing() {
+fn a_page_has_verdict_assumptions_and_command_and_is_self_contained() {
     let folder = tempfile::tempdir().expect("a folder");
     let html = fly(folder.path(), &["pentagon", "--set", "time.duration_s=2"]);
     for part in [
@@ -129,7 +128,7 @@ fn a_page_says_the_verdict_what_was_assumed_and_how_to_repeat_it_and_refers_to_n
 }
 
 #[test]
-fn figures_that_are_not_wanted_are_not_left_over() {
+fn unwanted_figures_are_removed() {
     let folder = tempfile::tempdir().expect("a folder");
     let flown = ["pentagon", "--set", "time.duration_s=1"];
     fly(folder.path(), &flown);
@@ -140,9 +139,9 @@ fn figures_that_are_not_wanted_are_not_left_over() {
 }
 
 #[test]
-fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_approach_from_near() {
+fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Alpha and bravo pass each other on ways of 100 m; charlie and delta are nearest before and after.
+    // Alpha and bravo pass each other on paths of 100 m; charlie and delta are closest before and after.
     let page = |miss_m: f64| {
         let mut table = "t,id,x,y,z\n".to_owned();
         for t in 0..=100 {
@@ -159,7 +158,7 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
     let near = page(1.5);
     let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest separation of all pairs")).expect("a figure");
     assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
-    // It is that of all, and not of one pair: 8 m but around the pass.
+    // The smallest separation of all pairs: 8 m except around the pass.
     let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());
     let line = lines.filter(|line| line.contains("#0072B2")).max_by_key(|line| line.len());
     let corners: Vec<(f64, f64)> = line
@@ -170,8 +169,8 @@ fn the_page_of_an_audit_shows_the_smallest_distance_of_all_and_the_closest_appro
         .collect();
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
     let [first, last] = [corners[0], corners[corners.len() - 1]];
-    // Of a time in which the distance stays as it is the line has the beginning alone.
+    // Of an interval with a constant separation the line has only the beginning.
     assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 10.0 && first.1 == last.1, "{corners:?}");
     let insets = |page: &str| page.matches("<svg x=").count();
-    assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "what is seen anyway has no inset");
+    assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "a visible approach has no inset");
 }

@@ -1,4 +1,4 @@
-//! Replays in a real browser: what they draw, what they say, and what the page forbids.
+//! Replays in a real browser: drawing, texts, and the restrictions of the page.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,16 +12,16 @@ use crate::replays_in_browser::{steer, steer_with};
 
 const DESKTOP: (u32, bool) = (1000, false);
 
-/// Runs the program in a folder and gives a file that it leaves there.
-fn left(folder: &Path, arguments: &[&str], file: &str) -> PathBuf {
+/// Runs the program in a folder and returns the path of a file that it writes.
+fn run_program(folder: &Path, arguments: &[&str], file: &str) -> PathBuf {
     let program = Command::new(env!("CARGO_BIN_EXE_tautline")).args(arguments).current_dir(folder).output();
     let program = program.expect("the program runs");
     assert!(program.status.code() <= Some(1), "{}", String::from_utf8_lossy(&program.stderr));
     folder.join(file)
 }
 
-fn flown(folder: &Path, arguments: &[&str]) -> PathBuf {
-    left(folder, &[&["run", "--quiet", "--out", "run"], arguments].concat(), "run/report.html")
+fn fly(folder: &Path, arguments: &[&str]) -> PathBuf {
+    run_program(folder, &[&["run", "--quiet", "--out", "run"], arguments].concat(), "run/report.html")
 }
 
 fn text(value: &Value) -> &str {
@@ -29,7 +29,7 @@ fn text(value: &Value) -> &str {
 }
 
 #[test]
-fn the_script_keeps_its_types() {
+fn the_script_passes_the_type_check() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let check = |file: &Path| {
         let compiler = root.join("target/typescript/node_modules/.bin/tsc");
@@ -50,13 +50,13 @@ fn the_script_keeps_its_types() {
     let wrong = folder.path().join("wrong.js");
     let source = fs::read_to_string(&script).expect("a script");
     fs::write(&wrong, source.replacen("const first = times[0]", "const first = `${times[0]}`", 1)).expect("written");
-    assert!(!check(&wrong).0, "a text for a number is seen");
+    assert!(!check(&wrong).0, "a wrong type is detected");
 }
 
 #[test]
-fn a_replay_draws_and_jumps_to_what_the_judge_found() {
+fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon-laplacian", "--set", "time.duration_s=10"]);
+    let page = fly(folder.path(), &["pentagon-laplacian", "--set", "time.duration_s=10"]);
     let report = fs::read_to_string(folder.path().join("run/report.json")).expect("a report");
     let report: Value = serde_json::from_str(&report).expect("JSON");
     let (found, said) = steer(
@@ -64,7 +64,8 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
         &page,
         DESKTOP,
         "const words = name => doc.querySelector('.replay-' + name).textContent;
-         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+           willReadFrequently: true });
          [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
          const colours = () => {
            root.player.draw(); pen.drawImage(view, 0, 0);
@@ -98,7 +99,7 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
         text(&found["closest"]["state"]).starts_with("violation: 4 and 5 come to 1.532 m (limit 2.000) · closest so far"),
         "{found}"
     );
-    assert!(found["reds"].as_u64() > Some(20), "who is too near is red: {found}");
+    assert!(found["reds"].as_u64() > Some(20), "vehicles in violation are red: {found}");
     assert!(text(&found["violation"]["said"]).starts_with("Violation: 4 and 5 came to 1.532 m (limit 2.000) at"));
     assert!(
         text(&found["end"]["state"]).starts_with("1 violation so far · closest so far 1.532 m, 4 and 5 · "),
@@ -108,30 +109,37 @@ fn a_replay_draws_and_jumps_to_what_the_judge_found() {
     assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
 }
 
-/// The outline of a ball at a corner of the picture is an ellipse: every pixel that is not on its edge is judged by the ray
+/// The outline of a ball at a corner of the picture is an ellipse: every pixel off its edge is compared with the ray
 /// through it.
 #[test]
-fn a_ball_is_right_to_the_pixel_wherever_it_is_seen() {
+fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Two that are never there together: one ball of 0.5 m is drawn, and nothing between two.
+    // Two vehicles that are never present together: one ball of 0.5 m is drawn, and no pair.
     let table = "t,id,x,y,z\n0,a,0,0,0\n1,a,0,0,0\n5,b,4,0,0\n6,b,4,0,0\n";
     fs::write(folder.path().join("two.csv"), table).expect("written");
-    let page =
-        left(folder.path(), &["audit", "two.csv", "--radius", "0.5", "--quiet", "--html", "two.html"], "two.html");
-    let script = "for (const box of doc.querySelectorAll('input[type=checkbox]')) { box.checked = false; box.dispatchEvent(new win.Event('change')); }
-         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+    let page = run_program(
+        folder.path(),
+        &["audit", "two.csv", "--radius", "0.5", "--quiet", "--html", "two.html"],
+        "two.html",
+    );
+    let script = "for (const box of doc.querySelectorAll('input[type=checkbox]')) { box.checked = false;
+      box.dispatchEvent(new win.Event('change')); }
+         const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+           willReadFrequently: true });
          [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
          const shots = [];
-         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4, [-0.5, 0.7, 0.8]]]) {
+         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4,
+           [-0.5, 0.7, 0.8]]]) {
            const camera = root.player.look({ yaw, pitch, distance, target, t: 0.5 });
            pen.drawImage(view, 0, 0);
            const all = pen.getImageData(0, 0, view.width, view.height).data, corner = all.slice(0, 3);
            let wrong = 0, inside = 0, edge = 0;
            for (let y = 0; y < view.height; y++) for (let x = 0; x < view.width; x++) {
-             // Four rays half a pixel around the middle, and a margin for the edge's shading.
+             // Four rays half a pixel around the centre, with a margin for the shading of the edge.
              const hits = new Set();
              for (const [dx, dy] of [[0.5, 0.5], [-0.4, -0.4], [1.4, -0.4], [-0.4, 1.4], [1.4, 1.4]]) {
-               const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height, v = (1 - (y + dy) / view.height * 2) * camera.tangent;
+               const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height,
+                 v = (1 - (y + dy) / view.height * 2) * camera.tangent;
                const ray = [0, 1, 2].map(k => camera.right[k] * u + camera.up[k] * v - camera.back[k]);
                hits.add([0].some(ball => {
                  const at = camera.place(ball), to = [0, 1, 2].map(k => at[k] - camera.eye[k]);
@@ -153,23 +161,26 @@ fn a_ball_is_right_to_the_pixel_wherever_it_is_seen() {
         assert_eq!(shot["wrong"], 0, "{found}");
     }
     let (twin, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.53"));
-    assert!(twin[0]["wrong"].as_u64() > Some(50), "a ball of another size is seen: {twin}");
+    assert!(twin[0]["wrong"].as_u64() > Some(50), "a ball of another size is detected: {twin}");
 }
 
 #[test]
-fn it_fits_a_phone_in_light_and_dark_and_within_a_sandbox() {
+fn a_replay_fits_a_phone_in_light_and_dark_and_runs_in_a_sandbox() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=3"]);
+    let page = fly(folder.path(), &["pentagon", "--set", "time.duration_s=3"]);
     for dark in [false, true] {
         let (found, said) = steer(
             folder.path(),
             &page,
             (360, dark),
-            "const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', { willReadFrequently: true });
+            "const view = doc.querySelector('.replay-view'), pen = doc.createElement('canvas').getContext('2d', {
+              willReadFrequently: true });
              root.player.draw(); pen.drawImage(view, 0, 0);
-             const sticking = [...doc.querySelectorAll('.replay *')].filter(e => e.getBoundingClientRect().right > win.innerWidth + 8.5).length;
+             const sticking = [...doc.querySelectorAll('.replay *')].filter(e =>
+               e.getBoundingClientRect().right > win.innerWidth + 8.5).length;
              return { wide: doc.documentElement.scrollWidth, sticking, paper: pen.getImageData(3, 60, 1, 1).data[0],
-               named: [...doc.querySelectorAll('.replay button, .replay select, .replay input, .replay-view')].every(e =>
+               named: [...doc.querySelectorAll(
+                 '.replay button, .replay select, .replay input, .replay-view')].every(e =>
                  e.textContent.trim() || e.getAttribute('aria-label') || e.closest('label')) };",
         );
         assert!(said.is_empty(), "{said:?}");
@@ -177,7 +188,7 @@ fn it_fits_a_phone_in_light_and_dark_and_within_a_sandbox() {
         assert_eq!(found["paper"].as_u64() < Some(60), dark, "{found}");
         assert_eq!(found["named"], true, "everything has a name");
     }
-    // Neither the origin of the page nor its frame is needed: the script says that it is ready by what it shows.
+    // In a sandbox the script needs neither the origin of the page nor its frame.
     let html = fs::read_to_string(&page).expect("a page");
     let outer = folder.path().join("outer.html");
     let inner = html.replace('&', "&amp;").replace('"', "&quot;");
@@ -193,16 +204,20 @@ fn it_fits_a_phone_in_light_and_dark_and_within_a_sandbox() {
     let without = fs::read_to_string(&outer).expect("a page").replace("allow-scripts", "allow-forms");
     fs::write(&outer, without).expect("written");
     let (_, said) = steer(folder.path(), &outer, DESKTOP, "return {};");
-    assert!(said.iter().any(|line| line.contains("Blocked script execution")), "what does not run is seen: {said:?}");
+    assert!(
+        said.iter().any(|line| line.contains("Blocked script execution")),
+        "a blocked script is detected: {said:?}"
+    );
 }
 
 #[test]
-fn no_other_script_runs_and_without_webgl_the_page_says_so() {
+fn only_the_replay_script_runs_and_missing_webgl_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
+    let page = fly(folder.path(), &["pentagon", "--set", "time.duration_s=1"]);
     let html = fs::read_to_string(&page).expect("a page");
     assert_eq!(html.matches("script-src 'sha256-").count() + html.matches("script-src &#39;sha256-").count(), 1);
-    let state = "return { state: root.dataset.state ?? 'none yet', none: doc.querySelector('.replay-none')?.textContent ?? '', ran: win.ran ?? false };";
+    let state = "return { state: root.dataset.state ?? 'none yet',
+      none: doc.querySelector('.replay-none')?.textContent ?? '', ran: win.ran ?? false };";
     let (found, said) = steer(folder.path(), &page, DESKTOP, state);
     assert!(said.is_empty() && found["state"] == "ready" && found["ran"] == false, "{found} {said:?}");
     fs::write(&page, html.replace("<footer>", "<script>window.ran = true;</script><footer>")).expect("written");
@@ -215,14 +230,14 @@ fn no_other_script_runs_and_without_webgl_the_page_says_so() {
     let (found, said) = steer_with(folder.path(), &page, DESKTOP, &WITHOUT_WEBGL, state);
     assert!(found["state"] == "none" && said.is_empty(), "{found} {said:?}");
     assert!(text(&found["none"]).contains("does not draw WebGL 2: there is no replay"), "{found}");
-    // One letter of the script changed, and it does not run.
+    // A changed script does not run.
     fs::write(&page, html.replace("const ABSENT", "const  ABSENT")).expect("written");
     let (found, _) = steer(folder.path(), &page, DESKTOP, state);
     assert_eq!(found["state"], "none yet");
 }
 
 #[test]
-fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
+fn names_are_escaped_and_absent_vehicles_are_not_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut table = "t,id,x,y,z\n".to_owned();
     for t in 0..=20 {
@@ -232,13 +247,17 @@ fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
         }
     }
     fs::write(folder.path().join("names.csv"), table).expect("written");
-    let page =
-        left(folder.path(), &["audit", "names.csv", "--delta", "1", "--quiet", "--html", "names.html"], "names.html");
+    let page = run_program(
+        folder.path(),
+        &["audit", "names.csv", "--delta", "1", "--quiet", "--html", "names.html"],
+        "names.html",
+    );
     let (found, said) = steer(
         folder.path(),
         &page,
         DESKTOP,
-        "const there = t => { const { place } = root.player.look({ yaw: 0, pitch: 0.5, distance: 30, target: [0, 0, 0], t }); return [0, 1].map(k => place(k)[3]); };
+        "const there = t => { const { place } = root.player.look({
+          yaw: 0, pitch: 0.5, distance: 30, target: [0, 0, 0], t }); return [0, 1].map(k => place(k)[3]); };
          return { there: [2, 5.5, 10, 16].map(there), state: doc.querySelector('.replay-state').textContent,
            images: doc.querySelectorAll('img, b').length, ran: win.ran ?? 0 };",
     );
@@ -251,11 +270,12 @@ fn names_are_text_and_vehicles_that_are_not_there_are_not_drawn() {
     );
 }
 
-/// Steers an audit's page to some times, and gives what it says at each.
+/// Moves the replay of an audit to some times, and returns the state text at each.
 fn states(folder: &Path, page: &Path, times_s: &[f64]) -> Vec<String> {
     let script = format!(
         "const scrub = doc.querySelector('input[type=range]');
-         return {times_s:?}.map(t => {{ scrub.value = t; scrub.oninput(); root.player.draw(); return doc.querySelector('.replay-state').textContent; }});"
+         return {times_s:?}.map(t => {{ scrub.value = t; scrub.oninput(); root.player.draw();
+           return doc.querySelector('.replay-state').textContent; }});"
     );
     let (found, said) = steer(folder, page, DESKTOP, &script);
     assert!(said.is_empty(), "{said:?}");
@@ -265,11 +285,11 @@ fn states(folder: &Path, page: &Path, times_s: &[f64]) -> Vec<String> {
 
 fn audited(folder: &Path, table: &str, more: &[&str]) -> PathBuf {
     fs::write(folder.join("said.csv"), table).expect("written");
-    left(folder, &[&["audit", "said.csv", "--quiet", "--html", "said.html"], more].concat(), "said.html")
+    run_program(folder, &[&["audit", "said.csv", "--quiet", "--html", "said.html"], more].concat(), "said.html")
 }
 
 #[test]
-fn at_no_time_is_more_said_than_the_judge_knows_by_then() {
+fn the_state_shows_only_findings_up_to_the_current_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut gap, mut leap) = ("t,id,x,y,z\n".to_owned(), "t,id,x,y,z\n".to_owned());
     for t in 0..=20_i32 {
@@ -296,25 +316,25 @@ fn at_no_time_is_more_said_than_the_judge_knows_by_then() {
         "violation: a and b come to 0.250 m (limit 1.000) · closest so far 0.250 m, a and b",
     ];
     assert_eq!(found, expected);
-    // Between two samples of a bounded acceleration a distance is at least something.
+    // Under a bounded acceleration the separation between two samples has a lower bound.
     let bounds = ["--delta", "1", "--motion", "bounded", "--max-accel", "300"];
     let found = states(folder.path(), &audited(folder.path(), &leap, &bounds), &[10.5]);
     assert!(
         found[0].starts_with("undecided: a and b may come too close · closest known so far at least 0.000 m"),
         "{found:?}"
     );
-    // Of single vehicles alone nothing is said of distances.
+    // With limits on single vehicles only, no separation is shown.
     let found = states(folder.path(), &audited(folder.path(), &leap, &["--limit", "speed=5"]), &[5.0, 19.5]);
     assert_eq!(found, ["no violation so far", "violation: b: speed 19.750 m/s (limit 5.000 m/s)"]);
 }
 
-/// What a run recorded itself of the time between its samples counts in its audit.
+/// The audit of a run uses the separations that the run recorded between samples.
 #[test]
-fn the_nearest_of_an_audited_run_is_that_of_the_verdict() {
+fn the_smallest_separation_of_an_audited_run_matches_the_verdict() {
     let folder = tempfile::tempdir().expect("a folder");
     let sets = ["--set", "time.duration_s=10", "--set", "time.record_hz=1", "--set", "arrival.hold_s=2"];
-    flown(folder.path(), &[&["pentagon-laplacian"], &sets[..]].concat());
-    let page = left(folder.path(), &["audit", "run", "--quiet", "--html", "run.html"], "run.html");
+    fly(folder.path(), &[&["pentagon-laplacian"], &sets[..]].concat());
+    let page = run_program(folder.path(), &["audit", "run", "--quiet", "--html", "run.html"], "run.html");
     let found = states(folder.path(), &page, &[10.0]);
     let (said, verdict) = (&found[0], fs::read_to_string(&page).expect("a page"));
     assert!(verdict.contains("came to 1.533 m (limit 2.000 m)") || verdict.contains("came to 1.532"), "the verdict");
@@ -322,27 +342,32 @@ fn the_nearest_of_an_audited_run_is_that_of_the_verdict() {
 }
 
 #[test]
-fn a_lost_picture_a_hidden_page_and_a_finger_that_scrolls_leave_nothing_wrong() {
+fn a_replay_recovers_from_lost_graphics_hidden_pages_and_scrolling() {
     let folder = tempfile::tempdir().expect("a folder");
-    let page = flown(folder.path(), &["pentagon", "--set", "time.duration_s=9"]);
+    let page = fly(folder.path(), &["pentagon", "--set", "time.duration_s=9"]);
     let (found, said) = steer(
         folder.path(),
         &page,
         DESKTOP,
-        "const view = doc.querySelector('.replay-view'), picture = () => { root.player.draw(); return view.toDataURL(); };
-         const point = (name, at) => view.dispatchEvent(new win.PointerEvent('pointer' + name, { pointerId: 1, clientX: at, clientY: at }));
+        "const view = doc.querySelector('.replay-view'), picture = () => { root.player.draw();
+          return view.toDataURL(); };
+         const point = (name, at) => view.dispatchEvent(new win.PointerEvent('pointer' + name, {
+           pointerId: 1, clientX: at, clientY: at }));
          view.setPointerCapture = () => {};
-         const still = picture(); point('down', 100); point('move', 160); const turned = picture(); point('cancel', 160);
+         const still = picture(); point('down', 100); point('move', 160); const turned = picture();
+           point('cancel', 160);
          const touch = [still !== turned, still === picture()];
          view.dispatchEvent(new win.Event('webglcontextlost'));
-         const lost = { state: root.dataset.state, none: doc.querySelector('.replay-none').textContent, panel: doc.querySelectorAll('.replay-panel').length };
+         const lost = { state: root.dataset.state, none: doc.querySelector('.replay-none').textContent,
+           panel: doc.querySelectorAll('.replay-panel').length };
          const start = doc.querySelector('.replay-start'); lost.label = start.getAttribute('aria-label');
          let next = () => {}; win.requestAnimationFrame = draw => { next = draw; return 1; };
          start.click();
          doc.querySelector('.replay-play').click();
          [1000, 1020, 9020].forEach(now => next(now));
          const clock = doc.querySelector('.replay-clock').textContent;
-         return { touch, clock, lost, again: root.dataset.state, left: doc.querySelectorAll('.replay-none, .replay-start').length };",
+         return { touch, clock, lost, again: root.dataset.state,
+           left: doc.querySelectorAll('.replay-none, .replay-start').length };",
     );
     assert!(said.is_empty(), "{said:?}");
     assert_eq!(found["touch"], serde_json::json!([true, true]), "{found}");

@@ -1,4 +1,4 @@
-//! Large swarms: what is looked at, kept and recorded grows with the number of vehicles, and not with that of pairs.
+//! Large swarms: the work, memory and size of recordings grow with the number of vehicles, not of pairs.
 
 use std::ops::ControlFlow;
 
@@ -10,9 +10,9 @@ use tautline::preflight::Preflight;
 use tautline::run::run_while;
 use tautline::scenario::{Scenario, Source};
 
-const MANY: usize = 10_000;
+const MANY_VEHICLES: usize = 10_000;
 
-/// A grid of 2 m that contracts to 1.6 m, as large as `count`, for a few steps.
+/// Returns a scenario with a grid of `count` vehicles that contracts from 2 m to 1.6 m over a few steps.
 fn grid(count: usize, more: &str) -> String {
     format!(
         "name = \"grid\"\nswarm.count = {count}\nstart = {{ shape = \"grid\", spacing_m = 2.0 }}\n\
@@ -22,7 +22,8 @@ fn grid(count: usize, more: &str) -> String {
 }
 
 const ALL: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\n";
-const LED: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\ngraph.kind = \"star\"\nreference = { kind = \"rest\", leader = 1 }\n";
+const LED: &str = "law = { kind = \"displacement\", delta_m = 1.0 }\ngraph.kind = \"star\"\n\
+                   reference = { kind = \"rest\", leader = 1 }\n";
 
 fn read(toml: &str) -> Scenario {
     let source = Source::Text { name: "test".to_owned(), text: toml.to_owned() };
@@ -30,10 +31,10 @@ fn read(toml: &str) -> Scenario {
 }
 
 #[test]
-fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehicle() {
+fn a_large_swarm_sweeps_near_pairs_and_records_vehicles() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, more) in [("all", ALL), ("led", LED)] {
-        let scenario = read(&grid(MANY, more));
+        let scenario = read(&grid(MANY_VEHICLES, more));
         let preflight = Preflight::of(&scenario).expect("a law");
         let path = folder.path().join(name);
         let header = Header::new(name, "", scenario.count(), scenario.delta_m);
@@ -46,12 +47,12 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
         };
         let report = threads.install(fly).expect("a flight");
         assert_eq!((report.audit.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
-        // Four neighbours each at 2 m, and four at 2.83 m.
-        let swept = report.audit.pairs_checked as f64 / (4 * MANY) as f64;
+        // Four neighbours at 2 m, and four at 2.83 m.
+        let swept = report.audit.pairs_checked as f64 / (4 * MANY_VEHICLES) as f64;
         assert!((2.0..=8.0).contains(&swept), "{name}: {swept} pairs a vehicle and step");
         recorder.finish().expect("written");
         let (bytes, numbers) = (std::fs::metadata(&path).expect("written").len(), preflight.recording_bytes);
-        assert_eq!((preflight.samples, numbers), (3, 3 * 72 * MANY as u64));
+        assert_eq!((preflight.samples, numbers), (3, 3 * 72 * MANY_VEHICLES as u64));
         assert!((numbers..numbers + 8192).contains(&bytes), "{name}: {bytes} for {numbers}");
 
         let shape = Some((&scenario.legs[..], &scenario.graph));
@@ -71,7 +72,7 @@ fn many_vehicles_are_judged_by_those_that_are_near_and_recorded_vehicle_by_vehic
 }
 
 #[test]
-fn a_law_without_numbers_of_edges_takes_no_memory_for_those_of_a_complete_graph() {
+fn a_law_without_edge_data_needs_no_memory_for_a_complete_graph() {
     let scenario = read(&grid(40_000, ALL));
     assert_eq!(scenario.graph.edge_count(), 799_980_000);
     scenario.validate().expect("the same answer");
@@ -81,7 +82,7 @@ fn a_law_without_numbers_of_edges_takes_no_memory_for_those_of_a_complete_graph(
 }
 
 #[test]
-fn what_is_recorded_of_many_vehicles_is_bounded_unless_a_rate_is_given() {
+fn the_recording_of_a_large_swarm_is_bounded_without_a_rate() {
     let of = |count: usize, time: &str| {
         let text = grid(count, ALL).replace("duration_s = 0.0125, record_hz = 120", time);
         let preflight = Preflight::of(&read(&text.replace("hold_s = 0.01", "hold_s = 1.0"))).expect("a law");
@@ -93,7 +94,7 @@ fn what_is_recorded_of_many_vehicles_is_bounded_unless_a_rate_is_given() {
 }
 
 #[test]
-fn the_steps_that_a_star_asks_for_are_told_and_a_leader_in_its_middle_asks_for_none() {
+fn a_star_limits_the_step_unless_its_centre_is_the_leader() {
     let star = format!("{ALL}graph.kind = \"star\"\n");
     let told = |more: &str| Preflight::of(&read(&grid(1000, more))).expect("a law").text();
     let said = told(&star);

@@ -1,5 +1,4 @@
-//! `docs/validation.md` says what `tautline validate` measures, every claim comes out as expected, and the page that it
-//! leaves can be read on any screen.
+//! Compares `docs/validation.md` with `tautline validate`, whose claims must all pass, and opens its page in a browser.
 
 use std::fs;
 use std::process::Command;
@@ -10,12 +9,12 @@ const PAGE: &str = include_str!("../../docs/validation.md");
 const BEGIN: &str = "<!-- begin: tautline validate --markdown -->\n";
 const END: &str = "<!-- end: tautline validate --markdown -->\n";
 
-/// The part of the page between the marks.
+/// Returns the part of the page between the marks.
 fn generated(page: &str) -> Option<&str> {
     page.split_once(BEGIN)?.1.split_once(END).map(|(part, _)| part)
 }
 
-/// The lines of which one text has more than the other.
+/// Returns the lines in which the texts differ.
 fn differences(page: &str, program: &str) -> String {
     let only = |mark: &str, here: &str, there: &str| {
         let lines = here.lines().filter(|line| !there.lines().any(|other| other == *line));
@@ -26,7 +25,7 @@ fn differences(page: &str, program: &str) -> String {
 
 #[test]
 #[ignore = "minutes: sh tests/run.sh --long"]
-fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
+fn the_page_matches_the_program_and_every_claim_passes() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| {
         Command::new(env!("CARGO_BIN_EXE_tautline")).arg("validate").args(arguments).current_dir(folder.path()).output()
@@ -66,7 +65,7 @@ fn the_page_says_what_the_program_measures_and_every_claim_is_as_expected() {
 }
 
 #[test]
-fn a_page_with_another_number_is_noticed() {
+fn a_different_number_on_the_page_is_detected() {
     let page = "a\nthe error is 1e-9 m\nb\n";
     let program = "a\nthe error is 2e-9 m\nb\n";
     let seen = differences(page, program);

@@ -1,4 +1,4 @@
-//! Pictures and films, by the library and by the program.
+//! Tests of pictures and films, by the library and by the program.
 
 #[path = "../support/program.rs"]
 mod program;

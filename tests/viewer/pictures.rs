@@ -1,6 +1,6 @@
-//! What is drawn is what is there: sizes true to the metre, colours true, what is in front hides what is behind.
+//! Rendering: sizes, colours, occlusion, and comparison with reference pictures.
 //!
-//! Needs a graphics adapter, or a driver in software; `tests/run.sh` installs one.
+//! Needs a graphics adapter, or a software driver; `tests/run.sh` installs one.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use tautline::render::{AdapterChoice, Layers, Picture, RenderError, Scene, Theme
 use tautline::scenario::{Scenario, Source};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
-/// Adapters round differently at edges; a picture that looks the same has a mean FLIP below this. Five small balls that
-/// move by a part of their width give 0.005 (see the negative twin).
-const FLIP_CEILING: f32 = 0.003;
+/// Largest mean FLIP of two pictures that look the same; adapters round differently at edges. Five small balls that
+/// move by a part of their width give 0.005 (see `a_moved_vehicle_changes_the_picture`).
+const MAX_FLIP: f32 = 0.003;
 
 fn renderer() -> Renderer {
     Renderer::open(&AdapterChoice::Best)
@@ -27,7 +27,7 @@ const WHITE: Colour = Colour::hex(0xFF_FF_FF);
 const RED: Colour = Colour::hex(0xC0_00_00);
 const SIZE: [u32; 2] = [301, 201];
 
-/// A scene seen from +x, 10 m away, y to the right.
+/// Returns a scene seen from +x, 10 m away, y to the right.
 fn scene(lens: Option<f64>, balls: &[Ball]) -> Scene {
     let orbit = Orbit { azimuth_deg: 0.0, elevation_deg: 0.0, distance_m: 10.0 };
     let mut camera = Camera::orbiting(orbit, Vector3::zeros(), SIZE);
@@ -55,8 +55,7 @@ fn is_background(pixel: [u8; 4]) -> bool {
     pixel == BACKGROUND.rgba
 }
 
-/// The area of everything that is not background \[pixels\], edges counted by how much they are covered: brightness of a
-/// white ball does not matter, whether a pixel is background does.
+/// Returns the bounding box of all pixels that differ from the background: left, right, top, bottom.
 fn extent(picture: &Picture) -> [u32; 4] {
     let mut extent = [u32::MAX, 0, u32::MAX, 0];
     for y in 0..picture.size_px[1] {
@@ -77,7 +76,7 @@ fn the_background_is_exactly_its_colour() {
 }
 
 #[test]
-fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
+fn a_ball_has_the_width_of_its_radius() {
     let mut renderer = renderer();
     let tangent = (35.0_f64 / 2.0).to_radians().tan();
     for radius_m in [0.05_f32, 0.25, 1.0, 2.5] {
@@ -88,7 +87,7 @@ fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
             let picture = renderer.paint(&scene(lens, &[ball([0.0; 3], radius_m, WHITE)])).expect("a picture");
             let [left, right, top, bottom] = extent(&picture).map(f64::from);
             for width in [right - left + 1.0, bottom - top + 1.0] {
-                // A pixel at each end is touched or not.
+                // A pixel at each end may be touched or not.
                 let slack = width - 2.0 * expected_px;
                 assert!((-0.6..=2.0).contains(&slack), "{radius_m} m: {width} pixels, expected {}", 2.0 * expected_px);
             }
@@ -98,7 +97,7 @@ fn a_ball_is_as_many_pixels_wide_as_its_radius_asks_for() {
 }
 
 #[test]
-fn a_shell_is_as_high_as_its_ratio_asks_for_and_as_wide_as_before() {
+fn the_ratio_scales_only_the_height_of_a_shell() {
     let mut renderer = renderer();
     for (ratio, lens, radius_m) in [(1.0_f32, 3.0, 1.0_f32), (2.5, 3.0, 1.0), (0.4, 3.0, 2.0)] {
         let mut scene = scene(Some(lens), &[]);
@@ -123,11 +122,11 @@ fn balls_behind_the_camera_are_not_drawn() {
 }
 
 #[test]
-fn a_ball_is_left_out_only_where_all_of_it_is_beside_the_picture() {
+fn a_ball_is_omitted_only_if_it_is_outside_the_picture() {
     let mut renderer = renderer();
     let tangent = (35.0_f64 / 2.0).to_radians().tan();
     let (across, up) = (10.0 * tangent * 301.0 / 201.0, 10.0 * tangent);
-    // Beyond the edge by less than the radius, and by more; beside the camera, where rays are steep, and far ahead.
+    // Beyond the edge by less and by more than the radius.
     for (beyond_m, is_seen) in [(0.4, true), (0.6, false)] {
         for (y, z) in [(across + beyond_m, 0.0), (-across - beyond_m, 0.0), (0.0, up + beyond_m), (0.0, -up - beyond_m)]
         {
@@ -145,9 +144,9 @@ fn a_ball_is_left_out_only_where_all_of_it_is_beside_the_picture() {
 }
 
 #[test]
-fn of_two_lines_on_one_another_the_later_one_is_seen_whole() {
+fn a_later_line_covers_an_earlier_one() {
     let mut crossed = scene(None, &[]);
-    // Along the line of sight's slant, so that their depths are alike only up to rounding.
+    // Along a slanted line of sight, so that the depths agree only up to rounding.
     let ends_m = [[-5.0, -2.0, -0.3], [5.0, 2.0, 0.3]];
     crossed.lines.push(Line { ends_m, colours: [WHITE; 2], width_px: 2.0 });
     let under = extent(&renderer().paint(&crossed).expect("a picture"));
@@ -157,7 +156,7 @@ fn of_two_lines_on_one_another_the_later_one_is_seen_whole() {
 }
 
 #[test]
-fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
+fn a_close_up_in_a_flight_of_thirty_kilometres_shows_edges() {
     let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
     let mut timeline = Timeline::of(&scenario);
     let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
@@ -175,14 +174,13 @@ fn a_camera_in_a_flight_of_thirty_kilometres_sees_what_is_before_it() {
     let with = renderer.shoot(&timeline, 0.0, &view).expect("a picture");
     let without = renderer.shoot(&timeline, 0.0, &View { layers: Layers::NONE, ..view }).expect("a picture");
     let (difference, _) = flip(&without, &with);
-    assert!(difference > FLIP_CEILING, "the edges are missing: {difference}");
+    assert!(difference > MAX_FLIP, "the edges are missing: {difference}");
 }
 
 #[test]
 fn the_edge_of_a_ball_is_smooth() {
     let picture = renderer().paint(&scene(Some(3.0), &[ball([0.0; 3], 1.0, WHITE)])).expect("a picture");
-    // Covered pixels, each by its part, add up to the area of the disc. A ball without light is as dark as its shadow
-    // side, so parts are read against a flat one: a pixel is covered by a quarter, a half, three quarters or whole.
+    // An edge pixel is a mixture of ball and background, in quarters of its coverage.
     let half_covered = picture
         .rgba
         .chunks_exact(4)
@@ -192,7 +190,7 @@ fn the_edge_of_a_ball_is_smooth() {
 }
 
 #[test]
-fn a_ball_in_front_hides_the_one_behind_in_whatever_order_they_come() {
+fn a_ball_in_front_hides_one_behind_in_any_order() {
     let mut renderer = renderer();
     let front = ball([2.0, 0.0, 0.0], 0.5, RED);
     let behind = ball([-2.0, 0.0, 0.0], 0.5, WHITE);
@@ -201,14 +199,14 @@ fn a_ball_in_front_hides_the_one_behind_in_whatever_order_they_come() {
         let [red, green, _, _] = picture.pixel(150, 100).expect("inside");
         assert!(red > 90 && green < 60, "the middle is red");
         let no_white = picture.rgba.chunks_exact(4).all(|pixel| pixel[1] < 200);
-        assert!(no_white, "nothing of the white one is left");
+        assert!(no_white, "the white ball is hidden");
     }
     let beside = renderer.paint(&scene(Some(3.0), &[front, ball([-2.0, 1.5, 0.0], 0.5, WHITE)])).expect("a picture");
-    assert!(beside.rgba.chunks_exact(4).any(|pixel| pixel[1] > 200), "beside it, it is seen");
+    assert!(beside.rgba.chunks_exact(4).any(|pixel| pixel[1] > 200), "beside the red ball the white one is visible");
 }
 
 #[test]
-fn a_shell_lets_through_what_is_within_and_the_camera_may_be_inside() {
+fn a_shell_is_transparent_and_may_contain_the_camera() {
     let mut renderer = renderer();
     let mut inside = scene(Some(3.0), &[ball([0.0; 3], 0.5, RED)]);
     let bare = renderer.paint(&inside).expect("a picture");
@@ -219,11 +217,14 @@ fn a_shell_lets_through_what_is_within_and_the_camera_may_be_inside() {
     let mut within = scene(None, &[]);
     within.shells.push(ball([10.0, 0.0, 0.0], 2.0, WHITE.at(0.5)));
     let picture = renderer.paint(&within).expect("a picture");
-    assert!(picture.rgba.chunks_exact(4).all(|pixel| !is_background(pixel.try_into().expect("four"))), "all around");
+    assert!(
+        picture.rgba.chunks_exact(4).all(|pixel| !is_background(pixel.try_into().expect("four"))),
+        "the shell covers the whole picture"
+    );
 }
 
 #[test]
-fn a_line_has_the_width_and_colour_that_it_asks_for() {
+fn a_line_has_its_width_and_colour() {
     let mut picture = scene(Some(3.0), &[]);
     let ends_m = [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
     picture.lines.push(Line { ends_m, colours: [RED; 2], width_px: 6.0 });
@@ -234,13 +235,13 @@ fn a_line_has_the_width_and_colour_that_it_asks_for() {
 }
 
 #[test]
-fn frames_repeat_bit_for_bit_even_on_another_renderer() {
+fn frames_are_identical_on_every_renderer() {
     let timeline = crossing();
     let shoot = |renderer: &mut Renderer| renderer.shoot(&timeline, 2.0, &small()).expect("a picture");
     let (mut first, mut second) = (renderer(), renderer());
     let once = shoot(&mut first);
     assert!(once == shoot(&mut first) && once == shoot(&mut second));
-    assert!(once != first.shoot(&timeline, 2.1, &small()).expect("a picture"), "another time is another picture");
+    assert!(once != first.shoot(&timeline, 2.1, &small()).expect("a picture"), "pictures at two times differ");
 }
 
 #[test]
@@ -258,7 +259,7 @@ fn a_size_that_cannot_be_drawn_is_refused() {
     assert!(matches!(none, Some(RenderError::NoSuchAdapter(_))), "{none:?}");
 }
 
-/// Three vehicles pass each other; two of them come too close from 2 s to 3 s.
+/// Returns vehicles that pass each other; two of them are too close from 2 s to 3 s.
 fn crossing() -> Timeline {
     let scenario = Scenario::read(&Source::Builtin("pentagon-laplacian".to_owned()), &[]).expect("built in");
     let mut timeline = Timeline::of(&scenario);
@@ -282,7 +283,7 @@ fn small() -> View {
     View { size_px: [320, 180], ..View::default() }
 }
 
-fn golden_folder() -> PathBuf {
+fn reference_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures")
 }
 
@@ -300,7 +301,7 @@ fn flip_image(picture: &Picture) -> nv_flip::FlipImageRgb8 {
     nv_flip::FlipImageRgb8::with_data(picture.size_px[0], picture.size_px[1], &rgb)
 }
 
-/// Mean FLIP of two pictures, from 0 to 1, and where they differ.
+/// Returns the mean FLIP of two pictures, from 0 to 1, and a map of their differences.
 fn flip(expected: &Picture, actual: &Picture) -> (f32, Picture) {
     let map = nv_flip::flip(flip_image(expected), flip_image(actual), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
     let mean = nv_flip::FlipPool::from_image(&map).mean();
@@ -309,18 +310,18 @@ fn flip(expected: &Picture, actual: &Picture) -> (f32, Picture) {
     (mean, Picture { size_px: actual.size_px, rgba })
 }
 
-/// Compares with `tests/pictures/NAME.png`; leaves the actual picture and the difference in the target folder when they
-/// look different. `UPDATE_PICTURES=1` keeps what is drawn now.
-fn looks_like(name: &str, actual: &Picture) {
-    let path = golden_folder().join(format!("{name}.png"));
+/// Compares with `tests/pictures/NAME.png`. If the pictures differ, writes the actual picture and the difference to the
+/// target folder. `UPDATE_PICTURES=1` overwrites the reference.
+fn assert_looks_like(name: &str, actual: &Picture) {
+    let path = reference_folder().join(format!("{name}.png"));
     if std::env::var_os("UPDATE_PICTURES").is_some() {
-        fs::create_dir_all(golden_folder()).expect("a folder");
+        fs::create_dir_all(reference_folder()).expect("a folder");
         fs::write(&path, actual.to_png().expect("a PNG")).expect("written");
     }
     let expected = read_png(&path);
     assert_eq!(expected.size_px, actual.size_px, "{name}");
     let (mean, difference) = flip(&expected, actual);
-    if mean > FLIP_CEILING {
+    if mean > MAX_FLIP {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
         let write = |suffix: &str, picture: &Picture| {
             let path = folder.join(format!("{name}-{suffix}.png"));
@@ -328,15 +329,15 @@ fn looks_like(name: &str, actual: &Picture) {
             path
         };
         let (actual, difference) = (write("actual", actual), write("difference", &difference));
-        panic!("{name}: mean FLIP {mean} above {FLIP_CEILING}: see {} and {}", actual.display(), difference.display());
+        panic!("{name}: mean FLIP {mean} above {MAX_FLIP}: see {} and {}", actual.display(), difference.display());
     }
 }
 
 #[test]
-fn pictures_look_as_they_did() {
+fn pictures_match_their_references() {
     let (timeline, mut renderer) = (crossing(), renderer());
     let mut shoot = |name: &str, time_s: f64, view: View| {
-        looks_like(name, &renderer.shoot(&timeline, time_s, &view).expect(name));
+        assert_looks_like(name, &renderer.shoot(&timeline, time_s, &view).expect(name));
     };
     shoot("start", 0.0, small());
     shoot("violation", 2.5, View { theme: Theme::Light, ..small() });
@@ -345,7 +346,7 @@ fn pictures_look_as_they_did() {
 }
 
 #[test]
-fn a_vehicle_that_moved_is_seen_to_have_moved() {
+fn a_moved_vehicle_changes_the_picture() {
     let mut renderer = renderer();
     let bare = View { layers: Layers::NONE, ..small() };
     let timeline = crossing();
@@ -353,5 +354,5 @@ fn a_vehicle_that_moved_is_seen_to_have_moved() {
     let (same, _) = flip(&first, &first);
     let (moved, _) = flip(&first, &second);
     assert_eq!(same, 0.0);
-    assert!(moved > FLIP_CEILING, "{moved}");
+    assert!(moved > MAX_FLIP, "{moved}");
 }

@@ -1,6 +1,6 @@
-//! `tautline render` and the pictures of a run: files, texts and exit codes.
+//! `tautline render`, `tautline view` and the pictures of a run: files, texts and exit codes.
 //!
-//! Needs a graphics adapter, or a driver in software; `tests/run.sh` installs one.
+//! Needs a graphics adapter, or a software driver; `tests/run.sh` installs one.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, arguments)
 }
 
-/// A folder with the run of a short flight in `out`.
+/// Returns a folder with the run of a short flight in `out`.
 fn flown(scenario: &str, more: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let base = ["run", scenario, "--out", "out", "--quiet", "--set", "time.duration_s=4"];
@@ -41,7 +41,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_comparison_shows_each_law_at_its_worst_moment() {
+fn a_comparison_shows_the_closest_approach_of_each_law() {
     let folder = tempfile::tempdir().expect("a folder");
     let what = ["compare", "pentagon", "--laws", "edge-tension,laplacian", "--runs", "2", "--set", "time.duration_s=6"];
     let Ran { exit, err, .. } = ran(folder.path(), &[&what[..], &["--html", "c.html", "--quiet"]].concat());
@@ -49,24 +49,27 @@ fn a_comparison_shows_each_law_at_its_worst_moment() {
     let page = fs::read_to_string(folder.path().join("c.html")).expect("a page");
     let pictures: Vec<_> = page.split("data:image/png;base64,").skip(1).collect();
     assert_eq!(pictures.len(), 2);
-    for (picture, said) in pictures.iter().zip(["edge-tension: 2.4", "laplacian: 1.5"]) {
+    for (picture, expected) in pictures.iter().zip(["edge-tension: 2.4", "laplacian: 1.5"]) {
         let caption = picture.split("<figcaption>").nth(1).expect("a caption");
-        assert!(caption.starts_with(said) && caption.contains(", the closest of 2 flights (start.seed "), "{caption}");
+        assert!(
+            caption.starts_with(expected) && caption.contains(", the closest of 2 flights (start.seed "),
+            "{caption}"
+        );
     }
     assert!(page.len() < 1 << 20, "{} bytes", page.len());
 }
 
 #[test]
-fn a_run_leaves_pictures_and_its_page_shows_them() {
+fn a_run_writes_pictures_and_shows_them_on_its_page() {
     let folder = flown("pentagon-laplacian", &[]);
     let out = folder.path().join("out");
     assert_eq!(names(&out.join("snapshots")), ["closest.png", "end.png", "start.png", "violation-1.png"]);
     assert_eq!(size_of(&out.join("snapshots/closest.png")), [1280, 720]);
     let page = fs::read_to_string(out.join("report.html")).expect("a page");
     assert_eq!(page.matches("data:image/png;base64,").count(), 4);
-    assert!(page.contains("Vehicles 4-5 were closer than delta from"), "the violation is told in words too");
+    assert!(page.contains("Vehicles 4-5 were closer than delta from"), "the violation is described in words");
 
-    // A run without pictures takes those of the run before away.
+    // A run without pictures removes those of the run before.
     let again = ["run", "pentagon", "--out", "out", "--force", "--no-snapshots", "--set", "time.duration_s=1"];
     ran(folder.path(), &again);
     assert_eq!(names(&out.join("snapshots")), Vec::<String>::new());
@@ -74,7 +77,7 @@ fn a_run_leaves_pictures_and_its_page_shows_them() {
 }
 
 #[test]
-fn a_machine_that_cannot_draw_flies_all_the_same_and_says_so() {
+fn a_run_without_an_adapter_flies_with_a_warning() {
     let folder = tempfile::tempdir().expect("a folder");
     let set = ["--set", "time.duration_s=1"];
     let run = [&["run", "pentagon", "--out", "out", "--adapter", "no such adapter"], &set[..]].concat();
@@ -85,12 +88,12 @@ fn a_machine_that_cannot_draw_flies_all_the_same_and_says_so() {
 }
 
 #[test]
-fn without_any_driver_render_ends_with_the_name_of_a_package() {
+fn render_without_a_driver_names_a_package() {
     let folder = flown("pentagon", &["--no-snapshots"]);
     let done = std::process::Command::new(TAUTLINE)
         .args(["render", "out/run.mcap"])
         .current_dir(folder.path())
-        // The loader finds no Vulkan driver; one for OpenGL would be of no use.
+        // The loader finds no Vulkan driver; OpenGL is not enough.
         .env("VK_DRIVER_FILES", "/nonexistent.json")
         .env("VK_ICD_FILENAMES", "/nonexistent.json")
         .output()
@@ -102,7 +105,7 @@ fn without_any_driver_render_ends_with_the_name_of_a_package() {
 }
 
 #[test]
-fn every_kind_of_picture_is_written_where_it_is_asked_for() {
+fn every_kind_of_picture_is_written_to_its_target() {
     let folder = flown("pentagon", &["--no-snapshots"]);
     let render = |more: &[&str]| {
         let arguments = [&["render", "out/run.mcap", "--size", "160x90"], more].concat();
@@ -130,11 +133,11 @@ fn every_kind_of_picture_is_written_where_it_is_asked_for() {
     while decoder.read_next_frame().expect("a frame").is_some() {
         frames += 1;
     }
-    assert_eq!(frames, 21, "4 s at 5 pictures a second, both ends included");
+    assert_eq!(frames, 21, "4 s at 5 pictures per second, both ends included");
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_with_its_remedy() {
+fn invalid_requests_are_refused_with_a_remedy() {
     let folder = flown("pentagon", &["--no-snapshots"]);
     let header = Header::new("empty", "", 2, 1.0);
     McapRecorder::create(&folder.path().join("empty.mcap"), &header).expect("a file").finish().expect("closed");
@@ -169,7 +172,7 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         (&["out/run.mcap", "--sheet", "4000x4"], WRONG_INPUT, "do not fit into"),
         (&["out/run.mcap", "--sheet", "10x10", "--size", "60000x60000"], WRONG_INPUT, "pixels a side"),
         (&["out/run.mcap", "--film", "film.avi"], WRONG_INPUT, "does not end in .mp4 or .gif"),
-        (&["out/run.mcap", "--film", "film.gif", "--fps", "0"], WRONG_INPUT, "not 0"),
+        (&["out/run.mcap", "--film", "film.gif", "--fps", "0"], WRONG_INPUT, "got 0"),
         (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "--speed: must be more than 0, got 0"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: must be more than 0, got -3"),
@@ -195,11 +198,11 @@ fn what_cannot_be_drawn_is_refused_with_its_remedy() {
         assert!(!err.contains("panicked"), "{arguments:?}: {err}");
     }
     assert_eq!(names(&folder.path().join("out")), ["figures", "report.html", "report.json", "run.mcap"]);
-    assert!(!folder.path().join("refused").exists(), "what is refused leaves no folder");
+    assert!(!folder.path().join("refused").exists(), "a refused command leaves no folder");
 }
 
 #[test]
-fn places_beyond_all_measure_are_refused_with_vehicle_value_and_time() {
+fn too_large_coordinates_are_refused_with_vehicle_value_and_time() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("far.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,1,0,0\n1,a,1e300,0,0\n1,b,-1e300,0,0\n")
         .expect("written");
@@ -207,14 +210,17 @@ fn places_beyond_all_measure_are_refused_with_vehicle_value_and_time() {
         let Ran { exit, err, .. } = ran(folder.path(), &[&["render", "far.csv"], more].concat());
         assert_eq!(exit, WRONG_INPUT, "{err}");
         let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-        assert!(text.contains("vehicle a has a coordinate of 1e300 m at 1 s; what is beyond 1e9 m"), "{text}");
+        assert!(
+            text.contains("vehicle a has a coordinate of 1e300 m at 1 s; coordinates and radii must be at most 1e9 m"),
+            "{text}"
+        );
     }
     assert_eq!(names(folder.path()), ["far.csv"]);
 }
 
 #[cfg(not(feature = "film"))]
 #[test]
-fn an_mp4_film_without_ffmpeg_is_refused_with_the_ways_to_get_one() {
+fn an_mp4_film_without_ffmpeg_is_refused_with_remedies() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n")
         .expect("written");
@@ -231,7 +237,7 @@ fn an_mp4_film_without_ffmpeg_is_refused_with_the_ways_to_get_one() {
 }
 
 #[test]
-fn no_picture_and_no_film_replaces_another_or_the_recording() {
+fn no_output_overwrites_another_or_the_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let rows = "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n1,b,2,0,0\n";
     let recordings = ["start.png", "sheet.png", "r.gif"];
@@ -250,7 +256,7 @@ fn no_picture_and_no_film_replaces_another_or_the_recording() {
         let text = err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
         assert!(text.contains(message), "{arguments:?}: {text}");
     }
-    assert_eq!(names(folder.path()), ["r.gif", "sheet.png", "start.png"], "nothing is made");
+    assert_eq!(names(folder.path()), ["r.gif", "sheet.png", "start.png"], "no file is created");
     for name in recordings {
         assert_eq!(fs::read_to_string(folder.path().join(name)).expect(name), rows);
     }
@@ -261,7 +267,7 @@ fn no_picture_and_no_film_replaces_another_or_the_recording() {
 }
 
 #[test]
-fn vehicles_that_meet_between_two_samples_are_pictured_as_they_meet() {
+fn the_closest_picture_is_at_the_closest_approach_between_samples() {
     let folder = tempfile::tempdir().expect("a folder");
     let rows = "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,2,0,0\n1,b,-2,0,0\n";
     fs::write(folder.path().join("headon.csv"), rows).expect("written");
@@ -275,7 +281,7 @@ fn vehicles_that_meet_between_two_samples_are_pictured_as_they_meet() {
     assert!(closest == halfway, "they are closest halfway");
 }
 
-/// The pixels of a picture, red, green and blue.
+/// Returns the pixels of a picture: red, green and blue.
 fn pixels(path: &Path) -> Vec<[u8; 3]> {
     let file = fs::File::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
@@ -284,13 +290,13 @@ fn pixels(path: &Path) -> Vec<[u8; 3]> {
     rgb.as_chunks().0.to_vec()
 }
 
-/// What a violation is drawn in on dark ground; the bar across the top begins with it.
-const ALARM: [u8; 3] = [0xFF, 0x2F, 0x3C];
+/// Colour of violations on a dark background; the banner fills the first pixel with it.
+const VIOLATION_COLOUR: [u8; 3] = [0xFF, 0x2F, 0x3C];
 
 #[test]
-fn a_picture_is_red_where_audit_finds_a_violation_and_nowhere_else() {
+fn a_picture_is_red_only_during_a_violation_of_the_audit() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Exactly 1.25 m apart, which is no violation.
+    // The separation is exactly 1.25 m, and equality is no violation.
     let still = |t: u32| format!("{t},a,0,0,0\n{t},b,0.75,1,0\n");
     let table = format!("t,id,x,y,z\n{}{}{}", still(0), still(1), still(2));
     fs::write(folder.path().join("still.csv"), table).expect("written");
@@ -301,15 +307,15 @@ fn a_picture_is_red_where_audit_finds_a_violation_and_nowhere_else() {
         let Ran { exit, err, .. } = ran(folder.path(), &render);
         assert_eq!(exit, GOOD, "{err}");
         let pixels = pixels(&folder.path().join(delta).join("at-1.000s.png"));
-        assert_eq!(pixels[0] == ALARM, is_violation, "delta {delta}: {:?}", pixels[0]);
-        assert_eq!(pixels.contains(&ALARM), is_violation, "delta {delta}");
+        assert_eq!(pixels[0] == VIOLATION_COLOUR, is_violation, "delta {delta}: {:?}", pixels[0]);
+        assert_eq!(pixels.contains(&VIOLATION_COLOUR), is_violation, "delta {delta}");
     }
 }
 
 #[test]
-fn what_the_judge_refuses_is_drawn_and_said_to_be_not_judged() {
+fn a_refused_recording_is_drawn_as_not_judged() {
     let folder = tempfile::tempdir().expect("a folder");
-    // The radius of a vehicle must not change in the middle of a flight.
+    // The radius of a vehicle must not change during a flight.
     let table = "t,id,x,y,z,radius\n0,a,0,0,0,0.1\n0,b,1,0,0,0.1\n1,a,0,0,0,0.2\n1,b,1,0,0,0.1\n";
     fs::write(folder.path().join("grows.csv"), table).expect("written");
     assert_eq!(ran(folder.path(), &["audit", "grows.csv", "--delta", "2"]).exit, WRONG_INPUT);
@@ -317,11 +323,11 @@ fn what_the_judge_refuses_is_drawn_and_said_to_be_not_judged() {
     let text = err.split_whitespace().collect::<Vec<_>>().join(" ");
     assert_eq!(exit, GOOD, "{err}");
     assert!(text.contains("it was not judged"), "{text}");
-    assert!(!pixels(&folder.path().join("snapshots/start.png")).contains(&ALARM));
+    assert!(!pixels(&folder.path().join("snapshots/start.png")).contains(&VIOLATION_COLOUR));
 }
 
 #[test]
-fn trails_are_as_long_as_they_are_asked_to_be() {
+fn trails_have_the_requested_length() {
     let folder = tempfile::tempdir().expect("a folder");
     let side_by_side = |t: u32| format!("{t},a,{},0,1\n{t},b,{},4,1\n", 2 * t, 2 * t);
     let table: String = (0..=10).map(side_by_side).collect();
@@ -344,10 +350,11 @@ fn trails_are_as_long_as_they_are_asked_to_be() {
 }
 
 #[test]
-fn a_window_reads_a_recording_as_it_is_told_to() {
+fn a_window_uses_the_reading_options() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("own.csv"), "t,id,east,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n").expect("written");
-    // Arguments after `view`, exit code, part of the message. There is no display: what gets that far was read.
+    // Arguments after `view`, exit code, part of the message. Without a display, a valid recording fails only after it
+    // was read.
     let cases: [(&[&str], Option<i32>, &str); 5] = [
         (&["own.csv"], WRONG_INPUT, "own.csv"),
         (&["own.csv", "--column", "x=east"], MACHINE_FAILED, "no display"),
@@ -373,7 +380,7 @@ fn a_window_reads_a_recording_as_it_is_told_to() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn where_there_is_no_desktop_the_driver_is_silent_and_the_program_stays_one_process() {
+fn without_a_desktop_the_driver_is_silent_and_there_is_one_process() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,-2,0,0\n0,b,2,0,0\n1,a,-2,1,0\n").expect("written");
     let command = |arguments: &[&str]| {
@@ -382,7 +389,7 @@ fn where_there_is_no_desktop_the_driver_is_silent_and_the_program_stays_one_proc
         command.env_remove("NODEVICE_SELECT").env_remove("MESA_VK_DEVICE_SELECT");
         command
     };
-    let complains = |command: &mut std::process::Command, exit: Option<i32>| {
+    let has_driver_message = |command: &mut std::process::Command, exit: Option<i32>| {
         let done = command.output().expect("the program runs");
         let err = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(done.status.code(), exit, "{err}");
@@ -390,28 +397,31 @@ fn where_there_is_no_desktop_the_driver_is_silent_and_the_program_stays_one_proc
     };
     let render = ["render", "two.csv", "--size", "64x36", "--at", "start"];
     let run = ["run", "pentagon", "--out", "out", "--set", "time.duration_s=1"];
-    assert!(!complains(&mut command(&render), GOOD));
-    assert!(!complains(&mut command(&run), Some(1)), "the formation is not reached: the exit code passes through");
-    // Who chooses a device by that layer keeps it, and its complaints: without the layer's absence there are some.
-    assert!(complains(command(&render).env("MESA_VK_DEVICE_SELECT", "0:0"), GOOD));
+    assert!(!has_driver_message(&mut command(&render), GOOD));
+    assert!(
+        !has_driver_message(&mut command(&run), Some(1)),
+        "the formation is not reached: the exit code passes through"
+    );
+    // Selecting a device through that layer keeps its message.
+    assert!(has_driver_message(command(&render).env("MESA_VK_DEVICE_SELECT", "0:0"), GOOD));
 
-    // A signal reaches the one process that there is.
+    // A signal reaches the only process.
     let long = ["run", "pentagon", "--out", "long", "--set", "time.duration_s=100000"];
     let mut flight = command(&long).stderr(std::process::Stdio::piped()).spawn().expect("the program runs");
     let recording = folder.path().join("long/run.mcap");
     let began = std::time::Instant::now();
     while fs::metadata(&recording).map_or(0, |file| file.len()) == 0 {
-        assert!(began.elapsed() < std::time::Duration::from_mins(1), "nothing is recorded");
+        assert!(began.elapsed() < std::time::Duration::from_mins(1), "the recording is empty");
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    let told = std::process::Command::new("kill").args(["-INT", &flight.id().to_string()]).status().expect("kill");
-    assert!(told.success());
-    assert_eq!(flight.wait().expect("it ends").code(), Some(1), "an interrupted run ends cleanly and is no pass");
+    let signal = std::process::Command::new("kill").args(["-INT", &flight.id().to_string()]).status().expect("kill");
+    assert!(signal.success());
+    assert_eq!(flight.wait().expect("it ends").code(), Some(1), "an interrupted run ends cleanly and does not pass");
     assert!(folder.path().join("long/report.json").exists());
 }
 
 #[test]
-fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
+fn an_unfinished_recording_is_drawn_with_a_note() {
     let folder = flown("pentagon", &["--no-snapshots"]);
     let whole = fs::read(folder.path().join("out/run.mcap")).expect("a recording");
     fs::write(folder.path().join("cut.mcap"), &whole[..whole.len() - 40]).expect("written");
@@ -421,7 +431,7 @@ fn a_recording_that_was_not_closed_is_drawn_and_said_to_be_unfinished() {
 }
 
 #[test]
-fn a_run_that_was_cut_off_at_once_is_told_from_one_that_can_be_drawn() {
+fn a_recording_without_samples_after_a_crash_is_refused() {
     let folder = flown("pentagon", &["--no-snapshots"]);
     let whole = fs::read(folder.path().join("out/run.mcap")).expect("a recording");
     for (bytes, more) in [(100, &[][..]), (4000, &[]), (4000, &["--allow-unfinished"])] {
@@ -433,7 +443,7 @@ fn a_run_that_was_cut_off_at_once_is_told_from_one_that_can_be_drawn() {
 }
 
 #[test]
-fn a_folder_is_said_to_have_been_taken_for_polynomials() {
+fn a_folder_is_read_as_one_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("some")).expect("a folder");
     fs::write(folder.path().join("some/table.csv"), "a,b\n1,2\n").expect("written");

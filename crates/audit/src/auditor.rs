@@ -1,4 +1,4 @@
-//! The audit of a flight: straight steps of all vehicles, one after the other.
+//! Audit of a flight: straight steps of all vehicles, one after the other.
 
 use super::candidates::{Candidates, pair_count, pairs, pairs_of};
 use super::cross_check::KeepOut;
@@ -9,36 +9,38 @@ use super::segment::Line;
 use super::sweep::{ClosestPoint, Interval, MAX_LENGTH_M, MIN_LIMIT_M, RelativeMotion};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, row, separation};
 
-/// Judges a motion instant by instant.
+/// Audits a flight instant by instant.
 ///
-/// Feed it one [`start`](Auditor::start) and then [`step`](Auditor::step) by step; [`finish`](Auditor::finish) gives the
-/// verdict. A step allocates nothing once the lists have grown to the swarm, except for new violations.
+/// Call [`start`](Auditor::start) once, then [`step`](Auditor::step) for each step; [`finish`](Auditor::finish) returns
+/// the verdict. A step allocates only for new violations once the lists have grown to the size of the swarm.
 #[derive(Clone, Debug)]
 pub struct Auditor {
     vehicles: usize,
     keep_out: KeepOut,
-    /// The last instant judged; `None` before the start.
+    /// Last judged instant; `None` before the start.
     time_s: Option<f64>,
     positions_m: Rows,
-    /// The smallest separation at the last instant \[m\] among some pairs: the next step's closest approach is at most
-    /// this.
+    /// Smallest separation of some pairs at the last instant \[m\]: an upper bound for the closest approach of the next
+    /// step.
     nearest_m: f64,
     candidates: Candidates,
     ledger: Ledger<Pair>,
-    /// Violations that began, and that ended, in the last step.
+    /// Violations that began in the last step, and violations that ended in it.
     began: Vec<Violation>,
     ended: Vec<Violation>,
-    /// What is counted as steps come, and the closest approach so far.
+    /// Counts so far, and the closest approach so far.
     outcome: AuditOutcome,
     /// Motion of the closest pair during the step of the closest approach.
     closest_motion: Option<ExactMotion>,
 }
 
 impl Auditor {
-    /// Creates an auditor of `vehicles` vehicles by the safety distance delta \[m\]. Fewer than two vehicles are always clear.
+    /// Creates an auditor of `vehicles` vehicles with the safety distance delta \[m\]. Fewer than two vehicles are
+    /// always clear.
     ///
     /// # Errors
-    /// [`AuditError::Delta`] unless delta is between 1e-70 m and 1e70 m; [`AuditError::TooManyVehicles`] beyond 2^32 - 1.
+    /// [`AuditError::Delta`] unless delta is between 1e-70 m and 1e70 m; [`AuditError::TooManyVehicles`] from 2^32
+    /// vehicles on.
     pub fn new(vehicles: usize, delta_m: f64) -> Result<Self, AuditError> {
         if !(MIN_LIMIT_M..=MAX_LENGTH_M).contains(&delta_m) {
             return Err(AuditError::Delta { delta_m, min_m: MIN_LIMIT_M, max_m: MAX_LENGTH_M });
@@ -64,8 +66,8 @@ impl Auditor {
     /// Judges the first instant: `positions_m` is N x 3 \[m\].
     ///
     /// # Errors
-    /// [`AuditError`] where the instant cannot be judged, or there already was a first one. Nothing changes then but the
-    /// outcome's count of refusals, which keeps it from being clear.
+    /// [`AuditError`] if the instant cannot be judged, or the auditor was already started. Only the count of refusals
+    /// changes then, which keeps the outcome from being clear.
     pub fn start(&mut self, time_s: f64, positions_m: &Rows) -> Result<StepFinding<'_>, AuditError> {
         let checked = if self.time_s.is_some() { Err(AuditError::AlreadyStarted) } else { Ok(()) };
         self.admit(checked.and_then(|()| check_instant(self.vehicles, time_s, positions_m)))?;
@@ -74,11 +76,11 @@ impl Auditor {
         Ok(self.sweep(Interval { from_s: time_s, to_s: time_s }, positions_m))
     }
 
-    /// Judges the straight motion from the instant before to this one: `positions_m` is N x 3 \[m\].
+    /// Judges the straight motion from the last instant to this one: `positions_m` is N x 3 \[m\].
     ///
     /// # Errors
-    /// [`AuditError`] where the instant cannot be judged. Nothing changes then but the outcome's count of refusals, which
-    /// keeps it from being clear; a later step is swept from the last instant that was judged.
+    /// [`AuditError`] if the instant cannot be judged. Only the count of refusals changes then, which keeps the outcome
+    /// from being clear. A later step is swept from the last judged instant.
     pub fn step(&mut self, time_s: f64, positions_m: &Rows) -> Result<StepFinding<'_>, AuditError> {
         let checked = match self.time_s {
             None => Err(AuditError::NotStarted),
@@ -90,13 +92,13 @@ impl Auditor {
         Ok(self.sweep(Interval { from_s: previous_s, to_s: time_s }, positions_m))
     }
 
-    /// Violations found so far, in the order of the steps in which they began and by pair within a step.
+    /// Returns the violations found so far, ordered by the step in which they began and then by pair.
     #[must_use]
     pub fn violations(&self) -> &[Violation] {
         &self.ledger.violations
     }
 
-    /// The closest approach of two vehicles so far.
+    /// Returns the closest approach of two vehicles so far.
     #[must_use]
     pub fn closest(&self) -> Option<ClosestApproach> {
         self.outcome.closest
@@ -104,8 +106,8 @@ impl Auditor {
 
     /// Returns the verdict over all judged steps.
     ///
-    /// Without a violation the smallest separation is rounded down, as in the audit of a recording. With violations it keeps
-    /// the value of the closest approach.
+    /// Without a violation the smallest separation is rounded down, as in the audit of a recording. With violations it
+    /// is the value of the closest approach.
     #[must_use]
     pub fn finish(mut self) -> AuditOutcome {
         let decided = self.time_s.is_some() && self.outcome.refused == 0 && self.ledger.is_decided();
@@ -125,10 +127,10 @@ impl Auditor {
         checked
     }
 
-    /// Sweeps from the positions held to `to`, which must have been checked.
+    /// Sweeps from the stored positions to `to`, which must have been checked.
     fn sweep(&mut self, step: Interval, to: &Rows) -> StepFinding<'_> {
         let Self { keep_out, positions_m: from, ledger, began, ended, .. } = self;
-        // Of equal separations the one that comes first is kept.
+        // Of equal separations the first is kept.
         let (mut pair, mut closest) = ((0, 0), ClosestPoint { squared: f64::INFINITY, at: 0.0 });
         let mut nearest_squared = f64::INFINITY;
         began.clear();
@@ -148,9 +150,11 @@ impl Auditor {
             if contact.is_some() || keep_out.is_near(&motion, point) {
                 let known = ledger.violations.len();
                 let exact = exact_motion([from, to], [i, j], step);
-                // The number that the closest approach of the step has, and below the limit where it is rounded up to that.
+                // The separation reported for the closest approach, or the next double below the limit if rounding
+                // lifts it to the limit.
                 let least_m = || point.separation_m().min(keep_out.delta_m.next_down());
-                if let Some(index) = ledger.near(Pair::new(i, j), keep_out, &motion, contact, &exact, least_m) {
+                if let Some(index) = ledger.judge_straight(Pair::new(i, j), keep_out, &motion, contact, &exact, least_m)
+                {
                     let violation = ledger.violations[index];
                     if index == known {
                         began.push(violation);
@@ -181,14 +185,14 @@ impl Auditor {
     }
 }
 
-/// The straight motion of a pair over a step, from one instant to the next.
+/// Returns the straight motion of a pair over a step.
 fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], over: Interval) -> ExactMotion {
     let Interval { from_s, to_s } = over;
     let line = |of| Line { from_s, to_s, from: row(from, of), to: row(to, of) };
     ExactMotion { first: line(i), second: line(j), over }
 }
 
-/// Whether an instant can be judged: a time, and a position for each vehicle, that are not beyond what is computed with.
+/// Checks that an instant can be judged: a finite time, and a position within range for each vehicle.
 pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) -> Result<(), AuditError> {
     if !time_s.is_finite() {
         return Err(AuditError::TimeNotFinite { time_s });
@@ -197,7 +201,7 @@ pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) ->
         return Err(AuditError::WrongCount { expected: vehicles, found: positions_m.nrows() });
     }
     let near = |x: &f64| x.abs() <= MAX_LENGTH_M;
-    // Without an early exit the usual case has no branch per number.
+    // Without an early exit the common case has no branch per number.
     if positions_m.as_slice().iter().fold(true, |all, x| all & near(x)) {
         return Ok(());
     }
@@ -211,69 +215,69 @@ pub(super) fn check_instant(vehicles: usize, time_s: f64, positions_m: &Rows) ->
     })
 }
 
-/// Why something could not be judged. Nothing changes then, except that the outcome is no longer clear.
+/// Reason why an input was not judged. The outcome can no longer be clear then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum AuditError {
     /// The safety distance is not a positive number within range.
-    #[error("the safety distance must be between {min_m:e} m and {max_m:e} m, not {delta_m} m")]
+    #[error("delta: must be between {min_m:e} m and {max_m:e} m, got {delta_m} m")]
     Delta {
-        /// The safety distance offered \[m\].
+        /// Safety distance \[m\].
         delta_m: f64,
-        /// Smallest that is accepted \[m\].
+        /// Smallest accepted value \[m\].
         min_m: f64,
-        /// Largest that is accepted \[m\].
+        /// Largest accepted value \[m\].
         max_m: f64,
     },
-    /// More vehicles than can be numbered.
-    #[error("{vehicles} vehicles are more than can be judged ({max})", max = u32::MAX)]
+    /// The number of vehicles exceeds 2^32 - 1.
+    #[error("the number of vehicles must be at most {max}, got {vehicles}", max = u32::MAX)]
     TooManyVehicles {
-        /// How many were asked for.
+        /// Number of vehicles.
         vehicles: usize,
     },
-    /// A step came before the start.
-    #[error("a step was offered before the start")]
+    /// A step was given before the start.
+    #[error("the first step came before the start; call `start` first")]
     NotStarted,
-    /// A second start came.
-    #[error("a second start was offered")]
+    /// The auditor was started twice.
+    #[error("the auditor was already started; call `step`")]
     AlreadyStarted,
-    /// Positions of another number of vehicles.
+    /// The number of positions differs from the number of vehicles.
     #[error("expected the positions of {expected} vehicles, found {found}")]
     WrongCount {
-        /// Vehicles that are judged.
+        /// Number of vehicles that are judged.
         expected: usize,
-        /// Vehicles offered.
+        /// Number of positions.
         found: usize,
     },
-    /// A time that is not a finite number.
+    /// The time is not a finite number.
     #[error("the time {time_s} s is not a finite number")]
     TimeNotFinite {
-        /// The time offered \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// A time not later than the one before.
+    /// The time is not later than the previous one.
     #[error("the time {time_s} s is not later than the time before, {previous_s} s")]
     TimeNotIncreasing {
-        /// The time before \[s\].
+        /// Previous time \[s\].
         previous_s: f64,
-        /// The time offered \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// A position that is not a finite number.
+    /// A position is not a finite number.
     #[error("the position of vehicle {} at {time_s} s is not a finite number", vehicle + 1)]
     NotFinite {
-        /// The vehicle, from 0.
+        /// Index of the vehicle, from 0.
         vehicle: usize,
-        /// The time \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// A position whose square could overflow.
+    /// A position is so large that its square could overflow.
     #[error("the position of vehicle {} at {time_s} s is beyond {limit_m:e} m, too far to judge", vehicle + 1)]
     TooFar {
-        /// The vehicle, from 0.
+        /// Index of the vehicle, from 0.
         vehicle: usize,
-        /// The time \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// Largest coordinate that is accepted \[m\].
+        /// Largest accepted coordinate \[m\].
         limit_m: f64,
     },
 }
@@ -282,8 +286,8 @@ pub enum AuditError {
 mod tests {
     use super::*;
 
-    /// An auditor whose second detector measures with another delta than the first.
-    fn auditor_with_a_wrong_second_detector() -> Auditor {
+    /// Returns an auditor whose second detector uses a larger delta than the first.
+    fn auditor_with_wrong_second_detector() -> Auditor {
         let mut auditor = Auditor::new(2, 2.0).unwrap();
         auditor.keep_out = KeepOut::new(2.1);
         auditor.keep_out.delta_m = 2.0;
@@ -295,9 +299,9 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_that_only_one_detector_calls_contact_is_undecided_and_says_why() {
+    fn a_contact_of_one_detector_alone_is_undecided_and_reported() {
         let [before, after] = pass(2.05);
-        let mut auditor = auditor_with_a_wrong_second_detector();
+        let mut auditor = auditor_with_wrong_second_detector();
         auditor.start(0.0, &before).unwrap();
         auditor.step(1.0, &after).unwrap();
         let outcome = auditor.finish();
@@ -310,9 +314,9 @@ mod tests {
     }
 
     #[test]
-    fn entries_at_different_times_are_a_disagreement_beside_the_violation() {
+    fn entries_at_different_times_are_a_violation_and_a_disagreement() {
         let [before, after] = pass(1.0);
-        let mut auditor = auditor_with_a_wrong_second_detector();
+        let mut auditor = auditor_with_wrong_second_detector();
         auditor.start(0.0, &before).unwrap();
         auditor.step(1.0, &after).unwrap();
         let outcome = auditor.finish();
@@ -320,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn two_right_detectors_call_the_same_passes_clear_and_violation() {
+    fn two_correct_detectors_agree() {
         for (miss_m, status) in [(2.05, Status::Clear), (1.0, Status::Violation)] {
             let [before, after] = pass(miss_m);
             let mut auditor = Auditor::new(2, 2.0).unwrap();

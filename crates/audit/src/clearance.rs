@@ -1,4 +1,4 @@
-//! The audit of a flight among obstacles: straight steps of all vehicles, one after the other.
+//! Audit of a flight among obstacles: straight steps of all vehicles, one after the other.
 
 use super::auditor::{AuditError, check_instant};
 use super::cross_check::KeepOut;
@@ -11,21 +11,22 @@ use super::segment::Segment;
 use super::sweep::{Interval, MIN_LIMIT_M};
 use tautline_core::swarm::{Rows, row};
 
-/// Rounding of a distance from a surface, as a part of the lengths that it is made of.
+/// Rounding of a distance from a surface, relative to the lengths that it is computed from.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// Judges a motion past obstacles at rest, instant by instant, as [`Auditor`](super::Auditor) judges that of vehicles past
-/// each other: in closed form over each straight step, with distances measured again by parry.
+/// Audits a flight past obstacles at rest, instant by instant.
 ///
-/// Each obstacle has a clearance of its own ([`Obstacle::clearance_m`]). A vehicle and an obstacle that cannot have come
-/// near over a step are not swept: a distance changes by no more than the vehicle moves.
+/// Each straight step is judged in closed form, with parry as the second detector, as in [`Auditor`](super::Auditor).
+///
+/// Each obstacle has its own clearance ([`Obstacle::clearance_m`]). A distance changes by at most the distance that the
+/// vehicle moves. A vehicle and an obstacle that were too far apart for an approach over the step are not swept.
 #[derive(Clone, Debug)]
 pub struct ClearanceAuditor {
-    obstacles: Vec<Judged>,
+    obstacles: Vec<GuardedObstacle>,
     vehicles: usize,
     time_s: Option<f64>,
     positions_m: Rows,
-    /// Distances at the last instant \[m\], those of a vehicle side by side, and whether they are below the limit.
+    /// Distances at the last instant \[m\], grouped by vehicle, and whether they are below the limit.
     distances_m: Vec<f64>,
     is_below: Vec<bool>,
     least_room_m: f64,
@@ -36,39 +37,39 @@ pub struct ClearanceAuditor {
 }
 
 #[derive(Clone, Debug)]
-struct Judged {
+struct GuardedObstacle {
     obstacle: Obstacle,
     place_m: nalgebra::Vector3<f64>,
     keep_out: KeepOut,
 }
 
-/// What one step (or the start) brought.
+/// Findings of one step, or of the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClearanceFinding<'a> {
-    /// The least that any vehicle has beyond a clearance at the end of the step \[m\].
+    /// Smallest distance beyond the clearance of any vehicle and obstacle at the end of the step \[m\].
     pub least_room_m: f64,
     /// Violations that began in this step.
     pub began: &'a [Violation<ObjectPair>],
-    /// Violations that ended in this step, complete. One that began and ended within is in both lists.
+    /// Violations that ended in this step, complete. A violation that began and ended in this step is in both lists.
     pub ended: &'a [Violation<ObjectPair>],
 }
 
-/// The verdict on a flight past obstacles, and what it rests on.
+/// Verdict on a flight past obstacles, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClearanceOutcome {
-    /// The verdict.
+    /// Verdict.
     pub status: Status,
-    /// The approaches of different vehicles and obstacles that came closest to their limits, at most ten, the least room first.
+    /// Approaches of different pairs that came closest to their limits, at most ten, the closest first.
     pub closest: Vec<Approach>,
-    /// Every violation, in the order of their beginning.
+    /// All violations, ordered by their start.
     pub violations: Vec<Violation<ObjectPair>>,
-    /// Every time at which it cannot be told.
+    /// All undecided times.
     pub undecided: Vec<Undecided<ObjectPair>>,
-    /// Steps on which ways bend by more than there was room for.
+    /// Number of steps on which paths may bend by more than the margin.
     pub unresolved: u64,
-    /// What the second detector says.
+    /// Result of the second detector.
     pub parry: ParryEvidence<ObjectPair>,
-    /// Calls answered by an error: what they offered was not judged.
+    /// Number of calls that returned an error. Their input was not judged.
     pub refused: u64,
 }
 
@@ -76,15 +77,17 @@ impl ClearanceAuditor {
     /// Creates an auditor of `vehicles` vehicles among obstacles at rest, each with a clearance.
     ///
     /// # Errors
-    /// [`ObstacleError`] for one that cannot be judged, moves, or has no clearance above zero.
+    /// [`ObstacleError`] if an obstacle is invalid, moves, or has no clearance above zero.
     pub fn new(vehicles: usize, obstacles: &[Obstacle]) -> Result<Self, ObstacleError> {
         let judged = obstacles.iter().map(|obstacle| {
             obstacle.check()?;
             let wrong = |reason: &str| ObstacleError { name: obstacle.name.clone(), reason: reason.to_owned() };
-            let [(_, place_m)] = obstacle.path[..] else { return Err(wrong("it moves")) };
+            let [(_, place_m)] = obstacle.path[..] else {
+                return Err(wrong("it moves; an obstacle of a flight must be at rest"));
+            };
             let limit_m = obstacle.clearance_m.filter(|&limit_m| limit_m >= MIN_LIMIT_M);
-            let limit_m = limit_m.ok_or_else(|| wrong("it has no clearance above 0 m"))?;
-            Ok(Judged { obstacle: obstacle.clone(), place_m, keep_out: KeepOut::new(limit_m) })
+            let limit_m = limit_m.ok_or_else(|| wrong("the clearance must be above 0 m"))?;
+            Ok(GuardedObstacle { obstacle: obstacle.clone(), place_m, keep_out: KeepOut::new(limit_m) })
         });
         Ok(Self {
             obstacles: judged.collect::<Result<_, _>>()?,
@@ -101,11 +104,12 @@ impl ClearanceAuditor {
         })
     }
 
-    /// Judges the straight motion from the instant before to this one, or the first instant: `positions_m` is N x 3 \[m\].
+    /// Judges the first instant, or the straight motion from the last instant to this one: `positions_m` is N x 3
+    /// \[m\].
     ///
     /// # Errors
-    /// [`AuditError`] where the instant cannot be judged. Nothing changes then but the count of refusals, which keeps the
-    /// outcome from being clear.
+    /// [`AuditError`] if the instant cannot be judged. Only the count of refusals changes then, which keeps the outcome
+    /// from being clear.
     pub fn step(&mut self, time_s: f64, positions_m: &Rows) -> Result<ClearanceFinding<'_>, AuditError> {
         let checked = match self.time_s {
             Some(previous_s) if time_s <= previous_s => Err(AuditError::TimeNotIncreasing { previous_s, time_s }),
@@ -128,12 +132,12 @@ impl ClearanceAuditor {
         Ok(ClearanceFinding { least_room_m: self.least_room_m, began: &self.began, ended: &self.ended })
     }
 
-    /// Sweeps the way of a vehicle past every obstacle.
+    /// Sweeps the path of a vehicle past every obstacle.
     fn sweep(&mut self, step: Interval, vehicle: usize, positions_m: &Rows) {
         let (from, to) = (row(&self.positions_m, vehicle), row(positions_m, vehicle));
         let (moved_m, is_first) = ((to - from).norm(), self.time_s.is_none());
         for index in 0..self.obstacles.len() {
-            let Judged { obstacle, place_m, keep_out } = &self.obstacles[index];
+            let GuardedObstacle { obstacle, place_m, keep_out } = &self.obstacles[index];
             let (place, limit_m) = (vehicle * self.obstacles.len() + index, keep_out.delta_m);
             let end_m = obstacle.shape.distance(to - place_m);
             let start_m = if is_first { end_m } else { self.distances_m[place] };
@@ -148,10 +152,10 @@ impl ClearanceAuditor {
             }
             let known = self.results.ledger.violations.len();
             let (target, may_violate) = (Target::Shape(&obstacle.shape), least_m < limit_m);
-            let stands = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
-            let flies = Segment::straight(step.from_s, step.to_s, from, to);
+            let standing = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
+            let flying = Segment::straight(step.from_s, step.to_s, from, to);
             PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, judges: true, may_violate, above: None }
-                .judge(&[stands], &[flies], step, &mut self.results);
+                .judge(&[standing], &[flying], step, &mut self.results);
             self.began.extend_from_slice(&self.results.ledger.violations[known..]);
             let was_below = std::mem::replace(&mut self.is_below[place], end_m < limit_m);
             let of_step = self.results.ledger.violations.len() > known;
@@ -162,19 +166,20 @@ impl ClearanceAuditor {
         }
     }
 
-    /// The approaches that came closest to their limits so far, the least room first.
+    /// Returns the approaches that came closest to their limits so far, the closest first.
     #[must_use]
     pub fn closest(&self) -> &[Approach] {
         &self.results.obstacles.kept
     }
 
-    /// Times that a vehicle was nearer to an obstacle than its clearance so far, in the order in which they were found.
+    /// Returns the times so far at which a vehicle was below the clearance of an obstacle, in the order in which they
+    /// were found.
     #[must_use]
     pub fn violations(&self) -> &[Violation<ObjectPair>] {
         &self.results.ledger.violations
     }
 
-    /// The verdict over everything judged.
+    /// Returns the verdict over all judged steps.
     #[must_use]
     pub fn finish(self) -> ClearanceOutcome {
         let Results { ledger, obstacles, .. } = self.results;
@@ -186,8 +191,8 @@ impl ClearanceAuditor {
     }
 }
 
-/// Smallest distance \[m\] from the surface of an obstacle at rest of a point that moves on a straight line, below zero
-/// within.
+/// Returns the smallest distance \[m\] of a point on a straight path from the surface of an obstacle at rest; negative
+/// inside.
 #[must_use]
 pub fn swept_distance_m(obstacle: &Obstacle, from: nalgebra::Vector3<f64>, to: nalgebra::Vector3<f64>) -> f64 {
     let place_m = obstacle.path.first().map_or_else(nalgebra::Vector3::zeros, |&(_, place_m)| place_m);
@@ -202,11 +207,11 @@ mod tests {
     use super::*;
     use crate::obstacle::one_of_each;
 
-    fn standing(shape: super::super::Shape, clearance_m: f64) -> Obstacle {
+    fn obstacle_at_origin(shape: super::super::Shape, clearance_m: f64) -> Obstacle {
         Obstacle { name: "o".to_owned(), shape, clearance_m: Some(clearance_m), path: vec![(0.0, Vector3::zeros())] }
     }
 
-    fn flown(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
+    fn fly(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
         let (mut began, mut ended) = (0, 0);
         for (k, at) in way.iter().enumerate() {
             let finding = auditor.step(k as f64, &Rows::from_row_slice(at)).unwrap();
@@ -217,30 +222,30 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_leaps_over_an_obstacle_between_two_instants_is_too_close() {
+    fn a_vehicle_that_passes_an_obstacle_between_two_instants_is_found() {
         for shape in one_of_each() {
-            let mut auditor = ClearanceAuditor::new(1, &[standing(shape, 0.5)]).unwrap();
+            let mut auditor = ClearanceAuditor::new(1, &[obstacle_at_origin(shape, 0.5)]).unwrap();
             let along = if matches!(shape, super::super::Shape::HalfSpace { .. }) {
                 [[0.0, 0.0, 9.0], [0.0, 0.0, 0.5], [0.0, 0.0, 9.0]]
             } else {
                 [[-9.0, 0.1, 0.0], [9.0, 0.1, 0.0], [9.0, 20.0, 0.0]]
             };
-            let counts = flown(&mut auditor, &along);
+            let counts = fly(&mut auditor, &along);
             let outcome = auditor.finish();
             assert_eq!((counts, outcome.status, outcome.violations.len()), ((1, 1), Status::Violation, 1), "{shape:?}");
             assert_eq!(outcome.parry.disagreements, 0, "{shape:?}");
-            let mut clear = ClearanceAuditor::new(1, &[standing(shape, 0.5)]).unwrap();
-            assert_eq!(flown(&mut clear, &[[-9.0, 9.0, 9.0], [9.0, 9.0, 9.0]]), (0, 0));
+            let mut clear = ClearanceAuditor::new(1, &[obstacle_at_origin(shape, 0.5)]).unwrap();
+            assert_eq!(fly(&mut clear, &[[-9.0, 9.0, 9.0], [9.0, 9.0, 9.0]]), (0, 0));
             assert_eq!(clear.finish().status, Status::Clear, "{shape:?}");
         }
     }
 
     #[test]
-    fn a_violation_over_several_steps_is_one_and_one_that_lasts_is_not_ended() {
+    fn a_violation_over_several_steps_is_one_and_may_last_to_the_end() {
         let ball = super::super::Shape::Ball { radius_m: 1.0 };
-        let mut auditor = ClearanceAuditor::new(1, &[standing(ball, 1.0)]).unwrap();
+        let mut auditor = ClearanceAuditor::new(1, &[obstacle_at_origin(ball, 1.0)]).unwrap();
         let way = [[-4.0, 0.0, 0.0], [-1.5, 0.0, 0.0], [1.5, 0.0, 0.0], [4.0, 0.0, 0.0], [1.5, 0.0, 0.0]];
-        assert_eq!(flown(&mut auditor, &way), (2, 1));
+        assert_eq!(fly(&mut auditor, &way), (2, 1));
         let outcome = auditor.finish();
         let times: Vec<_> = outcome.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
         assert_eq!(times.len(), 2);
@@ -250,8 +255,8 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_is_refused_and_keeps_it_from_being_clear() {
-        let ball = standing(super::super::Shape::Ball { radius_m: 1.0 }, 1.0);
+    fn invalid_input_is_refused_and_keeps_the_outcome_undecided() {
+        let ball = obstacle_at_origin(super::super::Shape::Ball { radius_m: 1.0 }, 1.0);
         for wrong in [
             Obstacle { clearance_m: None, ..ball.clone() },
             Obstacle { clearance_m: Some(0.0), ..ball.clone() },
@@ -275,13 +280,13 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
         #[test]
-        fn the_smallest_distance_is_that_of_every_step_swept(
+        fn the_smallest_distance_equals_that_of_a_full_sweep(
             ways in prop::collection::vec(prop::collection::vec(prop::array::uniform3(-6.0..6.0_f64), 12), 1..4),
             clearance_m in 0.05..1.5_f64,
         ) {
             let limit_m = |k: usize| clearance_m * (1.0 + 2.0 * k as f64);
             let obstacles: Vec<_> =
-                one_of_each().into_iter().enumerate().map(|(k, shape)| standing(shape, limit_m(k))).collect();
+                one_of_each().into_iter().enumerate().map(|(k, shape)| obstacle_at_origin(shape, limit_m(k))).collect();
             let mut auditor = ClearanceAuditor::new(ways.len(), &obstacles).unwrap();
             for k in 0..12 {
                 let rows: Vec<_> = ways.iter().flat_map(|way| way[k]).collect();
@@ -289,14 +294,15 @@ mod tests {
             }
             let outcome = auditor.finish();
             let swept = |way: &[[f64; 3]], obstacle: &Obstacle| {
-                way.windows(2).map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into())).fold(f64::INFINITY, f64::min)
+                let steps = way.windows(2).map(|ends| swept_distance_m(obstacle, ends[0].into(), ends[1].into()));
+                steps.fold(f64::INFINITY, f64::min)
             };
             let all: Vec<_> = ways.iter().flat_map(|way| obstacles.iter().map(|o| swept(way, o))).collect();
-            let rooms = all.iter().enumerate().map(|(k, m)| m - limit_m(k % obstacles.len()));
-            let least = rooms.clone().fold(f64::INFINITY, f64::min);
+            let margins = all.iter().enumerate().map(|(k, m)| m - limit_m(k % obstacles.len()));
+            let least = margins.clone().fold(f64::INFINITY, f64::min);
             prop_assert!((outcome.closest[0].lower_m - outcome.closest[0].limit_m - least).abs() < 1e-12);
             prop_assert_eq!(outcome.status == Status::Violation, least < 0.0);
-            let too_close = rooms.filter(|&room_m| room_m < 0.0).count();
+            let too_close = margins.filter(|&margin_m| margin_m < 0.0).count();
             let mut pairs: Vec<_> = outcome.violations.iter().map(|violation| violation.pair).collect();
             pairs.sort_unstable();
             pairs.dedup();

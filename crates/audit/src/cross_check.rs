@@ -1,6 +1,6 @@
-//! The second detector: parry. It shares the pairs and their relative motion with the first detector, and no formula for
-//! distances or contacts. On straight motion it casts two keep-out balls. On curves it casts them along chords. It measures
-//! distances from obstacles at points.
+//! Second detector, based on parry. It shares the pairs and their relative motion with the first detector, but no
+//! formula for distances or contacts. On straight motion it casts two keep-out balls, on curves it casts them along
+//! chords, and it measures distances from obstacles at points.
 
 use nalgebra::Vector3;
 use parry3d::math::{Pose, Vector};
@@ -13,16 +13,16 @@ use super::obstacle::Shape;
 use super::polynomial::{stray, value};
 use super::sweep::{ClosestPoint, RelativeMotion, Span, larger};
 
-/// Most chords that a segment of a curve is cast along.
-const MOST_CHORDS: u32 = 64;
-/// How far a chord may stray from the curve, as a fraction of the limit, where the number of chords allows it.
+/// Largest number of chords per segment of a curve.
+const MAX_CHORDS: u32 = 64;
+/// Distance of a chord from the curve as a fraction of the limit, if the number of chords allows it.
 const CHORD_OVER_LIMIT: f64 = 1e-6;
-/// Points of a segment at which the distance from an obstacle is measured again.
-const PLACES: u32 = 8;
-/// Relative difference of two distances from an obstacle that rounding explains: each is a handful of operations.
+/// Number of parts of a segment at whose ends the distance from an obstacle is measured again.
+const PARTS: u32 = 8;
+/// Relative difference of two distances from an obstacle that rounding explains; each takes a handful of operations.
 const ROUNDING: f64 = 1e-12;
 
-/// What the second detector says of a segment where the first found this minimum.
+/// Runs the second detector on a segment and compares it with the minimum that the first found.
 pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minimum, rounding: f64) -> CrossCheck {
     match (search.target, search.exact()) {
         (Target::Origin, Some(motion)) => {
@@ -35,13 +35,13 @@ pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minim
     }
 }
 
-/// Casts keep-out balls along chords of a curve. The answers may differ by what the chords stray.
+/// Casts keep-out balls along chords of a curve. The results may differ by the distance of the chords from the curve.
 fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, rounding: f64) -> CrossCheck {
     let limit = keep_out.delta_m;
     let whole = stray(r);
     let wanted = (whole / (CHORD_OVER_LIMIT * limit)).sqrt().ceil();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small number")]
-    let chords = wanted.clamp(1.0, f64::from(MOST_CHORDS)) as u32;
+    let chords = wanted.clamp(1.0, f64::from(MAX_CHORDS)) as u32;
     let at = |k: u32| value(r, f64::from(k) / f64::from(chords));
     let mut from = at(0);
     let mut contact = None;
@@ -53,7 +53,7 @@ fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, roundin
         }
         from = to;
     }
-    // The second differences of the control points bound the curvature, which n chords divide by n^2.
+    // The second derivative is bounded by the coefficients; n chords divide its effect by n^2.
     let strayed = curvature_stray(r) / f64::from(chords).powi(2) + rounding;
     let agrees = match contact {
         None => found.upper >= limit - strayed,
@@ -62,32 +62,32 @@ fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, roundin
     CrossCheck { contact, agrees }
 }
 
-/// Farthest that a chord of a part of length 1 / n strays from the curve, times n^2: an eighth of a bound on |r''|.
+/// Returns a bound on the distance of a chord over a part of length 1 / n from the curve, times n^2: max |r''| / 8.
 fn curvature_stray(r: &[Vector3<f64>]) -> f64 {
     r.iter().enumerate().skip(2).map(|(k, c)| (k * (k - 1)) as f64 * c.norm()).sum::<f64>() / 8.0
 }
 
-/// Measures the distance from an obstacle again, where it was found to be smallest and at places in between.
+/// Measures the distance from an obstacle again, at its minimum and at points in between.
 fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64) -> Vector3<f64>) -> CrossCheck {
-    let places = (0..=PLACES).map(|k| f64::from(k) / f64::from(PLACES));
+    let points = (0..=PARTS).map(|k| f64::from(k) / f64::from(PARTS));
     let measured = |u: f64| {
         let at = position(u);
         (distance(shape, at), ROUNDING * (at.norm() + shape.radius() + limit))
     };
     let (there, rounding) = measured(found.at);
     let same = (there - found.upper.max(0.0)).abs() <= rounding;
-    let lowest = places.clone().all(|u| {
+    let lowest = points.clone().all(|u| {
         let (distance, rounding) = measured(u);
         distance >= found.lower.max(0.0) - rounding
     });
-    let contact = places.chain([found.at]).filter(|u| measured(*u).0 < limit).reduce(f64::min);
+    let contact = points.chain([found.at]).filter(|u| measured(*u).0 < limit).reduce(f64::min);
     CrossCheck { contact, agrees: same && lowest }
 }
 
-/// Distance of a point from a shape by parry, zero within.
+/// Returns the distance of a point from a shape by parry, zero inside.
 fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
     let vector = |v: Vector3<f64>| Vector::new(v.x, v.y, v.z);
-    let point = vector(shape.turned(point));
+    let point = vector(shape.to_box_frame(point));
     match shape {
         Shape::Ball { radius_m } => Ball::new(*radius_m).distance_to_local_point(point, true),
         Shape::Box { half_m, .. } => Cuboid::new(vector(*half_m)).distance_to_local_point(point, true),
@@ -101,23 +101,24 @@ fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
 /// Width of the band around delta in which the two detectors may differ, in units of eps (|r0|^2 + delta^2) of squared
 /// separation.
 ///
-/// The cast decides by b^2 - |d|^2 (|r0|^2 - delta^2) and takes its root. Each sum of three products carries 3 u
-/// (u = eps/2); collected, the discriminant over |d|^2, which is delta^2 less the squared distance of the line, is off by
-/// at most 17 u |r0|^2 + 7 u delta^2, and the root adds 3 u of both. The closed form adds 8 u |r0| delta
-/// (`RelativeMotion::resolution_m` without its margin). Interpolated ends add 16 u S delta, S their scale. The sum stays below 24 u = 12 eps and is rounded up to a power of two.
-/// At |r0| = 10 m and delta = 2 m the band is 1e-13 m wide.
+/// The cast decides by b^2 - |d|^2 (|r0|^2 - delta^2) and takes its root. Each sum of three products carries 3 u (u =
+/// eps/2). The discriminant over |d|^2, which is delta^2 less the squared distance of the line, is off by at most 17 u
+/// |r0|^2 + 7 u delta^2, and the root adds 3 u of both. The closed form adds 8 u |r0| delta
+/// (`RelativeMotion::resolution_m` without its margin). Interpolated ends add 16 u S delta, S their scale. The sum
+/// stays below 24 u = 12 eps and is rounded up to a power of two. At |r0| = 10 m and delta = 2 m the band is 1e-13 m
+/// wide.
 const GRAZING_BAND: f64 = 16.0 * f64::EPSILON;
 
-/// Relative motions shorter than this \[m\] are given to parry as none: their squares underflow, and no accepted delta
-/// resolves them.
+/// Length below which a relative motion is cast as zero \[m\]: its square underflows, and no accepted delta resolves
+/// it.
 const NO_MOTION_M: f64 = 1e-100;
 
-/// What the second detector says of a segment of motion.
+/// Result of the second detector for a segment of motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CrossCheck {
-    /// Fraction of the segment at which it sees the first contact; NaN where it cannot tell.
+    /// Fraction of the segment at the first contact; NaN if parry fails.
     pub(super) contact: Option<f64>,
-    /// Whether it agrees with the first.
+    /// Whether the result agrees with the first detector.
     pub(super) agrees: bool,
 }
 
@@ -134,7 +135,7 @@ impl KeepOut {
         Self { ball: Ball::new(delta_m / 2.0), delta_m }
     }
 
-    /// When the balls first touch, as a fraction of the step; NaN if parry cannot tell.
+    /// Returns the fraction of the step at which the balls first touch; NaN if parry fails.
     #[inline]
     pub(super) fn cast(&self, motion: &RelativeMotion) -> Option<f64> {
         if motion.by.norm_squared() < NO_MOTION_M * NO_MOTION_M {
@@ -159,13 +160,14 @@ impl KeepOut {
         cast_shapes_ball_ball(&other, by, &self.ball, &self.ball, options).map(|hit| hit.time_of_impact)
     }
 
-    /// Whether the closest approach is below delta or so little above it that it takes a closer look.
+    /// Returns whether the closest approach is below delta, or so little above it that rounding matters.
     #[inline]
     pub(super) fn is_near(&self, motion: &RelativeMotion, closest: ClosestPoint) -> bool {
         closest.squared <= self.delta_m * self.delta_m + self.grazing_band(motion)
     }
 
-    /// When a motion that is closest here is below delta, given whether it is, beside what the cast says.
+    /// Returns the part of the motion below delta, and the comparison with the contact of the cast. `is_below` states
+    /// whether the closest approach is below delta.
     pub(super) fn compare(
         &self,
         motion: &RelativeMotion,
@@ -177,11 +179,11 @@ impl KeepOut {
         (below, CrossCheck { contact, agrees: self.agrees(motion, closest, below, contact) })
     }
 
-    /// Whether the two answers are the same up to rounding ([`GRAZING_BAND`]).
+    /// Returns whether the two results agree up to rounding ([`GRAZING_BAND`]).
     ///
-    /// Where one says contact and the other none, the smallest separation must lie in the band. Where both say contact,
-    /// the squared separation must change by less than the band between the two entries: that is l (2 h + l) for entries
-    /// l apart along the path, with h half the chord that the path cuts out of the ball of radius delta.
+    /// If only one detector reports a contact, the smallest separation must lie in the band. If both do, the squared
+    /// separation must change by less than the band between the two entries. That change is l (2 h + l) for entries l
+    /// apart along the path, with h half the chord that the path cuts out of the ball of radius delta.
     fn agrees(
         &self,
         motion: &RelativeMotion,
@@ -207,7 +209,7 @@ impl KeepOut {
         apart_squared <= self.grazing_band(motion)
     }
 
-    /// Width of the band for this motion \[m^2\].
+    /// Returns the width of the band for this motion \[m^2\].
     #[inline]
     fn grazing_band(&self, motion: &RelativeMotion) -> f64 {
         GRAZING_BAND * (larger(motion.from_squared, motion.interpolated_squared) + self.delta_m * self.delta_m)
@@ -239,27 +241,27 @@ mod tests {
     }
 
     #[test]
-    fn what_rounding_explains_of_a_distance_is_no_disagreement_however_far_the_obstacle_is() {
+    fn rounding_of_a_distance_is_no_disagreement_far_from_the_origin() {
         for shape in one_of_each() {
             for k in 0..50_u32 {
                 let turn = f64::from(k) * 2.4;
                 let far = Vector3::new(3e7 * turn.cos(), 2e7 * turn.sin(), 1e7);
-                // Past it: nearest somewhere between the ends.
+                // Past the obstacle: nearest somewhere between the ends.
                 let across = Vector3::new(-far.y, far.x, 0.0).normalize();
                 let along = |u: f64| far + across * (6e6 * u - 2.9e6);
                 let (lower, at) = shape.closest(along(0.0), along(1.0));
                 let right = Minimum { lower, upper: lower, at };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
-                // Within, parry says zero however deep it is.
+                // Inside, parry returns zero at every depth.
                 let wrong = Minimum { upper: lower + 0.1, ..right };
-                // Within a half-space one depth is as good as another.
+                // Inside a half-space the second detector cannot tell two depths apart.
                 assert!(lower < 0.0 || !from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {far:?}");
             }
         }
     }
 
     #[test]
-    fn a_minimum_that_is_wrong_is_a_disagreement() {
+    fn a_wrong_minimum_is_a_disagreement() {
         let along = |u: f64| Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
         for shape in one_of_each() {
             let (lower, at) = shape.closest(along(0.0), along(1.0));
@@ -279,8 +281,8 @@ mod tests {
 
     const DELTA_M: f64 = 2.0;
 
-    /// A straight pass: `miss_m` from zero at the closest, seen from `before_m` ahead of it to `after_m` behind it, in the
-    /// plane of two directions.
+    /// Returns a straight pass at the distance `miss_m` from the origin, from `before_m` ahead of the closest point to
+    /// `after_m` behind it, in the plane of two directions.
     fn pass(miss_m: f64, before_m: f64, after_m: f64, along: [f64; 3], aside: [f64; 3]) -> Option<RelativeMotion> {
         let along = Vector3::from(along).try_normalize(1e-3)?;
         let aside = Vector3::from(aside);
@@ -292,7 +294,7 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn the_detectors_agree_within_the_band_even_where_rounding_decides(
+        fn the_detectors_agree_within_the_grazing_band(
             ulps in -40.0..40.0_f64,
             (before, after) in (-6.0..6.0_f64, -6.0..6.0_f64),
             along in prop::array::uniform3(-1.0..1.0_f64),
@@ -308,13 +310,13 @@ mod tests {
             let is_below = closest.separation_m() < DELTA_M;
             let (below, check) = keep_out.compare(&motion, closest, is_below, keep_out.cast(&motion));
             prop_assert!(check.agrees, "{below:?} {check:?}");
-            // What needs no closer look is clear to both.
+            // A motion that is not near is clear for both detectors.
             prop_assert!(keep_out.is_near(&motion, closest) || (below.is_none() && check.contact.is_none()));
         }
     }
 
     #[test]
-    fn any_answer_that_rounding_does_not_explain_is_a_disagreement() {
+    fn a_difference_beyond_rounding_is_a_disagreement() {
         let keep_out = KeepOut::new(DELTA_M);
         let agrees = |miss_m: f64, change: fn(Option<f64>) -> Option<f64>| {
             let motion = pass(miss_m, 10.0, 10.0, [1.0, 2.0, 0.5], [0.0, 1.0, -1.0]).unwrap();

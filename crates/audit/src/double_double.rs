@@ -1,8 +1,8 @@
-//! Sums and products of doubles with twice the digits, and the exact sign of a sum.
+//! Double-double arithmetic: sums and products of doubles with twice the digits, and the exact sign of a sum.
 //!
 //! u = 2^-53 is the unit roundoff. The algorithms and their bounds are those of M. Joldes, J.-M. Muller and V. Popescu
-//! (ACM Transactions on Mathematical Software 44(2), 15, 2017) and of J. R. Shewchuk (Discrete & Computational Geometry 18,
-//! 305, 1997). They hold where no product underflows and no number overflows; callers check the sizes.
+//! (ACM Transactions on Mathematical Software 44(2), 15, 2017) and of J. R. Shewchuk (Discrete & Computational Geometry
+//! 18, 305, 1997). They hold if no product underflows and no number overflows; callers check the sizes.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -11,7 +11,7 @@ pub(super) const OPERATION: f64 = f64::EPSILON * f64::EPSILON * 4.0;
 /// Relative error of a quotient of two [`DoubleDouble`]s: at most 64 u^2.
 pub(super) const QUOTIENT: f64 = 4.0 * OPERATION;
 
-/// The unevaluated sum of two doubles, the second at most half a unit in the last place of the first.
+/// Unevaluated sum of two doubles, the second at most half a unit in the last place of the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct DoubleDouble {
     pub(super) high: f64,
@@ -114,39 +114,39 @@ impl Mul for DoubleDouble {
     }
 }
 
-/// Terms of |r|^2 - x^2: six for each axis, and two.
-const MOST_TERMS: usize = 20;
+/// Largest number of terms of |r|^2 - x^2: six for each axis, and two.
+const MAX_TERMS: usize = 20;
 
-/// An exact sum of doubles: terms that do not overlap, the smallest first.
+/// Exact sum of doubles: terms that do not overlap, the smallest first.
 #[derive(Debug)]
 struct Expansion {
-    terms: [f64; MOST_TERMS],
+    terms: [f64; MAX_TERMS],
     count: usize,
 }
 
 impl Expansion {
-    /// Adds a number; at most [`MOST_TERMS`] times.
+    /// Adds a number; at most [`MAX_TERMS`] times.
     fn add(&mut self, number: f64) {
-        let (mut carried, mut kept) = (number, 0);
+        let (mut carry, mut kept) = (number, 0);
         for k in 0..self.count {
-            let sum = two_sum(carried, self.terms[k]);
-            carried = sum.high;
+            let sum = two_sum(carry, self.terms[k]);
+            carry = sum.high;
             if sum.low != 0.0 {
                 self.terms[kept] = sum.low;
                 kept += 1;
             }
         }
-        if carried != 0.0 {
-            self.terms[kept] = carried;
+        if carry != 0.0 {
+            self.terms[kept] = carry;
             kept += 1;
         }
         self.count = kept;
     }
 }
 
-/// Whether |r| < x, exactly.
+/// Returns whether |r| < x, exactly.
 pub(super) fn is_shorter(r: &[DoubleDouble; 3], x: f64) -> bool {
-    let mut sum = Expansion { terms: [0.0; MOST_TERMS], count: 0 };
+    let mut sum = Expansion { terms: [0.0; MAX_TERMS], count: 0 };
     let mut add = |product: DoubleDouble, sign: f64| {
         for term in [product.low, product.high] {
             if term != 0.0 {
@@ -162,7 +162,7 @@ pub(super) fn is_shorter(r: &[DoubleDouble; 3], x: f64) -> bool {
             add(two_product(low, low), 1.0);
         }
     }
-    // The last term is larger than all others together.
+    // The last term is larger than the sum of all others.
     sum.count > 0 && sum.terms[sum.count - 1] < 0.0
 }
 
@@ -193,9 +193,9 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn every_operation_is_within_its_bound(a in pair(), b in pair(), near in -4..4_i32) {
+        fn every_operation_is_within_its_error_bound(a in pair(), b in pair(), near in -4..4_i32) {
             prop_assume!(a.high != 0.0 && b.high != 0.0);
-            // One that nearly cancels, too.
+            // A second operand that nearly cancels.
             let almost = two_sum(-a.high * (1.0 + f64::from(near) * f64::EPSILON), 0.5 * a.low);
             let within = |found: DoubleDouble, expected: BigRational, bound: f64| {
                 let off = value(found) - &expected;
@@ -221,10 +221,10 @@ mod tests {
     }
 
     #[test]
-    fn equal_is_not_shorter() {
+    fn an_equal_length_is_not_shorter() {
         let r = [3.0, 0.0, -4.0].map(DoubleDouble::from);
         assert!(!is_shorter(&r, 5.0) && is_shorter(&r, 5.0_f64.next_up()) && !is_shorter(&r, 5.0_f64.next_down()));
-        // 0.3 - 0.1 is 0.2 less a part that no double of that size holds.
+        // 0.3 - 0.1 is 0.2 less a part that is not a double of that size.
         let along = DoubleDouble::difference(0.3, 0.1);
         let r = [along, DoubleDouble::default(), DoubleDouble::default()];
         assert_eq!(is_shorter(&r, along.high), along.low < 0.0);

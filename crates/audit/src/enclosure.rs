@@ -1,35 +1,35 @@
 //! Certified minima on curves: branch and bound with Bernstein coefficients.
 //!
-//! Over a segment the relative position is a polynomial r(u), u from 0 to 1. A polynomial lies between its least and its
-//! greatest Bernstein coefficient, so those of |r|^2 enclose the squared distance; for an obstacle the control points of r
-//! enclose the distance from their chord. Halving the segment makes both bounds tight to second order. What rounding adds
-//! is bounded from the magnitudes that are summed, and widens the bounds.
+//! Over a segment the relative position is a polynomial r(u), u from 0 to 1. A polynomial lies between its least and
+//! its greatest Bernstein coefficient. Those of |r|^2 enclose the squared distance between vehicles. For an obstacle
+//! the control points of r bound the distance of the curve from its chord. Bisecting the segment makes both bounds
+//! tight to second order. Rounding is bounded from the magnitudes that are summed, and widens the bounds.
 
 use nalgebra::Vector3;
 
 use super::obstacle::Shape;
 use super::outcome::WIDTH_M;
-use super::polynomial::{BernsteinBasis, parts_told, rescale, value};
+use super::polynomial::{BernsteinBasis, classify_parts, rescale, value};
 use super::sweep::{RelativeMotion, Span};
 
-/// Parts that a search looks at in all before it gives up and answers with the interval it has, and products of Bernstein
-/// coefficients that these may take: those of twenty thousand parts of the seventh degree.
-const MOST_PARTS: usize = 20_000;
-const MOST_PRODUCTS: usize = MOST_PARTS * 15 * 15;
-/// Shortest part of a segment, as a fraction of it, that is looked at for when a distance is passed.
+/// Largest number of parts that a search examines before it returns the interval reached so far.
+const MAX_PARTS: usize = 20_000;
+/// Largest number of products of Bernstein coefficients in a search: those of [`MAX_PARTS`] parts of degree seven.
+const MAX_PRODUCTS: usize = MAX_PARTS * 15 * 15;
+/// Shortest part of a segment, as a fraction of it, to which the crossing of a distance is narrowed.
 const SHORTEST_PART: f64 = 1e-10;
 
-/// What a moving point keeps a distance from.
+/// Object whose distance from a moving point is searched.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Target<'a> {
-    /// The other vehicle: the origin of relative positions.
+    /// Other vehicle: the origin of relative positions.
     Origin,
-    /// An obstacle, relative to its place.
+    /// Obstacle, relative to its position.
     Shape(&'a Shape),
 }
 
 impl Target<'_> {
-    /// The distance of a point from it.
+    /// Returns the distance of a point.
     pub(super) fn distance(self, point: Vector3<f64>) -> f64 {
         match self {
             Self::Origin => point.norm(),
@@ -38,18 +38,18 @@ impl Target<'_> {
     }
 }
 
-/// The smallest distance over a segment.
+/// Enclosure of the smallest distance over a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Minimum {
-    /// It is at least this.
+    /// Lower bound.
     pub(super) lower: f64,
-    /// And at most this, which is reached,
+    /// Upper bound, which is reached at the fraction `at`.
     pub(super) upper: f64,
-    /// at this fraction of the segment.
+    /// Fraction of the segment at which the upper bound is reached.
     pub(super) at: f64,
 }
 
-/// A relative position over a segment, and where it is close to a target.
+/// Search for a relative position close to a target, over a segment.
 #[derive(Debug)]
 pub(super) struct Search<'a> {
     pub(super) target: Target<'a>,
@@ -57,21 +57,21 @@ pub(super) struct Search<'a> {
     basis: BernsteinBasis,
     part: Vec<Vector3<f64>>,
     squared: Vec<f64>,
-    /// Parts that may still be looked at.
+    /// Number of parts that may still be examined.
     left: usize,
 }
 
 impl<'a> Search<'a> {
-    /// A search along the polynomial with coefficients `r`, at least one.
+    /// Creates a search along the polynomial with coefficients `r`, at least one.
     pub(super) fn new(target: Target<'a>, r: &'a [Vector3<f64>]) -> Self {
         let degree = r.len().saturating_sub(1);
-        let wanted = if matches!(target, Target::Origin) { 2 * degree } else { degree };
-        let basis = BernsteinBasis::of_degree(wanted);
-        let left = MOST_PARTS.min(MOST_PRODUCTS / (wanted + 1).pow(2));
+        let squared_degree = if matches!(target, Target::Origin) { 2 * degree } else { degree };
+        let basis = BernsteinBasis::of_degree(squared_degree);
+        let left = MAX_PARTS.min(MAX_PRODUCTS / (squared_degree + 1).pow(2));
         Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new(), left }
     }
 
-    /// The motion, where it is straight.
+    /// Returns the motion if it is straight.
     pub(super) fn straight(&self) -> Option<RelativeMotion> {
         match *self.r {
             [from] => Some(RelativeMotion::new(from, from)),
@@ -80,12 +80,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The motion, where it is straight and its distance known in closed form.
+    /// Returns the motion if it is straight and its distance has a closed form.
     pub(super) fn exact(&self) -> Option<RelativeMotion> {
         self.straight().filter(|_| matches!(self.target, Target::Origin))
     }
 
-    /// The smallest distance, in closed form or to within [`WIDTH_M`]; `None` if it is not below `cutoff`.
+    /// Returns the smallest distance, in closed form or to within [`WIDTH_M`]; `None` if it is not below `cutoff`.
     pub(super) fn minimum(&mut self, cutoff: f64) -> Option<Minimum> {
         let Some(motion) = self.straight() else { return self.minimum_within((0.0, 1.0), cutoff) };
         let (lower, at) = match self.target {
@@ -98,15 +98,15 @@ impl<'a> Search<'a> {
         (lower < cutoff).then_some(Minimum { lower, upper: lower, at })
     }
 
-    /// The smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not below
-    /// `cutoff`.
+    /// Returns the smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not
+    /// below `cutoff`.
     pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64) -> Option<Minimum> {
         let (mut length, mut open) = (to - from, vec![(self.enclose(from, to - from).0, from)]);
         let (start, end) = (self.distance(from), self.distance(to));
         let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
         let mut lower = upper;
         loop {
-            // What cannot hold anything below what is known leaves its bound behind.
+            // A part that cannot improve the result is dropped; its lower bound is kept.
             let enough = cutoff.min(upper - self.width(upper));
             let give_up = self.left == 0;
             open.retain(|&(low, _)| {
@@ -131,30 +131,30 @@ impl<'a> Search<'a> {
         (lower < cutoff).then_some(Minimum { lower, upper, at })
     }
 
-    /// The parts of the segment that are spent below a distance, given that it is below at the fraction `at`; each to
-    /// within [`SHORTEST_PART`], rather too long than too short.
+    /// Returns the parts of the segment below a distance, given that the distance at the fraction `at` is. Each part is
+    /// exact to within [`SHORTEST_PART`], rather too long than too short.
     pub(super) fn below(&mut self, distance: f64, at: f64) -> Vec<(f64, f64)> {
         if let Some(motion) = self.exact() {
             let Span { enter, exit } = motion.below(distance, motion.closest());
             return vec![(enter, exit)];
         }
-        let parts = parts_told(SHORTEST_PART, self.left, |start, length| match self.enclose(start, length) {
+        let parts = classify_parts(SHORTEST_PART, self.left, |start, length| match self.enclose(start, length) {
             (low, _) if low >= distance => Some(false),
             (_, high) if high < distance => Some(true),
             _ => None,
         });
-        // Unbroken runs of parts that are not above for certain; kept is what is below for certain.
+        // Runs of adjacent parts that are not certainly above; a run is kept if it is below or contains `at`.
         let runs = parts.chunk_by(|a, b| a.2 != Some(false) && b.2 != Some(false));
         let spans = runs.filter_map(|run| {
             let (from, to) = (run.first()?.0, run.last()?.1);
-            let told = |told| run.iter().any(|part| part.2 == Some(told));
-            (told(true) || !told(false) && from <= at && at <= to).then_some((from, to))
+            let has = |class| run.iter().any(|part| part.2 == Some(class));
+            (has(true) || !has(false) && from <= at && at <= to).then_some((from, to))
         });
         let spans: Vec<_> = spans.collect();
         if spans.is_empty() { vec![(at, at)] } else { spans }
     }
 
-    /// The distance at a fraction of the segment.
+    /// Returns the distance at a fraction of the segment.
     pub(super) fn distance(&self, u: f64) -> f64 {
         self.target.distance(self.position(u))
     }
@@ -163,7 +163,7 @@ impl<'a> Search<'a> {
         value(self.r, u)
     }
 
-    /// Lower and upper bound of the distance over a part of the segment.
+    /// Returns a lower and an upper bound of the distance over a part of the segment.
     fn enclose(&mut self, start: f64, length: f64) -> (f64, f64) {
         self.left = self.left.saturating_sub(1);
         self.part.clear();
@@ -190,8 +190,8 @@ impl<'a> Search<'a> {
         ((low - rounding).max(0.0).sqrt().next_down().max(0.0), (high + rounding).max(0.0).sqrt().next_up())
     }
 
-    /// The distance from a convex set, below zero within, changes no faster than the point moves, and is greatest at a
-    /// corner of what encloses the point.
+    /// Bounds the distance from a convex set, negative inside. It changes no faster than the point moves, and it is
+    /// greatest at a control point.
     fn enclose_shape(&self, shape: &Shape) -> (f64, f64) {
         let n = self.part.len();
         let from = self.part[0];
@@ -206,12 +206,12 @@ impl<'a> Search<'a> {
         (shape.closest(from, to).0 - stray - rounding, high + rounding)
     }
 
-    /// What is summed for a position, at most.
+    /// Returns a bound on the sum of the terms of a position.
     fn magnitude(&self) -> f64 {
         self.part.iter().map(Vector3::norm).sum()
     }
 
-    /// How near the bounds of a distance are brought: no nearer than rounding lets them come.
+    /// Returns the width to which the bounds of a distance are brought; rounding limits it.
     fn width(&self, distance: f64) -> f64 {
         let scale = match self.target {
             Target::Origin => distance,
@@ -225,8 +225,7 @@ impl<'a> Search<'a> {
 mod tests {
     use super::*;
 
-    /// A curve of degree 7 that comes to exactly `miss` from the origin at u = 1/3: its distance is the root of
-    /// miss^2 + (3 u - 1)^2 (1 + u^2)^2 ... by construction of its two parts at right angles.
+    /// Returns a curve of degree 7 whose smallest distance from the origin is exactly `miss`, at u = 1/3.
     fn pass(miss: f64) -> Vec<Vector3<f64>> {
         // x = (3 u - 1)(1 + u^2)^3 = (3 u - 1)(1 + 3 u^2 + 3 u^4 + u^6)
         let x = [-1.0, 3.0, -3.0, 9.0, -3.0, 9.0, -1.0, 3.0];
@@ -246,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_minimum_that_is_not_below_the_cutoff_is_not_looked_for() {
+    fn a_minimum_above_the_cutoff_is_not_searched() {
         let r = pass(0.3);
         assert!(Search::new(Target::Origin, &r).minimum(0.29).is_none());
         assert!(Search::new(Target::Origin, &r).minimum(0.31).is_some());
@@ -264,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn two_dips_are_two_times() {
+    fn two_dips_are_two_intervals() {
         // x = 4 (u - 1/4)(u - 3/4): below 0.1 around both roots.
         let r = [0.75, -4.0, 4.0].map(|x| Vector3::new(x, 0.0, 0.0));
         let mut search = Search::new(Target::Origin, &r);
@@ -273,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_distance_of_a_curve_from_an_obstacle_is_enclosed_too() {
+    fn the_distance_of_a_curve_from_an_obstacle_is_enclosed() {
         let shape = Shape::Box { half_m: Vector3::repeat(0.25), yaw_rad: 0.0 };
         // A parabola over the box: z = 1 + (u - 1/2)^2, x from -1 to 1.
         let r = [Vector3::new(-1.0, 0.0, 1.25), Vector3::new(2.0, 0.0, -1.0), Vector3::new(0.0, 0.0, 1.0)];

@@ -1,16 +1,19 @@
-//! The separation of two vehicles on straight lines, exactly.
+//! Exact separation of two vehicles on straight lines.
 //!
-//! A [`Line`] joins two samples, whose times and positions are the doubles that were read. Over the time that two lines
-//! share, the relative position moves on a straight line too, from r0 to r1 = r0 + d, whose coordinates are fractions of
-//! these doubles. It is below x iff |r0| < x, or |r1| < x, or it is so between the ends:
+//! A [`Line`] joins two samples, whose times and positions are the doubles of the recording. Over the time that two
+//! lines share, the relative position moves on a straight line too, from r0 to r1 = r0 + d. Its coordinates are
+//! fractions of these doubles. The separation falls below x iff |r0| < x, or |r1| < x, or between the ends:
 //!
 //! ```text
 //! r0 . d < 0 < r1 . d   and   |r0|^2 |d|^2 - (r0 . d)^2 < x^2 |d|^2
 //! ```
 //!
-//! Three stages decide it, each where the one before it cannot: doubles ([`RelativeMotion`](super::sweep::RelativeMotion),
-//! whose callers know its rounding), numbers of twice the digits with a bound on their error, and whole numbers: all
-//! coordinates in units of one power of two, all times in units of another, both sides multiplied by what they are divided by.
+//! Three stages decide it, each if the one before cannot:
+//!
+//! - Doubles ([`RelativeMotion`](super::sweep::RelativeMotion)), with a bound on their rounding.
+//! - Double-doubles, with a bound on their error.
+//! - Integers: all coordinates in units of one power of two and all times in units of another. Both sides are
+//!   multiplied by their denominators.
 
 use std::cmp::Ordering;
 
@@ -21,7 +24,7 @@ use super::double_double::{DoubleDouble, OPERATION, is_shorter};
 use super::segment::{INTERPOLATION, Line, Place};
 use super::sweep::Interval;
 
-/// Two lines over a time within both.
+/// Motion of two vehicles on lines over an interval within both.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExactMotion {
     pub(super) first: Line,
@@ -29,14 +32,14 @@ pub(super) struct ExactMotion {
     pub(super) over: Interval,
 }
 
-/// Squares of lengths between these neither underflow nor overflow in any product of four of them.
+/// Range of squared lengths in which no product of four lengths underflows or overflows.
 const SQUARES: std::ops::RangeInclusive<f64> = 1e-200..=1e142;
-/// Units in the last place by which a separation is corrected before it is computed in whole numbers.
-const MOST_STEPS: u32 = 4;
+/// Largest number of units in the last place by which a separation is corrected before it is computed with integers.
+const MAX_CORRECTIONS: u32 = 4;
 /// Smallest size of a coordinate whose square has all of its digits.
 const SQUARABLE: f64 = 1e-120;
 
-/// Whether a number is below another one, given how far it can be off; `None` where that does not say.
+/// Returns the sign of a number with this error bound; `None` if the error could change the sign.
 fn sign(number: DoubleDouble, error: f64) -> Option<Ordering> {
     match number.high {
         high if high > error => Some(Ordering::Greater),
@@ -57,23 +60,23 @@ fn dot(a: &[DoubleDouble; 3], b: &[DoubleDouble; 3]) -> DoubleDouble {
 }
 
 impl ExactMotion {
-    /// Whether the separation falls below a distance.
+    /// Returns whether the separation falls below a distance.
     pub(super) fn is_below(&self, distance: f64) -> bool {
         let is_limited = distance < f64::INFINITY;
-        !is_limited || self.filtered(distance).unwrap_or_else(|| self.whole(distance).is_below())
+        !is_limited || self.decide_by_double_doubles(distance).unwrap_or_else(|| self.integer(distance).is_below())
     }
 
-    /// Whether the separation is below a distance at the start.
+    /// Returns whether the separation is below a distance at the start.
     pub(super) fn starts_below(&self, distance: f64) -> bool {
         let [start, _] = self.ends();
-        start.is_below(distance).unwrap_or_else(|| self.whole(distance).starts_below())
+        start.is_below(distance).unwrap_or_else(|| self.integer(distance).starts_below())
     }
 
-    /// The largest double that the separation never falls below.
+    /// Returns the smallest separation, rounded down to a double.
     pub(super) fn separation(&self) -> f64 {
-        let Some(mut distance) = self.about() else { return self.whole(0.0).separation() };
+        let Some(mut distance) = self.approximate_separation() else { return self.integer(0.0).separation() };
         let mut is_next_below = false;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_CORRECTIONS {
             if self.is_below(distance) {
                 distance = distance.next_down();
                 is_next_below = true;
@@ -83,21 +86,21 @@ impl ExactMotion {
                 distance = distance.next_up();
             }
         }
-        self.whole(0.0).separation()
+        self.integer(0.0).separation()
     }
 
-    /// The largest double that the first time of the smallest separation is not before \[s\].
+    /// Returns the first time of the smallest separation, rounded down to a double \[s\].
     pub(super) fn closest_s(&self) -> f64 {
-        self.whole(0.0).closest_s(self.over)
+        self.integer(0.0).closest_s(self.over)
     }
 
-    /// The motion in whole numbers.
+    /// Returns the motion in integers.
     #[cold]
-    fn whole(&self, distance: f64) -> WholeMotion {
-        WholeMotion::new([&self.first, &self.second], self.over, distance)
+    fn integer(&self, distance: f64) -> IntegerMotion {
+        IntegerMotion::new([&self.first, &self.second], self.over, distance)
     }
 
-    /// The relative position at both ends.
+    /// Returns the relative position at both ends.
     fn ends(&self) -> [End; 2] {
         let Self { first, second, .. } = self;
         if first.from == first.to && second.from == second.to {
@@ -120,8 +123,8 @@ impl ExactMotion {
         })
     }
 
-    /// The answer of twice the digits, where their rounding leaves no doubt.
-    fn filtered(&self, distance: f64) -> Option<bool> {
+    /// Decides by double-doubles; `None` if their rounding could change the result.
+    fn decide_by_double_doubles(&self, distance: f64) -> Option<bool> {
         let [start, end] = self.ends();
         let is_below = start.is_below(distance)?;
         if is_below || End::are_same(&start, &end) {
@@ -143,8 +146,8 @@ impl ExactMotion {
         }
     }
 
-    /// The smallest separation, to about a unit in the last place; `None` where its size does not allow it.
-    fn about(&self) -> Option<f64> {
+    /// Returns the smallest separation to about a unit in the last place; `None` if its size is out of range.
+    fn approximate_separation(&self) -> Option<f64> {
         let [start, end] = self.ends();
         let ends = [&start, &end].map(|end| dot(&end.r, &end.r).high);
         let nearest = ends[0].min(ends[1]);
@@ -157,7 +160,7 @@ impl ExactMotion {
     }
 }
 
-/// A relative position at an end of the shared time, and how far it can be off.
+/// Relative position at an end of the shared time, with a bound on its error.
 #[derive(Clone, Copy)]
 struct End {
     r: [DoubleDouble; 3],
@@ -165,18 +168,19 @@ struct End {
 }
 
 impl End {
-    /// Whether nothing moves.
+    /// Returns whether the relative position is constant.
     fn are_same(start: &Self, end: &Self) -> bool {
         start.error == 0.0 && end.error == 0.0 && start.r == end.r
     }
 
-    /// Whether no term of the exact square underflows.
+    /// Returns whether no term of the exact square underflows.
     fn is_squarable(&self) -> bool {
         let parts = self.r.iter().flat_map(|x| [x.high, x.low]);
         parts.into_iter().all(|part| part == 0.0 || part.abs() > SQUARABLE)
     }
 
-    /// Whether it is nearer than a distance.
+    /// Returns whether the position is nearer to the origin than a distance; `None` if rounding could change the
+    /// result.
     fn is_below(&self, distance: f64) -> Option<bool> {
         if self.error == 0.0 && self.r.iter().all(|x| x.high == 0.0) {
             return Some(distance > 0.0);
@@ -194,7 +198,7 @@ impl End {
     }
 }
 
-/// What decides whether a relative motion is closest between its ends.
+/// Terms that decide whether a relative motion is closest between its ends.
 struct Between {
     /// |r0|^2 |d|^2 - (r0 . d)^2.
     cross_squared: DoubleDouble,
@@ -206,12 +210,12 @@ struct Between {
     /// |r0| and |d|.
     length: f64,
     by: f64,
-    /// How far the ends can be off.
+    /// Bound on the error of the ends.
     end_error: f64,
 }
 
 impl Between {
-    /// `None` where the sizes leave it open.
+    /// Creates the terms; `None` if the sizes are out of range or the error of the ends is too large.
     fn of(start: &End, end: &End) -> Option<Self> {
         let d = [0, 1, 2].map(|axis| end.r[axis] - start.r[axis]);
         let end_error = start.error.max(end.error);
@@ -227,31 +231,31 @@ impl Between {
         Some(Self { cross_squared, by_squared, rates, rate_error, length, by, end_error })
     }
 
-    /// Bound on the error of `cross_squared` less x^2 |d|^2. With E the error of the ends, a = |r0| and b = |d|, and E at most a
-    /// quarter of both: the product |r0 x d| is off by c <= E (1.5 b + 2 a) < a b, its square by c (2 a b + c), and x^2 |d|^2
-    /// by 5 x^2 b E.
+    /// Returns a bound on the error of `cross_squared` less x^2 |d|^2. E is the error of the ends, a = |r0|, b = |d|,
+    /// and E is at most a quarter of both. The product |r0 x d| is off by c <= E (1.5 b + 2 a) < a b. Its square is off
+    /// by c (2 a b + c), and x^2 |d|^2 by 5 x^2 b E.
     fn error(&self, squared: f64) -> f64 {
         let (a, b) = (self.length, self.by);
         let of_ends = 16.0 * self.end_error * (a * b * b + a * a * b + squared * b);
         32.0 * OPERATION * (2.0 * a * a + squared) * b * b + of_ends
     }
 
-    /// Whether the closest point may lie between the ends.
+    /// Returns whether the closest point may lie between the ends.
     fn may_be_closer(&self) -> bool {
         self.rates[0].high < self.rate_error && self.rates[1].high > -self.rate_error
     }
 
-    /// Whether it lies there for certain.
+    /// Returns whether the closest point certainly lies between the ends.
     fn is_closer(&self) -> bool {
         self.rates[0].high < -self.rate_error && self.rates[1].high > self.rate_error
     }
 }
 
-/// A unit, 2 to some power, that doubles are whole numbers of.
+/// Unit of length or time: 2^k, with the exponent k.
 #[derive(Clone, Copy, Debug)]
 struct Units(i32);
 
-/// The mantissa of a finite double and the power of two that it is multiplied by.
+/// Returns the mantissa of a finite double and its power of two.
 fn parts(number: f64) -> (i64, i32) {
     let bits = number.to_bits();
     let (exponent, fraction) = ((bits >> 52) & 0x7ff, bits & ((1 << 52) - 1));
@@ -262,24 +266,24 @@ fn parts(number: f64) -> (i64, i32) {
 }
 
 impl Units {
-    /// The largest one that the exponents of these numbers allow.
+    /// Returns the largest unit that divides all these numbers.
     fn of(numbers: impl IntoIterator<Item = f64>) -> Self {
         let exponents = numbers.into_iter().filter(|x| *x != 0.0).map(|x| parts(x).1);
         Self(exponents.min().unwrap_or(0))
     }
 
-    /// The number in these units.
-    fn whole(self, number: f64) -> BigInt {
+    /// Returns the number in these units.
+    fn integer(self, number: f64) -> BigInt {
         let (mantissa, exponent) = parts(number);
         if mantissa == 0 { BigInt::ZERO } else { BigInt::from(mantissa) << exponent.abs_diff(self.0) }
     }
 }
 
-/// The motion in whole numbers: relative positions times `weight`, in units of length.
-pub(super) struct WholeMotion {
+/// Motion in integers: relative positions times `weight`, in units of length.
+pub(super) struct IntegerMotion {
     ends: [[BigInt; 3]; 2],
     by: [BigInt; 3],
-    /// A distance likewise.
+    /// Distance to compare with, scaled likewise.
     distance: BigInt,
     weight: BigInt,
     units: Units,
@@ -289,7 +293,7 @@ fn product(a: &[BigInt; 3], b: &[BigInt; 3]) -> BigInt {
     &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
 }
 
-impl WholeMotion {
+impl IntegerMotion {
     #[cold]
     pub(super) fn new(lines: [&Line; 2], over: Interval, distance: f64) -> Self {
         let times = Units::of(lines.iter().flat_map(|line| [line.from_s, line.to_s]).chain([over.from_s, over.to_s]));
@@ -298,15 +302,16 @@ impl WholeMotion {
         let at = [(over.from_s, false), (over.to_s, true)];
         let is_between = |line: &Line| at.iter().any(|&(t, end)| matches!(line.place(t, end), Place::Between));
         let weights = lines.map(|line| {
-            if is_between(line) { times.whole(line.to_s) - times.whole(line.from_s) } else { BigInt::from(1) }
+            if is_between(line) { times.integer(line.to_s) - times.integer(line.from_s) } else { BigInt::from(1) }
         });
         let position = |k: usize, time_s: f64, is_end: bool| {
             let line = lines[k];
             [0, 1, 2].map(|axis| match line.place(time_s, is_end) {
-                Place::Sample(at) => units.whole(at[axis]) * &weights[k],
+                Place::Sample(at) => units.integer(at[axis]) * &weights[k],
                 Place::Between => {
-                    let by = units.whole(line.to[axis]) - units.whole(line.from[axis]);
-                    units.whole(line.from[axis]) * &weights[k] + by * (times.whole(time_s) - times.whole(line.from_s))
+                    let by = units.integer(line.to[axis]) - units.integer(line.from[axis]);
+                    units.integer(line.from[axis]) * &weights[k]
+                        + by * (times.integer(time_s) - times.integer(line.from_s))
                 }
             })
         };
@@ -316,7 +321,7 @@ impl WholeMotion {
         });
         let by = [0, 1, 2].map(|axis| &ends[1][axis] - &ends[0][axis]);
         let weight = &weights[0] * &weights[1];
-        Self { ends, by, distance: units.whole(distance) * &weight, weight, units }
+        Self { ends, by, distance: units.integer(distance) * &weight, weight, units }
     }
 
     pub(super) fn starts_below(&self) -> bool {
@@ -328,7 +333,7 @@ impl WholeMotion {
         squared < &self.distance * &self.distance * by_squared
     }
 
-    /// The smallest squared separation as a numerator and a denominator.
+    /// Returns the smallest squared separation as a numerator and a denominator.
     fn closest(&self) -> (BigInt, BigInt) {
         let [start, end] = &self.ends;
         let start_rate = product(start, &self.by);
@@ -346,7 +351,7 @@ impl WholeMotion {
         root(&squared, &(by_squared * &self.weight * &self.weight), self.units.0)
     }
 
-    /// By bisection of the doubles from the first to the last instant.
+    /// Returns the first time of the smallest separation by bisection of the doubles in the interval.
     pub(super) fn closest_s(&self, over: Interval) -> f64 {
         let start_rate = product(&self.ends[0], &self.by);
         if start_rate >= BigInt::ZERO {
@@ -359,7 +364,7 @@ impl WholeMotion {
         // (t - from_s) |d|^2 <= -(r0 . d) (to_s - from_s)
         let is_reached = |time_s: f64| {
             let times = Units::of([over.from_s, over.to_s, time_s]);
-            let [from, to, at] = [over.from_s, over.to_s, time_s].map(|time_s| times.whole(time_s));
+            let [from, to, at] = [over.from_s, over.to_s, time_s].map(|time_s| times.integer(time_s));
             (at - &from) * &by_squared <= -&start_rate * (to - from)
         };
         let (mut low, mut high) = (over.from_s, over.to_s);
@@ -375,19 +380,19 @@ impl WholeMotion {
     }
 }
 
-/// Compares the height at a time within a line with another, exactly.
+/// Compares the height at a time within a line with another height, exactly.
 pub(super) fn compare_height(line: &Line, time_s: f64, height: f64) -> Ordering {
     let times = Units::of([line.from_s, line.to_s, time_s]);
     let lengths = Units::of([line.from.z, line.to.z, height]);
-    let above_start = lengths.whole(height) - lengths.whole(line.from.z);
-    let climbs = lengths.whole(line.to.z) - lengths.whole(line.from.z);
-    let [from, to, at] = [line.from_s, line.to_s, time_s].map(|time_s| times.whole(time_s));
+    let above_start = lengths.integer(height) - lengths.integer(line.from.z);
+    let climbs = lengths.integer(line.to.z) - lengths.integer(line.from.z);
+    let [from, to, at] = [line.from_s, line.to_s, time_s].map(|time_s| times.integer(time_s));
     (climbs * (at - &from)).cmp(&(above_start * (to - from)))
 }
 
-/// The double in the middle of all that lie between two.
+/// Returns the double in the middle of all doubles between two.
 fn between(low: f64, high: f64) -> f64 {
-    // Bits of doubles in the order of the numbers.
+    // Integers in the order of the doubles.
     let key = |number: f64| {
         let bits = number.to_bits().cast_signed();
         if bits < 0 { i64::MIN - bits } else { bits }
@@ -396,13 +401,13 @@ fn between(low: f64, high: f64) -> f64 {
     f64::from_bits(if middle < 0 { i64::MIN - middle } else { middle }.cast_unsigned())
 }
 
-/// The largest double that is at most the root of a fraction, times 2 to an exponent.
+/// Returns the square root of a fraction, times 2^`exponent`, rounded down to a double.
 fn root(numerator: &BigInt, denominator: &BigInt, exponent: i32) -> f64 {
     const DIGITS: u64 = 53;
     if *numerator == BigInt::ZERO {
         return 0.0;
     }
-    // So much that the root has more digits than a double.
+    // Shifted until the root has more digits than a double.
     let shift = (denominator.bits() + 2 * DIGITS + 4).saturating_sub(numerator.bits()).div_ceil(2);
     let root = ((numerator << (2 * shift)) / denominator).sqrt();
     let exponent = i64::from(exponent) - i64::try_from(shift).unwrap_or(i64::MAX);
@@ -410,7 +415,7 @@ fn root(numerator: &BigInt, denominator: &BigInt, exponent: i32) -> f64 {
     let mantissa = (root >> extra).to_u64_digits().1.first().copied().unwrap_or(0);
     let power = |exponent: i64| 2_f64.powi(i32::try_from(exponent).unwrap_or(i32::MAX));
     let exponent = exponent + extra;
-    // In two steps, neither of which rounds.
+    // In two steps, since one power of two could be out of range.
     mantissa as f64 * power(exponent / 2) * power(exponent - exponent / 2)
 }
 
@@ -420,7 +425,7 @@ mod tests {
 
     use super::*;
 
-    /// Small whole numbers, which meet distances exactly, and numbers of all digits of any size.
+    /// Generates small integers, which meet distances exactly, and numbers with all digits of any size.
     fn coordinate() -> impl Strategy<Value = f64> {
         let sized = (-1.0..1.0_f64, -300..200_i32).prop_map(|(x, exponent)| x * 2_f64.powi(exponent));
         prop_oneof![4 => (-6..7_i32).prop_map(f64::from), 4 => -10.0..10.0_f64, 1 => sized]
@@ -448,14 +453,14 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn every_stage_gives_the_answer_of_whole_numbers(motion in motion(), limit in 0..9_i32) {
+        fn every_stage_agrees_with_integers(motion in motion(), limit in 0..9_i32) {
             let separation = motion.separation();
-            prop_assert_eq!(separation, motion.whole(0.0).separation());
+            prop_assert_eq!(separation, motion.integer(0.0).separation());
             prop_assert!(!motion.is_below(separation) && motion.is_below(separation.next_up()), "{}", separation);
             for distance in [f64::from(limit), separation, separation.next_up(), separation.next_down().max(0.0)] {
-                let whole = motion.whole(distance);
-                prop_assert_eq!(motion.is_below(distance), whole.is_below());
-                prop_assert_eq!(motion.starts_below(distance), whole.starts_below());
+                let integer = motion.integer(distance);
+                prop_assert_eq!(motion.is_below(distance), integer.is_below());
+                prop_assert_eq!(motion.starts_below(distance), integer.starts_below());
             }
             let at_s = motion.closest_s();
             prop_assert!(motion.over.from_s <= at_s && at_s <= motion.over.to_s);
@@ -463,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn a_separation_of_the_smallest_size_is_a_double_too() {
+    fn a_separation_of_extreme_size_is_exact() {
         for size in [5e-324, 3e-310, 1e-170, 1e70] {
             let line = |y: f64, x: f64| Line {
                 from_s: 0.0,

@@ -1,5 +1,4 @@
-//! Findings so far: times below a limit, times that cannot be decided, the answers of the second detector, and the closest
-//! approaches.
+//! Findings so far: times below a limit, undecided times, results of the second detector, and closest approaches.
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,18 +10,18 @@ use super::findings::{Episodes, Finding, Tally};
 use super::outcome::{Approach, Disagreement, ObjectPair, ParryEvidence, Undecided, Violation};
 use super::sweep::{Interval, RelativeMotion};
 
-/// The findings on pairs that are named by `P`.
+/// Findings of pairs identified by `P`.
 #[derive(Clone, Debug)]
 pub(super) struct Ledger<P: Copy + Ord + fmt::Debug> {
-    /// In the order in which they were found.
+    /// Violations in the order in which they were found.
     pub(super) violations: Episodes<Violation<P>>,
     undecided: Episodes<Undecided<P>>,
-    /// The sampling rate that would decide all that is undecided \[Hz\]; none where there is none that would.
+    /// Sampling rate that would decide all undecided times \[Hz\]; `None` if no rate would.
     deciding_rate_hz: Option<f64>,
     pub(super) parry: ParryEvidence<P>,
 }
 
-/// Every violation and every undecided time, or the worst and the first of them, and how many there are.
+/// All violations and undecided times, or the worst and first of them, with their numbers.
 pub(super) struct Lists<P: Copy + Ord + fmt::Debug> {
     pub(super) violations: Vec<Violation<P>>,
     pub(super) undecided: Vec<Undecided<P>>,
@@ -32,9 +31,9 @@ pub(super) struct Lists<P: Copy + Ord + fmt::Debug> {
 }
 
 impl<P: Copy + Ord + fmt::Debug> Finding for Violation<P> {
-    type On = P;
+    type Subject = P;
 
-    fn on(&self) -> P {
+    fn subject(&self) -> P {
         self.pair
     }
 
@@ -48,9 +47,9 @@ impl<P: Copy + Ord + fmt::Debug> Finding for Violation<P> {
 }
 
 impl<P: Copy + Ord + fmt::Debug> Finding for Undecided<P> {
-    type On = P;
+    type Subject = P;
 
-    fn on(&self) -> P {
+    fn subject(&self) -> P {
         self.pair
     }
 
@@ -75,28 +74,28 @@ impl<P: Copy + Ord + fmt::Debug> Default for Ledger<P> {
 }
 
 impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
-    /// One that counts what it finds, and lists the worst and the first of it.
+    /// Creates a ledger that counts its findings and lists the worst and first of them.
     pub(super) fn bounded() -> Self {
         let (violations, undecided) = (Episodes::bounded(), Episodes::bounded());
         Self { violations, undecided, ..Self::default() }
     }
 
-    /// The window that is swept from now on, behind all that were.
-    pub(super) fn begin(&mut self, window: Interval) {
-        self.violations.begin(window);
-        self.undecided.begin(window);
+    /// Begins a new window, later than all earlier ones.
+    pub(super) fn begin_window(&mut self, window: Interval) {
+        self.violations.begin_window(window);
+        self.undecided.begin_window(window);
     }
 
-    /// Settles, now and then, what nothing that is still to be swept can continue. Is called between two pairs.
+    /// Settles finished findings if many are held. Called between two pairs.
     pub(super) fn settle(&mut self) {
         self.violations.settle();
         self.undecided.settle();
     }
 
-    /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of its
-    /// violation, if it is one. `least_m` gives the smallest separation of a violation.
+    /// Judges a straight motion that is below the limit, close to it, or in contact by the cast; returns the index of
+    /// its violation, if any. `least_m` computes the smallest separation of a violation.
     #[cold]
-    pub(super) fn near(
+    pub(super) fn judge_straight(
         &mut self,
         pair: P,
         keep_out: &KeepOut,
@@ -110,23 +109,23 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         let is_surely_below = approach.separation_m() + resolution_m < limit_m;
         let is_below = is_surely_below || exact.is_below(limit_m);
         let (span, check) = keep_out.compare(motion, approach, is_below, contact);
-        self.cross_check(pair, over, approach.separation_m(), span.map(|span| span.enter), check);
+        self.add_cross_check(pair, over, approach.separation_m(), span.map(|span| span.enter), check);
         let span = span?;
         let (from_s, to_s, min_at_s) = (over.at(span.enter), over.at(span.exit), over.at(approach.at));
-        if self.violations.is_of_before(to_s) {
+        if self.violations.is_from_earlier_window(to_s) {
             return None;
         }
         let violation = Violation { pair, from_s, to_s, min_m: least_m(), min_at_s, limit_m };
         let start_m = motion.from_squared.sqrt();
         let is_near = (start_m - limit_m).abs() <= resolution_m;
         let from_start = if is_near { exact.starts_below(limit_m) } else { start_m < limit_m };
-        Some(self.violated(violation, from_start))
+        Some(self.add_violation(violation, from_start))
     }
 
-    /// Enters a time below the limit, and says whether it is below from the very start of a segment; returns the index of
-    /// the violation that it is a part of. Those of one pair come in order of time, but may come again.
-    pub(super) fn violated(&mut self, new: Violation<P>, from_start: bool) -> usize {
-        let (all, known) = (&self.violations, self.violations.of(new.pair));
+    /// Adds a time below the limit; returns the index of the violation that contains it. `from_start` states that the
+    /// segment is below the limit from its first instant. Times of one pair come in order, and may come twice.
+    pub(super) fn add_violation(&mut self, new: Violation<P>, from_start: bool) -> usize {
+        let (all, known) = (&self.violations, self.violations.indices_of(new.pair));
         let mut touching = known.iter().rev().copied().take_while(|&k| all[k].to_s >= new.from_s);
         let repeated = touching.find(|&k| all[k].from_s <= new.from_s && new.to_s <= all[k].to_s);
         let continued = || known.last().copied().filter(|&k| from_start && new.from_s <= all[k].to_s);
@@ -141,10 +140,10 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         self.violations.add(new)
     }
 
-    /// Enters a time that cannot be decided; adjacent ones of a pair become one.
-    pub(super) fn undecided(&mut self, new: Undecided<P>) {
+    /// Adds an undecided time; adjacent undecided times of a pair are merged.
+    pub(super) fn add_undecided(&mut self, new: Undecided<P>) {
         self.deciding_rate_hz = self.deciding_rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
-        let last = self.undecided.of(new.pair).last().copied();
+        let last = self.undecided.indices_of(new.pair).last().copied();
         match last.and_then(|last| self.undecided.get_mut(last)) {
             Some(last) if new.from_s <= last.to_s && last.from_s <= new.to_s => {
                 last.to_s = last.to_s.max(new.to_s);
@@ -158,9 +157,16 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         }
     }
 
-    /// Enters what the second detector says of an interval, where the first finds this smallest distance and, at this
-    /// fraction, the first contact.
-    pub(super) fn cross_check(&mut self, pair: P, over: Interval, min_m: f64, enter: Option<f64>, check: CrossCheck) {
+    /// Adds the result of the second detector for an interval. `min_m` and `enter` are the smallest distance and the
+    /// fraction of the first contact by the first detector.
+    pub(super) fn add_cross_check(
+        &mut self,
+        pair: P,
+        over: Interval,
+        min_m: f64,
+        enter: Option<f64>,
+        check: CrossCheck,
+    ) {
         let [closed_form_s, parry_s] = [enter, check.contact].map(|fraction| fraction.map(|u| over.at(u)));
         let earlier_s = self.parry.min_toi_s;
         self.parry.min_toi_s = earlier_s.into_iter().chain(parry_s.filter(|time_s| !time_s.is_nan())).reduce(f64::min);
@@ -172,12 +178,12 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         }
     }
 
-    /// Whether every time is decided and the two detectors agree.
+    /// Returns whether every time is decided and the two detectors agree.
     pub(super) fn is_decided(&self) -> bool {
         self.undecided.is_empty() && self.parry.disagreements == 0
     }
 
-    /// What was found, in the order of its beginning and then by pair.
+    /// Returns the findings, ordered by start and then by pair.
     pub(super) fn into_lists(self) -> Lists<P> {
         let (violations, violations_tally) = self.violations.finish();
         let (undecided, undecided_tally) = self.undecided.finish();
@@ -186,47 +192,47 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     }
 }
 
-/// Approaches that are kept.
-pub(super) const KEPT: usize = 10;
+/// Largest number of approaches that are kept.
+pub(super) const MAX_KEPT: usize = 10;
 
-/// The closest approaches of different pairs.
+/// Closest approaches of different pairs.
 #[derive(Clone, Debug)]
 pub(super) struct ClosestPairs {
     pub(super) kept: Vec<Approach>,
-    /// What a pair that is not among them must come below to be: a distance, or what it has beyond its limit.
+    /// Value that another pair must come below to be added: a distance, or a distance beyond its limit.
     pub(super) threshold: f64,
-    /// Whether they are the closest to their limits, which differ, and not to each other.
+    /// Whether pairs are ordered by distance beyond their limits instead of by distance.
     beyond_limit: bool,
 }
 
 impl Default for ClosestPairs {
     fn default() -> Self {
-        Self { kept: Vec::with_capacity(KEPT + 1), threshold: f64::INFINITY, beyond_limit: false }
+        Self { kept: Vec::with_capacity(MAX_KEPT + 1), threshold: f64::INFINITY, beyond_limit: false }
     }
 }
 
 impl ClosestPairs {
-    /// Those that are closest to their limits.
+    /// Creates a table of the pairs that are closest to their limits.
     pub(super) fn to_limits() -> Self {
         Self { beyond_limit: true, ..Self::default() }
     }
 
-    /// What is compared of an approach.
-    fn key(&self, approach: &Approach) -> f64 {
+    /// Returns the number by which approaches are ordered.
+    fn order_key(&self, approach: &Approach) -> f64 {
         if self.beyond_limit { approach.lower_m - approach.limit_m } else { approach.lower_m }
     }
 
-    /// The distance that this pair must come below to change anything: where its distance is known by bounds that lie apart,
-    /// the upper one can still fall.
+    /// Returns the distance that this pair must come below to change the table. If the pair is known by separate
+    /// bounds, the upper bound can still fall.
     pub(super) fn cutoff(&self, pair: ObjectPair, limit_m: f64) -> f64 {
         let known = self.kept.iter().find(|kept| kept.pair == pair);
         let to_be_kept = if self.beyond_limit { self.threshold + limit_m } else { self.threshold };
         known.map_or(to_be_kept, |kept| if kept.is_known() { kept.lower_m } else { kept.upper_m })
     }
 
-    /// Keeps the closer of two approaches of one pair, and the closest pairs.
+    /// Adds an approach: keeps the closer of two approaches of one pair, and the closest pairs.
     pub(super) fn offer(&mut self, approach: Approach) {
-        let key = self.key(&approach);
+        let key = self.order_key(&approach);
         match self.kept.iter_mut().find(|kept| kept.pair == approach.pair) {
             Some(kept) => {
                 let upper_m = kept.upper_m.min(approach.upper_m);
@@ -240,45 +246,48 @@ impl ClosestPairs {
         }
         let mut kept = std::mem::take(&mut self.kept);
         kept.sort_by(|a, b| {
-            self.key(a).total_cmp(&self.key(b)).then(a.upper_m.total_cmp(&b.upper_m)).then(a.pair.cmp(&b.pair))
+            self.order_key(a)
+                .total_cmp(&self.order_key(b))
+                .then(a.upper_m.total_cmp(&b.upper_m))
+                .then(a.pair.cmp(&b.pair))
         });
-        kept.truncate(KEPT);
+        kept.truncate(MAX_KEPT);
         self.kept = kept;
         if let [.., last] = self.kept[..]
-            && self.kept.len() == KEPT
+            && self.kept.len() == MAX_KEPT
         {
-            self.threshold = self.key(&last);
+            self.threshold = self.order_key(&last);
         }
     }
 }
 
-/// Everything found so far.
+/// All findings so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Results {
     pub(super) ledger: Ledger<ObjectPair>,
     pub(super) closest: ClosestPairs,
     pub(super) obstacles: ClosestPairs,
-    /// Segments of pairs that were swept.
+    /// Number of pairs of segments that were swept.
     pub(super) swept: u64,
-    /// Says whether the sweep is to stop.
+    /// Flag that stops the sweep.
     pub(super) interruption: Interruption,
 }
 
 impl Results {
-    /// Of a recording: what is found is counted, and the worst and the first of it are listed.
+    /// Creates the results of a recording: findings are counted, and the worst and first of them listed.
     pub(super) fn bounded(interruption: Interruption) -> Self {
         Self { ledger: Ledger::bounded(), interruption, ..Self::default() }
     }
 
-    /// Whether the sweep goes on with another pair; settles what was found of those before it.
+    /// Settles the findings of earlier pairs and returns whether the sweep continues.
     #[inline]
-    pub(super) fn goes_on(&mut self) -> bool {
+    pub(super) fn settle_and_continue(&mut self) -> bool {
         self.ledger.settle();
         !self.interruption.is_set()
     }
 
-    /// The table that an approach belongs to.
-    pub(super) fn table(&mut self, pair: ObjectPair) -> &mut ClosestPairs {
+    /// Returns the table of closest approaches that a pair belongs to.
+    pub(super) fn closest_pairs_mut(&mut self, pair: ObjectPair) -> &mut ClosestPairs {
         match pair {
             ObjectPair::Vehicles(_) => &mut self.closest,
             ObjectPair::Obstacle { .. } => &mut self.obstacles,
@@ -286,8 +295,8 @@ impl Results {
     }
 }
 
-/// Flag that stops the work. Long loops check the flag and return an incomplete result. The caller that started the work
-/// checks the flag too and drops the result.
+/// Flag that stops the work. Long loops check the flag and return an incomplete result. The caller checks the flag too
+/// and drops that result.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interruption(Option<Arc<AtomicBool>>);
 
@@ -313,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_that_go_on_are_merged_and_those_that_begin_between_them_are_not() {
+    fn continued_violations_are_merged_and_new_ones_are_not() {
         let (a, b, c) = (Pair::new(0, 1), Pair::new(0, 2), Pair::new(1, 2));
         let mut ledger = Ledger::default();
         for (pair, span_s, min_m, from_start, index) in [
@@ -323,7 +332,7 @@ mod tests {
             (b, [1.3, 1.4], 0.5, false, 2),
             (c, [1.0, 2.0], 0.1, true, 1),
         ] {
-            assert_eq!(ledger.violated(below(pair, span_s, min_m), from_start), index);
+            assert_eq!(ledger.add_violation(below(pair, span_s, min_m), from_start), index);
         }
         let found: Vec<_> =
             ledger.into_lists().violations.iter().map(|v| (v.pair, v.from_s, v.to_s, v.min_m, v.min_at_s)).collect();
@@ -331,24 +340,24 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_left_and_came_back_at_the_same_instant_is_two_violations() {
+    fn a_violation_that_ends_and_restarts_at_one_instant_is_two() {
         let pair = Pair::new(0, 1);
         let mut ledger = Ledger::default();
-        ledger.violated(below(pair, [0.5, 1.0], 1.0), false);
-        ledger.violated(below(pair, [1.0, 1.5], 1.0), false);
+        ledger.add_violation(below(pair, [0.5, 1.0], 1.0), false);
+        ledger.add_violation(below(pair, [1.0, 1.5], 1.0), false);
         assert_eq!(ledger.violations.len(), 2);
     }
 
     #[test]
-    fn segments_of_one_violation_are_one_and_a_return_is_another() {
+    fn consecutive_segments_are_one_violation_and_a_later_entry_is_another() {
         let pair = Pair::new(0, 1);
         let mut ledger = Ledger::default();
-        ledger.violated(below(pair, [0.5, 1.0], 1.5), false);
-        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
-        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
-        ledger.violated(below(pair, [1.5, 1.75], 1.9), false);
-        // The border of two windows: what touches it comes again.
-        ledger.violated(below(pair, [1.0, 1.5], 1.2), true);
+        ledger.add_violation(below(pair, [0.5, 1.0], 1.5), false);
+        ledger.add_violation(below(pair, [1.0, 1.5], 1.2), true);
+        ledger.add_violation(below(pair, [1.0, 1.5], 1.2), true);
+        ledger.add_violation(below(pair, [1.5, 1.75], 1.9), false);
+        // The border of two windows: a segment that touches it comes again.
+        ledger.add_violation(below(pair, [1.0, 1.5], 1.2), true);
         let found: Vec<_> = ledger.violations.iter().map(|v| (v.from_s, v.to_s, v.min_m)).collect();
         assert_eq!(found, [(0.5, 1.5, 1.2), (1.5, 1.75, 1.9)]);
     }
@@ -359,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ten_closest_pairs_are_kept_each_at_its_closest() {
+    fn the_ten_closest_pairs_are_kept_each_at_its_smallest_distance() {
         let mut closest = ClosestPairs::default();
         for k in 0..12 {
             closest.offer(approach(k, 20.0 - k as f64));
@@ -372,12 +381,12 @@ mod tests {
         assert_eq!(closest.cutoff(approach(0, 0.0).pair, 1.0), 18.0);
         let far = Approach { limit_m: 30.0, ..approach(50, 31.0) };
         closest.offer(far);
-        assert!(!closest.kept.contains(&far), "others are closer to each other");
+        assert!(!closest.kept.contains(&far), "ten other pairs are closer");
         let mut to_limits = ClosestPairs::to_limits();
         (0..12).for_each(|k| to_limits.offer(approach(k, 20.0 - k as f64)));
         assert_eq!((to_limits.threshold, to_limits.cutoff(far.pair, 30.0)), (17.0, 47.0));
         to_limits.offer(far);
-        assert_eq!(to_limits.kept[0], far, "it is the closest to its limit");
+        assert_eq!(to_limits.kept[0], far, "this pair is the closest to its limit");
         let kept: Vec<_> = closest.kept.iter().map(|kept| kept.lower_m).collect();
         assert_eq!(kept, [8.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0]);
     }

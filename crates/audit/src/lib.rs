@@ -1,29 +1,30 @@
-//! The independent judge: did any two come closer than they may?
+//! Independent audit of motion: finds every time at which two vehicles come closer than their limit.
 //!
-//! It is fed with motion alone and knows no controller and no engine. Motion comes in segments: the steps of a flight, in
-//! which every vehicle moves on a straight line from one instant to the next ([`Auditor`], and [`ClearanceAuditor`] past
-//! obstacles), or what a recording says of
-//! each vehicle at times of its own, on lines, on curves, or within a bound ([`recorded`]). Whole segments are swept, so
-//! nothing passes between samples. Two detectors look at each pair that is swept:
+//! The audit reads motion only and shares no code with controllers or engines. Motion comes in segments. In a flight
+//! these are steps, in which every vehicle moves on a straight line from one instant to the next ([`Auditor`], and
+//! [`ClearanceAuditor`] for obstacles). In a recording each vehicle has its own times and moves on lines, on curves, or
+//! within a bound ([`recorded`]). Segments are swept whole, so an approach between two samples is found. Each swept
+//! pair is checked by two detectors:
 //!
-//! - the closed form: the smallest |r0 + s d| over s from 0 to 1, where r0 is the relative position at the start of the
-//!   segment and d its change. It gives the verdict. Where its rounding leaves a doubt, exact arithmetic on the positions decides. On
-//!   curves the smallest distance is enclosed;
-//! - parry's shape cast of two keep-out balls of radius delta/2. It must agree.
+//! - The closed form: the smallest |r0 + s d| over s from 0 to 1, where r0 is the relative position at the start of the
+//!   segment and d its change. It gives the verdict. Where its rounding could change the verdict, exact arithmetic on
+//!   the positions decides. On curves the smallest distance is enclosed.
+//! - The shape cast of parry with two keep-out balls of radius delta/2. It must agree.
 //!
-//! The second is a cross-check of the formula and no second proof: both are given the same list of pairs and the same
-//! relative motion, so a pair that is wrongly left out, or a motion that is wrongly read, is wrong for both.
+//! The cast checks the formula and is no second proof. Both detectors get the same list of pairs and the same relative
+//! motion. A pair that is left out by mistake, or a motion that is misread, is wrong for both.
 //!
-//! A violation is a separation **strictly** below the limit, exactly: positions and times are taken as the doubles that they are.
+//! A violation is a separation **strictly** below the limit. The comparison is exact for the positions and times as
+//! doubles.
 //!
-//! Large swarms are not swept pair by pair: pairs that a bound on motion proves to be neither too close nor among the
-//! closest are left out, so the answer is that of the full sweep.
+//! Large swarms are not swept pair by pair. A pair is left out if a bound on its motion proves that it is neither below
+//! its limit nor among the closest pairs. The result equals that of the full sweep.
 //!
 //! ```
 //! use tautline_audit::{Auditor, Status};
 //! use tautline_core::swarm::Rows;
 //!
-//! // Head-on past each other in one step: far apart at both ends, 1 m apart in between.
+//! // Head-on past each other in one step: 10 m apart at both ends, 1 m apart in between.
 //! let mut auditor = Auditor::new(2, 2.0)?;
 //! auditor.start(0.0, &Rows::from_row_slice(&[-5.0, 0.0, 0.0, 5.0, 1.0, 0.0]))?;
 //! let finding = auditor.step(1.0, &Rows::from_row_slice(&[5.0, 0.0, 0.0, -5.0, 1.0, 0.0]))?;

@@ -1,31 +1,31 @@
-//! What is in the way beside other vehicles.
+//! Obstacles: shapes, paths, and distances from them.
 
 use nalgebra::Vector3;
 
 use super::segment::Segment;
 use super::sweep::{MAX_LENGTH_M, RelativeMotion};
 
-/// Before and after its points an obstacle stands still; no recording lasts longer \[s\].
+/// Bound of the time before the first and after the last point of a path, during which the obstacle stands still \[s\].
 const ALWAYS_S: f64 = 1e300;
 
-/// A thing that a vehicle must stay clear of.
+/// Object that vehicles must stay clear of.
 ///
-/// A vehicle must stay [`clearance_m`](Self::clearance_m) away from its surface; without one, the vehicle's own radius or
-/// delta / 2, whichever is larger, so that a keep-out ball that may touch another may touch an obstacle too.
+/// A vehicle must stay [`clearance_m`](Self::clearance_m) away from its surface. The default is the larger of the
+/// vehicle's radius and delta / 2, so that a keep-out ball may touch an obstacle as it may touch another one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstacle {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its form.
+    /// Shape.
     pub shape: Shape,
-    /// Distance that a vehicle's centre must keep from the surface \[m\]; at 0 m it may touch and not enter.
+    /// Distance that a vehicle's centre must keep from the surface \[m\]; at 0 m it may touch but not enter.
     pub clearance_m: Option<f64>,
-    /// Where it is \[m\], and when \[s\]: one point for a thing that stands, else points at increasing times that it passes
-    /// on straight lines. Before the first and after the last it stands.
+    /// Path: times \[s\] and positions \[m\]. One point for an obstacle at rest, else points at increasing times,
+    /// joined by straight lines. The obstacle stands still before the first and after the last point.
     pub path: Vec<(f64, Vector3<f64>)>,
 }
 
-/// The form of an obstacle around its place.
+/// Shape of an obstacle, relative to its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A ball.
@@ -33,88 +33,91 @@ pub enum Shape {
         /// Radius \[m\].
         radius_m: f64,
     },
-    /// A box, upright.
+    /// Upright box.
     Box {
-        /// Half of its lengths \[m\].
+        /// Half lengths \[m\].
         half_m: Vector3<f64>,
-        /// How far it is turned about the vertical \[rad\], counter-clockwise from above.
+        /// Rotation about the vertical \[rad\], counter-clockwise seen from above.
         yaw_rad: f64,
     },
-    /// Everything within a radius of a straight line.
+    /// All points within a radius of a line segment.
     Capsule {
-        /// One end of the line, from the place of the obstacle \[m\].
+        /// First end of the line segment, relative to the position of the obstacle \[m\].
         from_m: Vector3<f64>,
-        /// The other end \[m\].
+        /// Second end \[m\].
         to_m: Vector3<f64>,
         /// Radius \[m\].
         radius_m: f64,
     },
-    /// Everything behind a plane through the place of the obstacle.
+    /// All points behind a plane through the position of the obstacle.
     HalfSpace {
-        /// Points out of it; of any length but zero.
+        /// Normal that points out of the half-space; of any length but zero.
         normal: Vector3<f64>,
     },
 }
 
-/// What is wrong with an obstacle.
+/// Error in the definition of an obstacle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("obstacle `{name}`: {reason}")]
 pub struct ObstacleError {
-    /// The obstacle.
+    /// Name of the obstacle.
     pub name: String,
-    /// What is wrong.
+    /// Reason.
     pub reason: String,
 }
 
 impl Obstacle {
-    /// Whether it can be judged.
+    /// Checks that the obstacle can be judged.
     ///
     /// # Errors
-    /// [`ObstacleError`] where a length, a place or a time is none.
+    /// [`ObstacleError`] if a length, a position, a time or the clearance is out of range.
     pub fn check(&self) -> Result<(), ObstacleError> {
         let wrong = |reason: String| Err(ObstacleError { name: self.name.clone(), reason });
         let length = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
         let place = |v: &Vector3<f64>| v.iter().all(|x| x.abs() <= MAX_LENGTH_M);
         match &self.shape {
             Shape::Ball { radius_m } | Shape::Capsule { radius_m, .. } if !length(*radius_m) => {
-                return wrong(format!("the radius must be above 0 m, not {radius_m:?}"));
+                return wrong(format!("the radius must be above 0 m, got {radius_m:?}"));
             }
             Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => {
                 return wrong("every length of the box must be above 0 m".to_owned());
             }
-            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(format!("the yaw is {yaw_rad:?}")),
+            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => {
+                return wrong(format!("the yaw must be a finite number, got {yaw_rad:?}"));
+            }
             Shape::Capsule { from_m, to_m, .. } if !(place(from_m) && place(to_m)) => {
                 return wrong("the ends of the capsule must be finite numbers".to_owned());
             }
             Shape::HalfSpace { normal } if !length(normal.norm()) => {
-                return wrong("the normal must have a direction".to_owned());
+                return wrong("the normal must not be zero".to_owned());
             }
             _ => {}
         }
         if let Some(clearance_m) = self.clearance_m
             && !(0.0..=MAX_LENGTH_M).contains(&clearance_m)
         {
-            return wrong(format!("the clearance must not be below 0 m, and not be {clearance_m:?}"));
+            return wrong(format!("the clearance must be at least 0 m, got {clearance_m:?}"));
         }
-        let Some((_, first)) = self.path.first() else { return wrong("it has no place".to_owned()) };
+        let Some((_, first)) = self.path.first() else { return wrong("the path has no point".to_owned()) };
         if self.path.len() == 1 && place(first) {
             return Ok(());
         }
         for (time_s, at) in &self.path {
             if !(time_s.is_finite() && place(at)) {
-                return wrong(format!("the point at {time_s:?} s is not a finite place and time"));
+                return wrong(format!("the point at {time_s:?} s is not finite"));
             }
         }
         match self.path.windows(2).find(|points| points[1].0 <= points[0].0) {
-            Some(points) => {
-                wrong(format!("the point at {:?} s comes after the one at {:?} s", points[1].0, points[0].0))
-            }
+            Some(points) => wrong(format!(
+                "the time {:?} s of a point is not later than {:?} s before it",
+                points[1].0, points[0].0
+            )),
             None => Ok(()),
         }
     }
 
-    /// Whether its section at height 0 is its outline from above, at all times. Then no height brings a vehicle nearer to it than
-    /// height 0.
+    /// Returns whether the section at height 0 equals the outline seen from above, at all times. Then no height brings
+    /// a vehicle nearer to the obstacle than height 0.
     #[must_use]
     pub fn is_upright_through_ground(&self) -> bool {
         let holds_0 = |from: f64, to: f64| from.min(to) <= 0.0 && 0.0 <= from.max(to);
@@ -130,7 +133,7 @@ impl Obstacle {
         })
     }
 
-    /// Returns the shape with all lengths multiplied by a factor.
+    /// Returns the obstacle with all lengths but the normal multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         let shape = match self.shape {
@@ -145,7 +148,7 @@ impl Obstacle {
         Self { name: self.name.clone(), shape, clearance_m: self.clearance_m.map(|m| m * factor), path }
     }
 
-    /// Its way, without an end.
+    /// Returns the path as segments, including the times before its first and after its last point.
     pub(super) fn segments(&self) -> Vec<Segment> {
         let (Some(&(_, first)), Some(&(last_s, last))) = (self.path.first(), self.path.last()) else {
             return Vec::new();
@@ -153,42 +156,44 @@ impl Obstacle {
         let [(first_s, _), _, ..] = self.path[..] else {
             return vec![Segment::straight(-ALWAYS_S, ALWAYS_S, first, first)];
         };
-        let mut way = vec![Segment::straight(-ALWAYS_S, first_s, first, first)];
-        way.extend(self.path.windows(2).map(|ends| Segment::straight(ends[0].0, ends[1].0, ends[0].1, ends[1].1)));
-        way.push(Segment::straight(last_s, ALWAYS_S, last, last));
-        way
+        let mut path = vec![Segment::straight(-ALWAYS_S, first_s, first, first)];
+        path.extend(self.path.windows(2).map(|ends| Segment::straight(ends[0].0, ends[1].0, ends[0].1, ends[1].1)));
+        path.push(Segment::straight(last_s, ALWAYS_S, last, last));
+        path
     }
 }
 
 impl Shape {
-    /// Distance from the surface of a point \[m\], given from the obstacle's place: below zero within.
+    /// Returns the distance of a point from the surface \[m\], negative inside. The point is relative to the obstacle's
+    /// position.
     pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
         if let Self::HalfSpace { normal } = self {
             return point.dot(&normal.normalize());
         }
-        let point = self.turned(point);
-        let off = self.off_core(point).norm();
+        let point = self.to_box_frame(point);
+        let off = self.offset_from_core(point).norm();
         match self {
             Self::Box { half_m, .. } if off == 0.0 => (point.abs() - half_m).max(),
             _ => off - self.radius(),
         }
     }
 
-    /// The smallest distance while a point moves straight, and the fraction of the way at which it is reached first.
+    /// Returns the smallest distance of a point on a straight path, and the fraction of the path at which it is first
+    /// reached.
     ///
-    /// The vector from the nearest point of the core (a point, a line, a box) to the moving one is a straight function of
-    /// the fraction between the places where the nearest feature changes, so each part has a closed form.
+    /// The core of a shape is a point, a line segment or a box. The vector from the nearest point of the core to the
+    /// moving point is linear in the fraction between changes of the nearest feature. Each part has a closed form.
     pub(super) fn closest(&self, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
         if let Self::HalfSpace { .. } = self {
             let (start, end) = (self.distance(from), self.distance(to));
             return if end < start { (end, 1.0) } else { (start, 0.0) };
         }
-        let (from, to) = (self.turned(from), self.turned(to));
+        let (from, to) = (self.to_box_frame(from), self.to_box_frame(to));
         let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
         let mut best = (f64::INFINITY, 0.0);
-        let mut start = (0.0, self.off_core(from));
-        for u in self.changes(from, to).into_iter().chain([1.0]) {
-            let end = (u, self.off_core(at(u)));
+        let mut start = (0.0, self.offset_from_core(from));
+        for u in self.feature_changes(from, to).into_iter().chain([1.0]) {
+            let end = (u, self.offset_from_core(at(u)));
             let part = RelativeMotion::new(start.1, end.1).closest();
             if part.squared < best.0 {
                 best = (part.squared, start.0 + (end.0 - start.0) * part.at);
@@ -208,8 +213,8 @@ impl Shape {
         }
     }
 
-    /// A point in the frame in which the shape is upright and unturned.
-    pub(super) fn turned(&self, point: Vector3<f64>) -> Vector3<f64> {
+    /// Transforms a point into the frame in which a box is not rotated.
+    pub(super) fn to_box_frame(&self, point: Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Box { yaw_rad, .. } if *yaw_rad != 0.0 => {
                 let (sin, cos) = (libm::sin(*yaw_rad), libm::cos(*yaw_rad));
@@ -219,8 +224,8 @@ impl Shape {
         }
     }
 
-    /// The vector from the nearest point of the core.
-    fn off_core(&self, point: Vector3<f64>) -> Vector3<f64> {
+    /// Returns the vector from the nearest point of the core to a point.
+    fn offset_from_core(&self, point: Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Ball { .. } | Self::HalfSpace { .. } => point,
             Self::Box { half_m, .. } => point.zip_map(half_m, |x, half| x - x.clamp(-half, half)),
@@ -233,8 +238,8 @@ impl Shape {
         }
     }
 
-    /// The fractions of a straight way at which the nearest feature changes, in order.
-    fn changes(&self, from: Vector3<f64>, to: Vector3<f64>) -> Vec<f64> {
+    /// Returns the fractions of a straight path at which the nearest feature changes, in order.
+    fn feature_changes(&self, from: Vector3<f64>, to: Vector3<f64>) -> Vec<f64> {
         let by = to - from;
         let mut found = Vec::new();
         let mut cross = |start: f64, rate: f64| {
@@ -263,11 +268,11 @@ impl Shape {
     }
 }
 
-/// How deep a straight way leads into a box that it meets, as a distance below zero, and the fraction of the way at which
-/// it is deepest first.
+/// Returns the largest depth of a straight path in a box that it meets, as a negative distance, and the first fraction
+/// of the path at which it is reached.
 ///
-/// Over the way the distance from each of the six faces is a straight function of the fraction; the largest of them is
-/// least at an end of the way or where two of them cross.
+/// The distance from each of the six faces is linear in the fraction. The largest of them is least at an end of the
+/// path or where two of them cross.
 fn deepest(half_m: &Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
     let by = to - from;
     let faces: [(f64, f64); 6] = std::array::from_fn(|face| {
@@ -284,7 +289,7 @@ fn deepest(half_m: &Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> (f64,
     })
 }
 
-/// A shape of each kind.
+/// Returns one shape of each kind.
 #[cfg(test)]
 pub(super) fn one_of_each() -> [Shape; 4] {
     [
@@ -300,9 +305,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_smallest_distance_of_a_straight_way_is_that_of_a_fine_walk() {
+    fn the_smallest_distance_of_a_straight_path_matches_fine_sampling() {
         const STEPS: u32 = 20_000;
-        // A step moves less than 1e-3 m, and the distance is at most so much steeper than its minimum.
+        // A step moves less than 1e-3 m, and the distance changes by no more than the point moves.
         const TOLERANCE_M: f64 = 1e-3;
         for shape in one_of_each() {
             for k in 0..40_u32 {
@@ -310,17 +315,17 @@ mod tests {
                 let from = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);
                 let to = Vector3::new(-3.0 * (turn + 0.4).cos(), -2.0 * turn.sin(), 1.5 - 0.07 * f64::from(k));
                 let (found, u) = shape.closest(from, to);
-                let walked =
+                let sampled =
                     (0..=STEPS).map(|s| shape.distance(from + (to - from) * (f64::from(s) / f64::from(STEPS))));
-                let walked = walked.fold(f64::INFINITY, f64::min);
-                assert!(found <= walked + 1e-12 && walked - found < TOLERANCE_M, "{shape:?}: {found} {walked}");
+                let sampled = sampled.fold(f64::INFINITY, f64::min);
+                assert!(found <= sampled + 1e-12 && sampled - found < TOLERANCE_M, "{shape:?}: {found} {sampled}");
                 assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?}");
             }
         }
     }
 
     #[test]
-    fn an_obstacle_without_size_place_or_order_is_refused() {
+    fn an_obstacle_with_invalid_size_position_or_times_is_refused() {
         let good = Obstacle {
             name: "tower".to_owned(),
             shape: Shape::Ball { radius_m: 1.0 },

@@ -1,4 +1,4 @@
-//! What an audit says.
+//! Results of an audit: the verdict, approaches, violations, and undecided times.
 
 use std::fmt;
 
@@ -6,21 +6,21 @@ use serde::{Deserialize, Serialize};
 
 use tautline_core::swarm::{ClosestApproach, Pair};
 
-/// Width of the interval in which the smallest distance on a curve is enclosed \[m\]; rounding widens it where coordinates
-/// are large.
+/// Width of the interval in which the smallest distance on a curve is enclosed \[m\]; rounding widens it where
+/// coordinates are large.
 pub const WIDTH_M: f64 = 1e-9;
 
-/// The verdict over everything that was judged.
+/// Verdict of an audit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// No pair came closer than it may, both detectors agree on it, and everything offered was judged.
+    /// No pair came below its limit, both detectors agree, and all input was judged.
     Clear,
-    /// A pair was found closer than it may come, whatever else was found.
+    /// At least one pair came below its limit.
     Violation,
-    /// No violation was found, yet it cannot be called clear: nothing was judged, something was refused or not seen, the
-    /// two detectors disagree, or a separation could not be resolved. A flight in steps too long for its law is undecided with
-    /// violations that integration may have made.
+    /// No violation was found, but the motion is not proved clear. Reasons: nothing was judged, input was refused or
+    /// missing, the two detectors disagree, or a separation could not be resolved. A flight whose steps are too long
+    /// for its law is undecided if its violations may come from integration errors.
     #[default]
     Undecided,
 }
@@ -34,7 +34,7 @@ impl Status {
         }
     }
 
-    /// Returns the verdict on two things together: the worse of the two.
+    /// Returns the combined verdict: the worse of the two.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         let has = |status: Self| self == status || other == status;
@@ -52,22 +52,22 @@ impl Status {
     }
 }
 
-/// A pair of objects that must keep a distance. Indices count from 0.
+/// Pair of objects that must keep a distance. Indices count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ObjectPair {
     /// Two vehicles.
     Vehicles(Pair),
     /// A vehicle and an obstacle.
     Obstacle {
-        /// The vehicle.
+        /// Index of the vehicle.
         vehicle: usize,
-        /// The obstacle, an index into [`Settings::obstacles`](super::recorded::Settings::obstacles).
+        /// Index of the obstacle in [`Settings::obstacles`](super::recorded::Settings::obstacles).
         obstacle: usize,
     },
 }
 
 impl ObjectPair {
-    /// The two vehicles, if it is two.
+    /// Returns the two vehicles, or `None` if one of the objects is an obstacle.
     #[must_use]
     pub fn vehicles(self) -> Option<Pair> {
         match self {
@@ -77,127 +77,127 @@ impl ObjectPair {
     }
 }
 
-/// The closest that two came.
+/// Closest approach of a pair.
 ///
-/// Lengths are distances of two centres, or of a centre from an obstacle's surface, in metres; with an ellipsoid they are
+/// Distances are between two centres, or from a centre to an obstacle's surface \[m\]. With an ellipsoid they are
 /// scaled distances.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Approach {
-    /// The pair.
+    /// Pair of objects.
     #[serde(skip)]
     pub pair: ObjectPair,
-    /// It is at least this \[m\].
+    /// Lower bound of the smallest distance \[m\].
     pub lower_m: f64,
-    /// It is at most this \[m\]; the same as `lower_m` where the motion is exact, and within [`WIDTH_M`] of it on curves.
+    /// Upper bound of the smallest distance \[m\]; equal to `lower_m` where the motion is exact, and within [`WIDTH_M`]
+    /// of it on curves.
     pub upper_m: f64,
-    /// When the motion as drawn is closest \[s\].
+    /// Time at which the interpolated motion is closest \[s\].
     pub time_s: f64,
-    /// What it must not fall below \[m\].
+    /// Limit: the distance must not fall below it \[m\].
     pub limit_m: f64,
 }
 
 impl Approach {
-    /// Whether both bounds are one number, to the width of the enclosure.
+    /// Returns whether both bounds agree to within the width of the enclosure.
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.upper_m - self.lower_m <= 2.0 * WIDTH_M
     }
 
-    /// One number for the smallest distance \[m\]: what is reached where the motion is known, and what it is at least where
-    /// it is not.
+    /// Returns the smallest distance \[m\] if it is known, else its lower bound.
     #[must_use]
     pub fn certain_m(&self) -> f64 {
         if self.is_known() { self.upper_m } else { self.lower_m }
     }
 }
 
-/// A time during which a pair was closer than it may come, without a break.
+/// Uninterrupted time during which a pair was below its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Violation<P = Pair> {
-    /// The pair.
+    /// Pair of objects.
     #[serde(skip)]
     pub pair: P,
-    /// When the distance fell below the limit \[s\]; the start if it was below from the start.
+    /// Time at which the distance fell below the limit \[s\]; the start of the motion if it began below.
     pub from_s: f64,
-    /// When it was back at the limit \[s\]; the last instant judged while it still is below.
+    /// Time at which the distance was back at the limit \[s\]; the last judged instant if it is still below.
     pub to_s: f64,
-    /// Smallest distance within \[m\]; under bounded acceleration an upper bound of it.
+    /// Smallest distance within this time \[m\]; an upper bound of it under bounded acceleration.
     pub min_m: f64,
-    /// When that was \[s\], the earliest such instant.
+    /// Earliest time of the smallest distance \[s\].
     pub min_at_s: f64,
-    /// What the distance must not fall below \[m\].
+    /// Limit: the distance must not fall below it \[m\].
     pub limit_m: f64,
 }
 
-/// A time over which it cannot be told whether a pair came too close.
+/// Time during which it is not decided whether a pair is below its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Undecided<P = Pair> {
-    /// The pair.
+    /// Pair of objects.
     #[serde(skip)]
     pub pair: P,
-    /// From \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// To \[s\].
+    /// End \[s\].
     pub to_s: f64,
-    /// Their distance is at least this \[m\].
+    /// Lower bound of the distance \[m\].
     pub lower_m: f64,
-    /// Its smallest value is at most this \[m\].
+    /// Upper bound of the smallest distance \[m\].
     pub upper_m: f64,
-    /// What it must not fall below \[m\].
+    /// Limit: the distance must not fall below it \[m\].
     pub limit_m: f64,
-    /// The sampling rate that decides where the vehicles fly as drawn between samples \[Hz\]; `None` where the drawn motion
-    /// meets the limit to the last digit, or the limit lies within the width or rounding of an exact motion.
+    /// Sampling rate at which the verdict on the interpolated motion would be certain \[Hz\]. `None` if the
+    /// interpolated distance equals the limit to the last digit, or if an exact motion is within rounding of the limit.
     pub rate_hz: Option<f64>,
 }
 
-/// What one step (or the start) brought.
+/// Findings of one step, or of the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepFinding<'a> {
-    /// Closest approach of all pairs over this step; `None` with fewer than two vehicles. Among equals the lowest pair,
-    /// and its earliest time.
+    /// Closest approach of all pairs over this step; `None` with fewer than two vehicles. Of equal separations, the
+    /// lowest pair at its earliest time.
     pub closest: Option<ClosestApproach>,
-    /// Violations that began in this step, as far as known at its end, by pair.
+    /// Violations that began in this step, as known at its end, ordered by pair.
     pub began: &'a [Violation],
-    /// Violations that ended in this step, complete, by pair. One that began and ended within is in both lists.
+    /// Violations that ended in this step, complete, ordered by pair. A violation that began and ended in this step is
+    /// in both lists.
     pub ended: &'a [Violation],
 }
 
-/// The verdict and what it rests on.
+/// Verdict on a flight, with its evidence.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AuditOutcome {
-    /// The verdict.
+    /// Verdict.
     pub status: Status,
-    /// Closest approach of all pairs from the start to the end; among equals that of the earliest step, there the
+    /// Closest approach of all pairs over the flight. Of equal separations, that of the earliest step, there of the
     /// lowest pair, at its earliest time.
     pub closest: Option<ClosestApproach>,
-    /// Every violation, in the order of their beginning and then by pair.
+    /// All violations, ordered by their start and then by pair.
     pub violations: Vec<Violation>,
-    /// Steps judged, the start not counted.
+    /// Number of judged steps, without the start.
     pub steps: u64,
-    /// Pairs swept in closed form (and cast by parry), summed over the start and all steps.
+    /// Number of pairs swept in closed form and cast by parry, summed over the start and all steps.
     pub pairs_checked: u64,
-    /// Pairs proved, by a bound on how far vehicles moved, to stay farther apart than delta and than the closest pair of
-    /// the step; summed likewise. Together with `pairs_checked` this is (steps + 1) N (N - 1) / 2.
+    /// Number of pairs that were proved, by a bound on their motion, to stay farther apart than delta and than the
+    /// closest pair of the step; summed likewise. `pairs_checked + pairs_excluded` = (steps + 1) N (N - 1) / 2.
     pub pairs_excluded: u64,
-    /// Calls answered by an error: what they offered was not judged.
+    /// Number of calls that returned an error. Their input was not judged.
     pub refused: u64,
-    /// Steps that are clear with less room than the paths of their vehicles may bend; 0 for straight steps, which are judged
-    /// exactly.
+    /// Number of clear steps whose margin is smaller than the possible bend of the paths; 0 for straight steps, which
+    /// are judged exactly.
     pub unresolved: u64,
-    /// What the second detector says.
+    /// Result of the second detector.
     pub parry: ParryEvidence,
 }
 
-/// What the second detector found on the pairs that it was asked about: parry's shape cast of keep-out balls, and parry's
-/// distances from obstacles.
+/// Result of the second detector: parry's shape cast of keep-out balls, and parry's distances from obstacles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParryEvidence<P = Pair> {
-    /// Earliest time of contact \[s\]; `None` when there never was one. Touching at exactly the limit is a contact to parry
-    /// and not a violation.
+    /// Earliest time of contact \[s\]; `None` without contact. Contact at exactly the limit is reported by parry and is
+    /// no violation.
     pub min_toi_s: Option<f64>,
-    /// Answers that contradict those of the first detector by more than rounding explains: each is an error.
+    /// Number of results that contradict the first detector by more than rounding; each is an error.
     pub disagreements: u64,
-    /// The first of them.
+    /// First disagreement.
     pub first_disagreement: Option<Disagreement<P>>,
 }
 
@@ -207,20 +207,20 @@ impl<P> Default for ParryEvidence<P> {
     }
 }
 
-/// Two detectors, two answers.
+/// Contradicting results of the two detectors for one segment of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disagreement<P = Pair> {
-    /// The pair.
+    /// Pair of objects.
     pub pair: P,
-    /// Start of the segment of motion, for a flight the step \[s\].
+    /// Start of the segment of motion, in a flight of the step \[s\].
     pub from_s: f64,
-    /// Its end \[s\].
+    /// End of the segment \[s\].
     pub to_s: f64,
-    /// Smallest separation within it by the closed form \[m\].
+    /// Smallest separation within the segment by the closed form \[m\].
     pub min_m: f64,
-    /// When the pair falls below its limit by the closed form \[s\]; `None` when it does not.
+    /// Time at which the pair falls below its limit by the closed form \[s\]; `None` if it does not.
     pub closed_form_s: Option<f64>,
-    /// First contact by parry \[s\]; `None` when there is none, NaN when it could not tell.
+    /// First contact by parry \[s\]; `None` without contact, NaN if parry failed.
     pub parry_s: Option<f64>,
 }
 

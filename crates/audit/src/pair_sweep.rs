@@ -1,4 +1,4 @@
-//! The sweep of two objects past each other, segment by segment.
+//! Sweep of two objects past each other, segment by segment.
 
 use nalgebra::Vector3;
 
@@ -16,13 +16,13 @@ pub(super) struct PairSweep<'a> {
     pub(super) pair: ObjectPair,
     pub(super) target: Target<'a>,
     pub(super) keep_out: KeepOut,
-    /// What the distance must come below to be among the closest.
+    /// The distance must be below this value to be among the closest.
     pub(super) cutoff: f64,
     /// Whether the distance is compared with the limit. If not, only the closest approach is found.
     pub(super) judges: bool,
-    /// Whether bounds on the motion leave it open that the distance falls below its limit: then it is judged twice.
+    /// Whether bounds on the motion allow the distance to fall below its limit; if so, the second detector runs too.
     pub(super) may_violate: bool,
-    /// Height at or below which both are on the ground.
+    /// Height at or below which both objects are on the ground.
     pub(super) above: Option<f64>,
 }
 
@@ -34,11 +34,11 @@ pub(super) struct Overlap<'a> {
     pub(super) over: Interval,
 }
 
-/// Calls `f` with the time that each segment of one shares with each of the other, in order of time.
+/// Calls `f` with the time that each segment of `first` shares with each segment of `second`, in order of time.
 ///
-/// Segments are closed: one that ends where another begins shares that instant with it. Where two end together the next
-/// two follow, so that two jumps at one instant are swept together; one that nothing follows waits for what follows the
-/// other, unless the two were such jumps.
+/// Segments are closed: a segment shares an instant with one that begins where it ends. If two segments end together,
+/// both advance, so that two jumps at one instant are swept together. A segment without a successor stays for the
+/// successor of the other, unless both are jumps.
 pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: impl FnMut(Overlap<'a>)) {
     let (mut a, mut b) = (0, 0);
     while let (Some(one), Some(other)) = (first.get(a), second.get(b)) {
@@ -59,20 +59,21 @@ pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: i
     }
 }
 
-/// Smallest separation of straight segments below a cutoff. Rounded bounds select the candidates; their separations are exact.
+/// Smallest separation of straight segments below a cutoff. Rounded bounds select the candidates; their separations are
+/// exact.
 #[derive(Debug)]
 struct Nearest<'a> {
     cutoff: f64,
-    /// What the smallest separation is not above, and its square with a margin.
+    /// Upper bound of the smallest separation, and its square with a margin.
     upper: f64,
     upper_squared: f64,
-    /// What may be the smallest: a lower bound, where it is closest, and the segments.
+    /// Candidates for the smallest separation: lower bound, fraction of the closest approach, and segments.
     candidates: Vec<(f64, f64, Overlap<'a>)>,
 }
 
 impl<'a> Nearest<'a> {
-    /// Margin of the rough bound. With e the resolution, (x + e)^2 <= x^2 (1 + m) + e^2 (1 + 1 / m), and e^2 is 64 eps^2 times the
-    /// squared scale.
+    /// Margin of the rough bound. With the resolution e, (x + e)^2 <= x^2 (1 + m) + e^2 (1 + 1 / m), and e^2 is 64
+    /// eps^2 times the squared scale.
     const MARGIN: f64 = 1e-6;
     const OF_SCALE: f64 = 1e-23;
 
@@ -91,7 +92,7 @@ impl<'a> Nearest<'a> {
     fn take_near(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
         let (separation, resolution) = (closest.separation_m(), motion.resolution_m());
         let (lower, upper) = (separation - resolution, separation + resolution);
-        if lower < self.upper && !self.candidates.last().is_some_and(|(.., before)| before.stands_like(overlap)) {
+        if lower < self.upper && !self.candidates.last().is_some_and(|(.., before)| before.is_at_rest_like(overlap)) {
             self.candidates.push((lower, closest.at, *overlap));
         }
         if upper < self.upper {
@@ -99,7 +100,7 @@ impl<'a> Nearest<'a> {
         }
     }
 
-    /// The smallest separation, as the largest double that is not above it, and when it is first reached \[s\].
+    /// Returns the smallest separation, rounded down to a double, and when it is first reached \[s\].
     fn finish(self) -> Option<(f64, f64)> {
         let mut found = None;
         let mut least = self.cutoff;
@@ -117,8 +118,8 @@ impl<'a> Nearest<'a> {
 }
 
 impl PairSweep<'_> {
-    /// Judges what two vehicles, or an obstacle and a vehicle, do in a window. Straight segments are judged whole, so that
-    /// what is found does not depend on windows; curves within the window.
+    /// Judges a pair in a window. Straight segments are judged whole, so that findings do not depend on windows; curves
+    /// are judged within the window.
     pub(super) fn judge(&self, first: &[Segment], second: &[Segment], window: Interval, results: &mut Results) {
         let mut nearest = Nearest::below(self.cutoff);
         let vehicles = matches!(self.target, Target::Origin);
@@ -153,8 +154,8 @@ impl PairSweep<'_> {
         }
     }
 
-    /// Whether one of two is on the ground for all of a time that they share. A segment that leaves the ground begins on
-    /// it, which matters where no more than that instant is shared.
+    /// Returns whether an object is on the ground during a whole shared time. A segment that takes off begins on the
+    /// ground, which matters if the shared time is an instant.
     #[inline]
     fn is_on_ground(&self, of: &Segment, over: Interval) -> bool {
         let starts_there = |above: f64| {
@@ -168,27 +169,27 @@ impl PairSweep<'_> {
     fn offer(&self, lower_m: f64, upper_m: f64, time_s: f64, results: &mut Results) {
         let Self { pair, keep_out, .. } = self;
         let approach = Approach { pair: *pair, lower_m, upper_m, time_s, limit_m: keep_out.delta_m };
-        results.table(*pair).offer(approach);
+        results.closest_pairs_mut(*pair).offer(approach);
     }
 
-    /// Two straight segments, by the closed form and by the cast.
+    /// Judges two straight segments by the closed form and by the cast.
     #[inline(never)]
     fn straight(&self, overlap: &Overlap<'_>, motion: &RelativeMotion, closest: ClosestPoint, results: &mut Results) {
         let contact = self.keep_out.cast(motion);
         if contact.is_some() || self.keep_out.is_near(motion, closest) {
             let exact = overlap.exact();
-            results.ledger.near(self.pair, &self.keep_out, motion, contact, &exact, || exact.separation());
+            results.ledger.judge_straight(self.pair, &self.keep_out, motion, contact, &exact, || exact.separation());
         }
     }
 
-    /// Judges an interval in which one of the two is on a curve or is an obstacle.
+    /// Judges an interval in which one object is on a curve or is an obstacle.
     fn curved(&self, overlap: &Overlap<'_>, results: &mut Results) {
         let Overlap { first, second, over } = *overlap;
         let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
         let r = overlap.relative();
         let mut search = Search::new(self.target, &r);
         let deviation = first.deviation() + second.deviation();
-        // Straight past an obstacle, the distance is that of a formula and no enclosure.
+        // The distance of a straight motion from an obstacle is a closed form, not an enclosure.
         let rounding = if overlap.is_straight() { 0.0 } else { first.rounding() + second.rounding() };
         let matters = if self.judges { limit_m.max(self.cutoff) } else { self.cutoff };
         let Some(drawn) = search.minimum(matters + deviation + rounding) else { return };
@@ -196,7 +197,7 @@ impl PairSweep<'_> {
         let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
         let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
         let deviation_at = |u: f64| first.deviation_at(over.at(u)) + second.deviation_at(over.at(u));
-        // What the ends say is a fact where they are samples.
+        // The distance at an end is certain if the ends are samples.
         let upper = |search: &Search<'_>, from: f64, to: f64, lowest: &Minimum| {
             let [start, end] = [from, to].map(|u| search.distance(u) + deviation_at(u));
             (lowest.upper + deviation_at(lowest.at)).min(start).min(end) + rounding
@@ -213,7 +214,7 @@ impl PairSweep<'_> {
             return;
         }
         let mut enter = None;
-        // Where it cannot be told whether both are on the ground, nothing too close is a violation for certain.
+        // Where it is unknown whether both vehicles are on the ground, no time below the limit is a certain violation.
         let counts = [first, second].iter().any(|segment| segment.grounded == Some(false));
         if upper_m < limit_m && counts {
             for (from, to) in search.below(limit_m, drawn.at) {
@@ -225,41 +226,43 @@ impl PairSweep<'_> {
                 if min_m < limit_m {
                     let from_start = from <= 0.0 && search.distance(0.0) < limit_m;
                     let min_at_s = over.at(lowest.at);
-                    results.ledger.violated(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
+                    results
+                        .ledger
+                        .add_violation(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
                     enter = enter.or(Some(from));
                 } else {
-                    results.ledger.undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
+                    results.ledger.add_undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
                 }
             }
         } else if lower_m < limit_m {
-            results.ledger.undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
+            results.ledger.add_undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
         }
         if self.may_violate {
             let check = cross_check(&search, &self.keep_out, &drawn, rounding);
-            results.ledger.cross_check(pair, over, drawn.upper, enter, check);
+            results.ledger.add_cross_check(pair, over, drawn.upper, enter, check);
         }
     }
 }
 
 impl Overlap<'_> {
-    /// Whether both segments are straight.
+    /// Returns whether both segments are straight.
     #[inline]
     fn is_straight(&self) -> bool {
         self.first.curve().is_none() && self.second.curve().is_none()
     }
 
-    /// Whether both vehicles stand still at the same positions as in another overlap.
+    /// Returns whether both vehicles stand still at the same positions as in another overlap.
     #[inline]
-    fn stands_like(&self, other: &Self) -> bool {
+    fn is_at_rest_like(&self, other: &Self) -> bool {
         let is_still = |of: &Segment, other: &Segment| of.from == of.to && of.from == other.from && of.to == other.to;
         is_still(self.first, other.first) && is_still(self.second, other.second)
     }
 
-    /// The relative motion of two straight segments over the time that they share.
+    /// Returns the relative motion of two straight segments over the time that they share.
     #[inline]
     pub(super) fn straight(&self) -> RelativeMotion {
         let (a, b) = (self.first, self.second);
-        let are_samples = a.whole.is_none() && b.whole.is_none();
+        let are_samples = a.parent.is_none() && b.parent.is_none();
         if are_samples && a.from_s == b.from_s && a.to_s == b.to_s {
             RelativeMotion::new(b.from - a.from, b.to - a.to)
         } else {
@@ -267,9 +270,8 @@ impl Overlap<'_> {
         }
     }
 
-    /// The motion of two straight segments that are not over the same time, or are parts of others.
-    /// Displacements are added to the difference of two starting points, never positions to positions: far from the
-    /// origin that loses nothing.
+    /// Returns the relative motion of two straight segments with different times, or of parts of segments.
+    /// Displacements are added to the difference of two starting points, which loses no digits far from the origin.
     #[inline(never)]
     fn cut(&self) -> RelativeMotion {
         let (a, b) = (self.first.line(), self.second.line());
@@ -282,13 +284,13 @@ impl Overlap<'_> {
         RelativeMotion::interpolated([at(self.over.from_s, false), at(self.over.to_s, true)], start, [by_a, by_b])
     }
 
-    /// Both straight segments as they were read.
+    /// Returns the exact motion of two straight segments.
     pub(super) fn exact(&self) -> ExactMotion {
         ExactMotion { first: self.first.line(), second: self.second.line(), over: self.over }
     }
 
-    /// The relative position as a polynomial of the fraction of the time that is shared: at least one coefficient, the last
-    /// one of several not zero.
+    /// Returns the relative position as a polynomial of the fraction of the shared time. It has at least one
+    /// coefficient; of several, the last is not zero.
     fn relative(&self) -> Vec<Vector3<f64>> {
         let (a, b) = (self.first, self.second);
         if self.is_straight() {
@@ -307,8 +309,8 @@ impl Overlap<'_> {
         r
     }
 
-    /// The sampling rate of both at which the deviation is no more than the margin: over intervals of h it is the sum of
-    /// what each has now, c = peak / `h_now`^2, times h^2.
+    /// Returns the sampling rate of both vehicles at which the deviation is at most the margin \[Hz\]. The deviation
+    /// over intervals of h is the sum of c h^2, with c = peak / `h_now`^2 of each vehicle.
     fn rate_hz(&self, margin: f64) -> Option<f64> {
         let curves = [self.first, self.second].into_iter().filter_map(|segment| segment.curve());
         let per_s2: f64 = curves.map(|curve| curve.deviation.peak / (curve.to_s - curve.from_s).powi(2)).sum();
@@ -344,7 +346,7 @@ mod tests {
         overlaps(&first, &second, |overlap| closest = closest.min(overlap.straight().closest().separation_m()));
         assert_eq!(closest, 5.0);
         assert_eq!(times(&first, &second), [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]);
-        // One jumps while the other stands: the jump meets it where it stands.
+        // One vehicle jumps while the other stands: the jump passes the standing vehicle.
         let waiting = [still(0.5, 1.5, 3.0)];
         let mut closest = f64::INFINITY;
         overlaps(&first, &waiting, |overlap| closest = closest.min(overlap.straight().closest().separation_m()));
@@ -352,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn what_ends_where_the_other_begins_shares_an_instant() {
+    fn a_segment_that_ends_where_the_other_begins_shares_an_instant() {
         assert_eq!(times(&[still(0.0, 1.0, 0.0)], &[still(1.0, 2.0, 0.0)]), [(1.0, 1.0)]);
         assert_eq!(times(&[still(0.0, 1.0, 0.0)], &[still(1.5, 2.0, 0.0)]), []);
         let first = [still(0.0, 1.0, 0.0)];
@@ -368,12 +370,12 @@ mod tests {
     }
 
     #[test]
-    fn a_last_jump_is_swept_once_and_one_seen_once_meets_the_jump_of_the_other() {
-        // In convoy: one takes the place that the other leaves at the same instant, and the other is not seen again.
+    fn a_last_jump_is_swept_once_and_a_single_sample_meets_a_jump() {
+        // Convoy: `tail` takes the place that `lead` leaves at the same instant; `lead` has no later sample.
         let lead = [still(0.0, 1.0, 0.0), jump(1.0, [0.0, 1.0])];
         let tail = [still(0.0, 1.0, -1.0), jump(1.0, [-1.0, 0.0]), still(1.0, 2.0, 0.0), jump(2.0, [0.0, 0.0])];
         assert_eq!((closest(&lead, &tail), closest(&tail, &lead)), (1.0, 1.0));
-        // Fix once between two gaps, where the other's jump leads.
+        // A single sample between two gaps, at the end of the other vehicle's jump.
         let seen_once = [still(0.0, 0.0, 50.0), still(1.0, 1.0, 0.0), still(3.0, 3.0, 50.0)];
         assert_eq!((closest(&seen_once, &tail), closest(&tail, &seen_once)), (0.0, 0.0));
         assert_eq!(closest(&[still(0.0, 0.0, 50.0), still(1.0, 1.0, 3.0), still(3.0, 3.0, 50.0)], &tail), 3.0);

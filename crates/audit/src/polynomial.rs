@@ -1,17 +1,17 @@
-//! Polynomials, and what their Bernstein coefficients enclose.
+//! Polynomials of vectors and their enclosures by Bernstein coefficients.
 //!
-//! Coefficients are those of the powers, the constant one first. A polynomial over the fractions from 0 to 1 lies within
-//! the hull of its Bernstein coefficients.
+//! Coefficients are those of the powers, the constant first. A polynomial over the fractions from 0 to 1 lies within
+//! the convex hull of its Bernstein coefficients.
 
 use nalgebra::Vector3;
 
-/// The value at `u`, by Horner's rule.
+/// Returns the value at `u`, by Horner's rule.
 #[inline]
 pub(super) fn value(c: &[Vector3<f64>], u: f64) -> Vector3<f64> {
     c.iter().rev().fold(Vector3::zeros(), |sum, c| sum * u + c)
 }
 
-/// Makes a polynomial in t one in (t - start) / length, by Horner's shift of the origin.
+/// Turns a polynomial in t into one in (t - start) / length, by Horner's shift of the origin.
 pub(super) fn rescale(c: &mut [Vector3<f64>], start: f64, length: f64) {
     let degree = c.len().saturating_sub(1);
     if start != 0.0 {
@@ -29,8 +29,8 @@ pub(super) fn rescale(c: &mut [Vector3<f64>], start: f64, length: f64) {
     }
 }
 
-/// The lower triangle of C(j, k) / C(n, k), row by row: the Bernstein coefficients of degree n are its product with the
-/// coefficients of the powers.
+/// Lower triangle of C(j, k) / C(n, k), row by row. Its product with the coefficients of the powers gives the Bernstein
+/// coefficients of degree n.
 #[derive(Debug)]
 pub(super) struct BernsteinBasis(Vec<f64>);
 
@@ -52,34 +52,34 @@ impl BernsteinBasis {
         (0..count).map(|j| &self.0[j * (j + 1) / 2..(j + 1) * (j + 2) / 2])
     }
 
-    /// Least and greatest Bernstein coefficient of a polynomial of this degree.
+    /// Returns the least and the greatest Bernstein coefficient of a polynomial of this degree.
     pub(super) fn range(&self, c: &[f64]) -> (f64, f64) {
         let coefficients = self.rows(c.len()).map(|row| row.iter().zip(c).map(|(b, c)| b * c).sum::<f64>());
         coefficients.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), b| (low.min(b), high.max(b)))
     }
 
-    /// The Bernstein coefficients, or control points, of a polynomial of this degree.
+    /// Returns the Bernstein coefficients, or control points, of a polynomial of this degree.
     pub(super) fn points(&self, c: &[Vector3<f64>]) -> impl Iterator<Item = Vector3<f64>> {
         self.rows(c.len()).map(move |row| row.iter().zip(c).fold(Vector3::zeros(), |sum, (b, c)| sum + c * *b))
     }
 }
 
-/// Halves the fractions from 0 to 1 until each part is told a yes or a no, is as short as asked, or so many parts were looked
-/// at; `tell` is given the start and the length of a part. Neighbours that are told the same are one part: its start, its end
-/// and what it is told.
-pub(super) fn parts_told(
+/// Bisects the interval from 0 to 1 until each part is classified, has at most the length `shortest`, or at least
+/// `max_parts` parts were examined. `classify` gets the start and the length of a part. Adjacent parts of one class are
+/// merged; each part is its start, its end and its class.
+pub(super) fn classify_parts(
     shortest: f64,
-    most: usize,
-    mut tell: impl FnMut(f64, f64) -> Option<bool>,
+    max_parts: usize,
+    mut classify: impl FnMut(f64, f64) -> Option<bool>,
 ) -> Vec<(f64, f64, Option<bool>)> {
-    let (mut parts, mut open, mut length, mut looked_at) = (Vec::new(), vec![0.0], 1.0, 0);
+    let (mut parts, mut open, mut length, mut examined) = (Vec::new(), vec![0.0], 1.0, 0);
     while !open.is_empty() {
-        looked_at += open.len();
-        let is_last = length <= shortest || looked_at >= most;
+        examined += open.len();
+        let is_last = length <= shortest || examined >= max_parts;
         for start in std::mem::take(&mut open) {
-            match tell(start, length) {
+            match classify(start, length) {
                 None if !is_last => open.extend([start, start + 0.5 * length]),
-                told => parts.push((start, start + length, told)),
+                class => parts.push((start, start + length, class)),
             }
         }
         length *= 0.5;
@@ -93,7 +93,7 @@ pub(super) fn parts_told(
     parts
 }
 
-/// Farthest that a polynomial strays from the straight way between its ends, by its control points.
+/// Returns a bound on the distance of a polynomial from the uniform motion between its ends, by its control points.
 pub(super) fn stray(c: &[Vector3<f64>]) -> f64 {
     let n = c.len();
     let Some(from) = c.first().filter(|_| n > 2) else { return 0.0 };
@@ -102,8 +102,8 @@ pub(super) fn stray(c: &[Vector3<f64>]) -> f64 {
     BernsteinBasis::of_degree(n - 1).points(c).enumerate().map(strays).fold(0.0, f64::max)
 }
 
-/// Farthest that a polynomial gets from the straight line between its ends, however it flies along it, by its control points:
-/// the distance from a line is a convex function of a place.
+/// Returns a bound on the distance of a polynomial from the straight line between its ends, by its control points.
+/// Unlike [`stray`] it compares no times. The distance from a line is a convex function of the position.
 pub(super) fn stray_across(c: &[Vector3<f64>]) -> f64 {
     let n = c.len();
     let Some(from) = c.first().filter(|_| n > 2) else { return 0.0 };
@@ -121,13 +121,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_curve_strays_from_its_chord_at_most_as_far_as_its_control_points() {
+    fn the_stray_of_a_curve_is_bounded_by_its_control_points() {
         let r = [Vector3::zeros(), Vector3::new(1.0, 4.0, 0.0), Vector3::new(0.0, -4.0, 0.0)];
         // The parabola rises by 1; its one inner control point by 2.
         assert_eq!(stray(&r), 2.0);
         assert_eq!(stray(&r[..2]), 0.0);
         assert_eq!((stray_across(&r), stray_across(&r[..2])), (2.0, 0.0));
-        // Eased from rest to rest on a straight line it is never off that, and past its end as far as its control points are.
+        // An eased motion on a straight line never leaves the line. A motion past its end leaves it by its control
+        // points.
         let eased = [0.0, 0.0, 3.0, -2.0].map(|x| Vector3::new(x, 2.0 * x, 0.0));
         assert!(stray_across(&eased) < 1e-15 && stray(&eased) > 0.5);
         let back = [0.0, 4.0, -3.0].map(|x| Vector3::new(x, 0.0, 0.0));
@@ -136,15 +137,18 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_told_is_halved_down_to_the_shortest_part_or_as_often_as_allowed() {
-        // Below and above 0.3, which no part that holds it can be told.
-        let tell = |start: f64, length: f64| match 0.3 {
+    fn unclassified_parts_are_bisected_to_the_shortest_length_or_the_allowed_number() {
+        // Crossing at 0.3: a part that contains it has no class.
+        let classify = |start: f64, length: f64| match 0.3 {
             crossing if start + length <= crossing => Some(true),
             crossing if start >= crossing => Some(false),
             _ => None,
         };
-        assert_eq!(parts_told(0.25, 99, tell), [(0.0, 0.25, Some(true)), (0.25, 0.5, None), (0.5, 1.0, Some(false))]);
-        assert_eq!(parts_told(1e-9, 3, tell), [(0.0, 0.5, None), (0.5, 1.0, Some(false))]);
-        assert_eq!(parts_told(1e-9, 1, tell), [(0.0, 1.0, None)]);
+        assert_eq!(
+            classify_parts(0.25, 99, classify),
+            [(0.0, 0.25, Some(true)), (0.25, 0.5, None), (0.5, 1.0, Some(false))]
+        );
+        assert_eq!(classify_parts(1e-9, 3, classify), [(0.0, 0.5, None), (0.5, 1.0, Some(false))]);
+        assert_eq!(classify_parts(1e-9, 1, classify), [(0.0, 1.0, None)]);
     }
 }

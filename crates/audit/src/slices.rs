@@ -1,37 +1,38 @@
-//! The closest approach of one slice of time after the other, as many as there is room for.
+//! Closest approach in each slice of time, with a bounded number of slices.
 
 use super::outcome::Approach;
 
-/// Neighbours become one across a gap only where that is this small a part of a slice.
+/// Largest gap between two slices that are merged, as a fraction of the width of the merged slice.
 const GAP_SHARE: f64 = 1.0 / 16.0;
 
-/// The closest that any two came in a slice of time.
+/// Closest approach of all pairs in a slice of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slice {
-    /// From \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// To \[s\].
+    /// End \[s\].
     pub to_s: f64,
     /// Closest approach: pair, distance and time.
     pub closest: Approach,
-    /// Whether two are there all the time. Where it is not so nothing is known of some of it, and the distance is one of the
-    /// rest alone.
+    /// Whether at least two vehicles are present during the whole slice. If not, the distance is known only for a part
+    /// of it.
     pub is_whole: bool,
 }
 
-/// Slices in order of time; nothing is known of the time between two that do not touch.
+/// Slices in order of time; between two slices that do not touch nothing is known.
 ///
-/// Beyond so many, neighbours become one, and all slices are about as wide; the closest of all is never lost. Two that do not
-/// touch become one that is not whole, and only where what is between them is a small part of it.
+/// Above the largest number, neighbours are merged until all slices have similar widths. The smallest distance of all
+/// is never lost. Two slices that do not touch are merged only if the gap between them is small, into a slice that is
+/// not whole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slices {
     all: Vec<Slice>,
     most: usize,
-    /// Widest slice that two neighbours become \[s\].
+    /// Width up to which two neighbours are merged \[s\].
     width_s: f64,
 }
 
-/// Largest number of slices by default.
+/// Default of the largest number of slices.
 const MOST: usize = 2000;
 
 impl Default for Slices {
@@ -41,23 +42,23 @@ impl Default for Slices {
 }
 
 impl Slice {
-    /// From when to when \[s\] it is known how near two were: all the time of a whole one, of another no longer than the instant
-    /// at which they were closest.
+    /// Returns the interval \[s\] for which the smallest distance is known: the whole slice if it is whole, else the
+    /// instant of the closest approach.
     #[must_use]
     pub fn known_s(&self) -> [f64; 2] {
         let at_s = self.closest.time_s.max(self.from_s).min(self.to_s);
         if self.is_whole { [self.from_s, self.to_s] } else { [at_s; 2] }
     }
 
-    /// The width \[s\] from which on this one and the next become one.
-    fn joined_at_s(&self, next: &Self) -> f64 {
+    /// Returns the width \[s\] from which this slice and the next are merged.
+    fn merge_width_s(&self, next: &Self) -> f64 {
         (next.to_s - self.from_s).max((next.from_s - self.to_s) / GAP_SHARE)
     }
 
-    fn and(self, next: Self) -> Self {
+    fn merge(self, next: Self) -> Self {
         Self {
             to_s: next.to_s,
-            closest: nearer(self.closest, next.closest),
+            closest: closer(self.closest, next.closest),
             is_whole: self.is_whole && next.is_whole && next.from_s <= self.to_s,
             ..self
         }
@@ -65,35 +66,36 @@ impl Slice {
 }
 
 impl Slices {
-    /// Creates an empty list of at most `most` slices, and of at least two.
+    /// Creates an empty list of at most `most` slices, at least two.
     #[must_use]
     pub fn new(most: usize) -> Self {
         Self { all: Vec::new(), most: most.max(2), width_s: 0.0 }
     }
 
-    /// Takes the next one, which begins no earlier than the last one ended; what is no number is passed over.
+    /// Adds the next slice, which must not begin before the last one ends. A slice with a number that is not finite is
+    /// ignored.
     pub fn take(&mut self, next: Slice) {
         let numbers = [next.from_s, next.to_s, next.closest.time_s, next.closest.certain_m()];
         if !numbers.iter().all(|number| number.is_finite()) {
             return;
         }
         match self.all.last_mut() {
-            Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
+            Some(last) if last.merge_width_s(&next) <= self.width_s => *last = last.merge(next),
             _ => self.all.push(next),
         }
         if self.all.len() > self.most {
-            self.thin(self.most / 2);
+            self.merge_neighbours(self.most / 2);
         }
     }
 
-    fn thin(&mut self, most: usize) {
+    fn merge_neighbours(&mut self, most: usize) {
         let known_s: f64 = self.all.iter().map(|slice| slice.to_s - slice.from_s).sum();
         self.width_s = self.width_s.max(known_s / most as f64);
         loop {
             let mut wider: Vec<Slice> = Vec::new();
             for next in self.all.drain(..) {
                 match wider.last_mut() {
-                    Some(last) if last.joined_at_s(&next) <= self.width_s => *last = last.and(next),
+                    Some(last) if last.merge_width_s(&next) <= self.width_s => *last = last.merge(next),
                     _ => wider.push(next),
                 }
             }
@@ -101,7 +103,7 @@ impl Slices {
             if self.all.len() <= most {
                 return;
             }
-            let needed_s = self.all.windows(2).map(|two| two[0].joined_at_s(&two[1])).fold(f64::INFINITY, f64::min);
+            let needed_s = self.all.windows(2).map(|two| two[0].merge_width_s(&two[1])).fold(f64::INFINITY, f64::min);
             self.width_s = needed_s.max(2.0 * self.width_s);
         }
     }
@@ -110,20 +112,20 @@ impl Slices {
     #[must_use]
     pub fn finish(mut self, most: usize) -> Vec<Slice> {
         if self.all.len() > most.max(1) {
-            self.thin(most.max(1));
+            self.merge_neighbours(most.max(1));
         }
         self.all
     }
 
-    /// The closest of all.
+    /// Returns the closest approach of all slices.
     #[must_use]
     pub fn closest(&self) -> Option<Approach> {
-        self.all.iter().map(|slice| slice.closest).reduce(nearer)
+        self.all.iter().map(|slice| slice.closest).reduce(closer)
     }
 }
 
-/// The closer of two; of equals one that is known, and the first.
-fn nearer(a: Approach, b: Approach) -> Approach {
+/// Returns the closer of two approaches; of equal ones a known one, then the first.
+fn closer(a: Approach, b: Approach) -> Approach {
     let order = b.certain_m().total_cmp(&a.certain_m()).then(a.is_known().cmp(&b.is_known()));
     if order.is_lt() { b } else { a }
 }
@@ -146,21 +148,21 @@ mod tests {
     }
 
     #[test]
-    fn slices_are_as_wide_at_the_beginning_as_at_the_end_and_the_closest_of_all_is_kept() {
+    fn slices_have_similar_widths_and_keep_the_smallest_distance() {
         let mut slices = Slices::new(4096);
         (0..100_000).for_each(|k| slices.take(slice(k)));
         assert_eq!(slices.closest(), Some(slice(12_345).closest));
         for most in [4096, 1000, 3, 1] {
             let kept = slices.clone().finish(most);
             assert!(kept.len() <= most && kept.iter().any(|of| of.closest == slice(12_345).closest));
-            assert!(kept.windows(2).all(|two| two[0].to_s == two[1].from_s), "they touch");
+            assert!(kept.windows(2).all(|two| two[0].to_s == two[1].from_s), "the slices touch");
             let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
             assert!(most < 4 || widest_s <= 4.0 * 100_000.0 / most as f64, "{most}: {widest_s}");
         }
     }
 
     #[test]
-    fn no_slice_reaches_across_a_gap() {
+    fn no_slice_spans_a_gap() {
         let mut slices = Slices::new(4096);
         (0..50_000).filter(|k| !(30_000..30_400).contains(k)).for_each(|k| slices.take(slice(k)));
         let kept = slices.finish(1000);
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn one_late_instant_makes_no_slice_wider() {
+    fn a_single_late_sample_does_not_widen_slices() {
         let mut slices = Slices::new(4096);
         (0..6000).for_each(|k| slices.take(slice(k)));
         slices.take(Slice { to_s: 2e8, ..slice(200_000_000) });
@@ -180,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_joined_across_a_gap_is_known_at_its_closest_alone() {
+    fn a_slice_merged_across_a_gap_is_known_only_at_its_closest_approach() {
         let mut slices = Slices::new(4096);
         (0..200).filter(|k| *k != 90).for_each(|k| slices.take(slice(k)));
         let kept = slices.finish(4);
@@ -195,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn many_gaps_are_bounded_too() {
+    fn slices_with_many_gaps_are_bounded() {
         let mut slices = Slices::new(100);
         (0..10_000).map(|k| 2 * k).for_each(|k| slices.take(slice(k)));
         assert!(slices.all.len() <= 100 && slices.finish(7).len() <= 7);
@@ -205,10 +207,10 @@ mod tests {
     }
 
     #[test]
-    fn of_equals_the_known_one_stays() {
+    fn of_equal_distances_the_known_one_is_kept() {
         let bound = Approach { upper_m: 5.0, ..approach(0.5, 2.0) };
         let known = approach(0.7, 2.0);
-        assert_eq!((nearer(bound, known), nearer(known, bound)), (known, known));
-        assert_eq!((nearer(known, approach(0.9, 2.0)), nearer(known, approach(0.9, 1.0))), (known, approach(0.9, 1.0)));
+        assert_eq!((closer(bound, known), closer(known, bound)), (known, known));
+        assert_eq!((closer(known, approach(0.9, 2.0)), closer(known, approach(0.9, 1.0))), (known, approach(0.9, 1.0)));
     }
 }

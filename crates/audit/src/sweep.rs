@@ -1,28 +1,32 @@
-//! Closest approach of one pair over one step, in closed form.
+//! Closed form of the closest approach of one pair over one step.
 //!
 //! Both vehicles move on straight lines at constant speed, so their relative position does too:
-//! r(s) = r0 + s d with d = r1 - r0 and s from 0 to 1. |r(s)|^2 is a parabola in s with its vertex at
-//! s\* = -(r0 . d) / |d|^2.
+//!
+//! ```text
+//! r(s) = r0 + s d,   d = r1 - r0,   0 <= s <= 1
+//! ```
+//!
+//! |r(s)|^2 is a parabola in s with its vertex at s\* = -(r0 . d) / |d|^2.
 
 use nalgebra::Vector3;
 
-/// Smallest limit that is judged by \[m\]: its fourth power, which the cast forms, does not vanish.
+/// Smallest accepted limit \[m\]: its fourth power, which the cast forms, does not underflow.
 pub(super) const MIN_LIMIT_M: f64 = 1e-70;
-/// Largest limit and coordinate that is judged \[m\]: fourth powers of lengths stay finite.
+/// Largest accepted limit and coordinate \[m\]: fourth powers of lengths stay finite.
 pub(super) const MAX_LENGTH_M: f64 = 1e70;
-/// Rounding of [`RelativeMotion::closest`]: the separation found is off by at most this many times the scale of the motion,
-/// the larger of |r0| and |r1|.
+/// Bound on the rounding error of [`RelativeMotion::closest`], relative to the scale of the motion: the larger of |r0|
+/// and |r1|.
 ///
-/// To first order in u = eps/2: r0 and r1 carry u each, d one more u, s d two, the sum and the norm three, each relative
-/// to |r0| or less since s |d| <= |r0| at the closest point; that is at most 8 u = 4 eps. An error of s\* itself moves the
-/// point along d, which the separation feels in second order alone unless it is itself of that size. The bound is twice as
-/// large, which covers what is of higher order.
+/// To first order in u = eps/2: r0 and r1 carry u each, d one more u, s d two, the sum and the norm three. Each error
+/// is relative to at most |r0|, since s |d| <= |r0| at the closest point. Together that is at most 8 u = 4 eps. An
+/// error of s\* moves the point along d, which changes the separation in second order only, unless the separation
+/// itself is of that size. The bound is twice as large and so covers higher orders.
 ///
-/// Where the ends are interpolated, each is off by at most 8 u of the sum of what is added for it, and so is every point
-/// between them: the scale is larger by twice that sum.
+/// Interpolated ends are each off by at most 8 u of the sum of their terms, and so is every point between them. The
+/// scale is then larger by twice that sum.
 const RESOLUTION: f64 = 8.0 * f64::EPSILON;
 
-/// An interval of time \[s\], from its first to its last instant.
+/// Closed interval of time \[s\].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
     pub(super) from_s: f64,
@@ -30,8 +34,8 @@ pub(super) struct Interval {
 }
 
 impl Interval {
-    /// The time at a fraction of the interval, exact at both ends and never earlier at a larger fraction, for every rounding
-    /// on its way is in order. Halves of times are taken, whose difference cannot overflow.
+    /// Returns the time at a fraction of the interval. It is exact at both ends and monotonic in the fraction, since
+    /// each rounded operation is. Times are halved first, so that their difference cannot overflow.
     pub(super) fn at(self, fraction: f64) -> f64 {
         let (from, to) = (0.5 * self.from_s, 0.5 * self.to_s);
         let time_s = if fraction < 1.0 { 2.0 * (from + fraction * (to - from)) } else { self.to_s };
@@ -39,14 +43,14 @@ impl Interval {
     }
 }
 
-/// The larger of two finite numbers; cheaper than `f64::max`, which looks for NaN.
+/// Returns the larger of two finite numbers; cheaper than `f64::max`, which checks for NaN.
 #[inline]
 pub(super) fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }
 }
 
-/// Smallest distance of two vehicles \[m\] while their relative position moves on a straight line from `from` to `to`
-/// \[m\].
+/// Returns the smallest separation of two vehicles \[m\] while their relative position moves on a straight line from
+/// `from` to `to` \[m\].
 #[must_use]
 pub fn swept_separation_m(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
     RelativeMotion::new(from, to).closest().separation_m()
@@ -65,20 +69,20 @@ pub(super) struct RelativeMotion {
     pub(super) from_squared: f64,
     /// |r1|^2 \[m^2\].
     pub(super) to_squared: f64,
-    /// What interpolated ends are rounded in proportion to, squared \[m^2\]; 0 for differences of two samples.
+    /// Square of the scale of the rounding errors of interpolated ends \[m^2\]; 0 for differences of two samples.
     pub(super) interpolated_squared: f64,
 }
 
-/// Where a relative motion is closest to zero.
+/// Point of a relative motion that is closest to the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ClosestPoint {
     /// Smallest separation, squared \[m^2\].
     pub(super) squared: f64,
-    /// Fraction s of the step at which it is reached first.
+    /// Fraction s of the step at which it is first reached.
     pub(super) at: f64,
 }
 
-/// The part of a step that a pair spends below a distance, as fractions of the step.
+/// Part of a step during which a pair is below a distance, as fractions of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Span {
     pub(super) enter: f64,
@@ -92,7 +96,8 @@ impl RelativeMotion {
         Self { from, to, by: to - from, from_squared, to_squared, interpolated_squared: 0.0 }
     }
 
-    /// Between ends that are interpolated: each is a difference of starting points plus shares of two displacements.
+    /// Creates a motion between interpolated ends. Each end is a difference of starting points plus fractions of two
+    /// displacements.
     #[inline]
     pub(super) fn interpolated(ends: [Vector3<f64>; 2], start: Vector3<f64>, by: [Vector3<f64>; 2]) -> Self {
         let [from, to] = ends;
@@ -101,19 +106,19 @@ impl RelativeMotion {
         Self { interpolated_squared: 9.0 * sum_squared, ..Self::new(from, to) }
     }
 
-    /// What the separation found is rounded in proportion to, squared \[m^2\].
+    /// Returns the square of the scale of the rounding errors \[m^2\].
     #[inline]
     pub(super) fn scale_squared(&self) -> f64 {
         larger(larger(self.from_squared, self.to_squared), self.interpolated_squared)
     }
 
-    /// How far the separation found can be off \[m\].
+    /// Returns the bound on the error of the computed separation \[m\].
     #[inline]
     pub(super) fn resolution_m(&self) -> f64 {
         RESOLUTION * self.scale_squared().sqrt()
     }
 
-    /// The closest approach. It is never farther than either end.
+    /// Returns the closest approach, which is never farther than either end.
     #[inline]
     pub(super) fn closest(&self) -> ClosestPoint {
         let mut closest = ClosestPoint { squared: self.from_squared, at: 0.0 };
@@ -126,18 +131,19 @@ impl RelativeMotion {
         closest
     }
 
-    /// When the pair is below `distance_m`, given that the closest approach is.
+    /// Returns the part of the step during which the pair is below `distance_m`, given that the closest approach is.
     ///
-    /// With b = r0 . d and c = |r0|^2 - distance^2 the roots of |d|^2 s^2 + 2 b s + c are q / |d|^2 and c / q, where
-    /// q = -b -+ sqrt(b^2 - |d|^2 c) takes the sign that does not cancel. The discriminant is taken from the closest
-    /// point of the unbounded line, |d|^2 (distance^2 - |r(s\*)|^2), which keeps a graze exact where b^2 - |d|^2 c cancels.
+    /// Let b = r0 . d and c = |r0|^2 - distance^2. The roots of |d|^2 s^2 + 2 b s + c are q / |d|^2 and c / q. The sign
+    /// in q = -b -+ sqrt(b^2 - |d|^2 c) is the one that does not cancel. The discriminant is computed from the closest
+    /// point of the unbounded line, |d|^2 (distance^2 - |r(s\*)|^2). That stays exact for a graze, where b^2 - |d|^2 c
+    /// cancels.
     pub(super) fn below(&self, distance_m: f64, closest: ClosestPoint) -> Span {
         let excess = |squared: f64| (squared.sqrt() - distance_m) * (squared.sqrt() + distance_m);
         let (speed_squared, b, c) = (self.by.norm_squared(), self.from.dot(&self.by), excess(self.from_squared));
         let foot_squared = (self.from - self.by * (b / speed_squared)).norm_squared();
         let root = (speed_squared * -excess(foot_squared)).max(0.0).sqrt();
         let (enter, exit) = if b < 0.0 { (c / (root - b), (root - b) / speed_squared) } else { (0.0, -c / (root + b)) };
-        // `min` and `max` pass over NaN, so a motion too small to divide by keeps the whole step.
+        // `min` and `max` ignore NaN, so a motion too small to divide by counts as below for the whole step.
         let enter = if self.from_squared.sqrt() < distance_m { 0.0 } else { enter.max(0.0).min(closest.at) };
         let exit = if self.to_squared.sqrt() < distance_m { 1.0 } else { exit.min(1.0).max(closest.at) };
         Span { enter, exit }
@@ -169,8 +175,8 @@ mod tests {
         RelativeMotion::new(Vector3::from(from), Vector3::from(to))
     }
 
-    /// The smallest squared separation as an exact fraction, for positions that are whole numbers: |r0 x d|^2 / |d|^2
-    /// between the ends, else that of the nearer end.
+    /// Returns the smallest squared separation of integer positions as an exact fraction: |r0 x d|^2 / |d|^2 between
+    /// the ends, else the square of the nearer end.
     fn exact_closest(from: [i64; 3], to: [i64; 3]) -> (i128, i128) {
         let wide = |v: [i64; 3]| v.map(i128::from);
         let (from, to) = (wide(from), wide(to));
@@ -184,7 +190,7 @@ mod tests {
         (dot(cross, cross), dot(by, by))
     }
 
-    fn whole(range: std::ops::Range<i64>) -> impl Strategy<Value = [i64; 3]> {
+    fn integers(range: std::ops::Range<i64>) -> impl Strategy<Value = [i64; 3]> {
         prop::array::uniform3(range)
     }
 
@@ -192,12 +198,12 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn the_separation_is_that_of_exact_arithmetic_within_the_resolution(
+        fn the_separation_equals_exact_arithmetic_to_within_the_resolution(
             (from, to) in prop_oneof![
-                (whole(-1_000_000..1_000_000), whole(-1_000_000..1_000_000)),
-                (whole(-9..9), whole(-9..9)),
-                // Through the neighbourhood of zero.
-                (whole(-1_000_000..1_000_000), whole(-9..9)).prop_map(|(a, b)| {
+                (integers(-1_000_000..1_000_000), integers(-1_000_000..1_000_000)),
+                (integers(-9..9), integers(-9..9)),
+                // Close to the origin.
+                (integers(-1_000_000..1_000_000), integers(-9..9)).prop_map(|(a, b)| {
                     (a, std::array::from_fn(|axis| b[axis] - a[axis]))
                 }),
             ],
@@ -213,7 +219,7 @@ mod tests {
         }
 
         #[test]
-        fn times_of_an_interval_are_in_the_order_of_their_fractions(
+        fn the_time_is_monotonic_in_the_fraction(
             from_s in -1e3..1e3_f64, length_s in 0.0..10.0_f64, fraction in 0.0..1.0_f64, near in 1..4_u32
         ) {
             let interval = Interval { from_s, to_s: from_s + length_s };
@@ -245,14 +251,14 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_keeps_its_distance_is_closest_at_the_start() {
+    fn a_constant_separation_is_closest_at_the_start() {
         let still = motion([3.0, 4.0, 0.0], [3.0, 4.0, 0.0]);
         assert_eq!(still.closest(), ClosestPoint { squared: 25.0, at: 0.0 });
         assert_eq!(still.below(6.0, still.closest()), Span { enter: 0.0, exit: 1.0 });
     }
 
     #[test]
-    fn a_graze_is_below_for_the_chord_that_it_cuts() {
+    fn a_graze_is_below_for_the_length_of_its_chord() {
         // 1 nm deep at distance 2 m: half the chord is sqrt((2 - x)(2 + x)) with x = 2 - 1e-9.
         let x = 2.0 - 1e-9;
         let graze = motion([-10.0, x, 0.0], [10.0, x, 0.0]);
@@ -262,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_too_small_to_square_is_below_for_the_whole_step() {
+    fn a_motion_whose_square_underflows_is_below_for_the_whole_step() {
         let tiny = motion([1e-180, 0.0, 0.0], [-1e-180, 0.0, 0.0]);
         assert_eq!(tiny.below(1.0, tiny.closest()), Span { enter: 0.0, exit: 1.0 });
     }

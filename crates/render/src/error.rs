@@ -1,73 +1,73 @@
-//! Why there is no picture, no film or no window.
+//! Errors of pictures, films and the window.
 
 use tautline_core::record::RecordError;
 use tautline_report::request::Failure;
 
-/// Largest coordinate and radius that are drawn \[m\]: more than twice as far as the Moon. Pictures are made in single
-/// precision, where fourth powers of lengths must have room.
+/// Largest coordinate and radius that can be drawn \[m\]: more than twice the distance of the Moon. Pictures use single
+/// precision, in which fourth powers of lengths must not overflow.
 pub const FARTHEST_M: f64 = 1e9;
 
-/// Why there is no picture, no film or no window.
+/// Error of a picture, a film or the window.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// The recording cannot be read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A length is too large to be drawn: whose, which, when and how large, in a sentence.
-    #[error("{0}; what is beyond {FARTHEST_M:e} m cannot be drawn")]
+    /// A length is too large to be drawn. The text names vehicle, quantity, value and time.
+    #[error("{0}; coordinates and radii must be at most {FARTHEST_M:e} m")]
     TooFar(String),
-    /// The flight of this name holds no samples.
-    #[error("{0} holds no samples, so there is nothing to draw")]
+    /// The flight of this name has no samples.
+    #[error("{0} has no samples, so there is nothing to draw")]
     Empty(String),
-    /// A camera that is none of the known ones, or out of range.
+    /// The camera is unknown or out of range.
     #[error("{0}")]
     Camera(String),
-    /// A camera follows a vehicle that the flight does not have.
+    /// The camera follows a vehicle that the flight does not have.
     #[error("{0}")]
     NoVehicle(String),
-    /// The machine has no adapter at all.
-    #[error("this machine has no graphics adapter and no driver in software")]
+    /// The machine has no adapter.
+    #[error("this machine has no graphics adapter and no software driver")]
     NoAdapter,
-    /// It has adapters, but not of this choice.
+    /// The machine has adapters, but none that matches the choice.
     #[error("{0}")]
     NoSuchAdapter(String),
     /// A picture of this size cannot be drawn.
     #[error("{0}")]
     PictureSize(String),
-    /// The adapter cannot be started, failed while drawing, or is gone.
+    /// The adapter cannot be started, failed while drawing, or was lost.
     #[error("{0}")]
     Driver(String),
-    /// A picture cannot be encoded or put together.
-    #[error("the picture cannot be made: {0}")]
+    /// A picture cannot be encoded or composed.
+    #[error("the picture cannot be encoded or composed: {0}")]
     Picture(String),
-    /// The name of the file does not say which format a film is to be.
+    /// The file name has no extension of a film format.
     #[error("`{0}` does not end in .mp4 or .gif")]
     UnknownFilm(String),
-    /// The format does not allow this number of pictures a second.
+    /// The format does not allow this frame rate.
     #[error("{0}")]
     FilmRate(String),
     /// The format does not allow pictures of this size.
     #[error("{0}")]
     FilmSize(String),
-    /// The film was not given the pictures that it was made for, or its encoder failed.
+    /// The film got the wrong pictures, or its encoder failed.
     #[error("{0}")]
     Film(String),
-    /// Nothing here encodes MP4.
+    /// There is no encoder for MP4.
     #[error("this build encodes MP4 films with ffmpeg, and there is no ffmpeg on PATH")]
     NoFfmpeg,
     /// The film cannot be written.
     #[error("the film cannot be written: {0}")]
     Write(#[from] std::io::Error),
-    /// There is no screen to open a window on.
+    /// There is no display for a window.
     #[error("there is no display to open a window on: {0}")]
     NoDisplay(String),
-    /// The window system refused.
+    /// The window system refused the window.
     #[error("the window cannot be opened: {0}")]
     NoWindow(String),
 }
 
 impl RenderError {
-    /// The stable name of the problem, such as `render/no-adapter`.
+    /// Returns the stable code of the error, such as `render/no-adapter`.
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {
@@ -92,7 +92,7 @@ impl RenderError {
         }
     }
 
-    /// Whether the machine is at fault, and not what was asked for.
+    /// Returns whether the cause is the machine, as opposed to the input.
     #[must_use]
     pub fn is_machine(&self) -> bool {
         use RenderError as E;
@@ -100,22 +100,23 @@ impl RenderError {
         of_machine || matches!(self, E::Picture(_) | E::Film(_) | E::NoFfmpeg | E::Write(_))
     }
 
-    /// What helps, where something does.
+    /// Returns a remedy, if there is one.
     #[must_use]
     pub fn help(&self) -> Option<&'static str> {
         use RenderError as E;
         Some(match self {
-            E::TooFar(_) => "mend the recording, or see whether its lengths are in metres",
+            E::TooFar(_) => "correct the recording, or check that its lengths are in metres",
             E::Empty(_) => "give a recording that holds at least one sample, such as a run's run.mcap",
             E::NoVehicle(_) => "give the name of a vehicle of the recording",
             E::Camera(_) => {
-                "give iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres such as -60,30,25"
+                "give iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres \
+                 such as -60,30,25"
             }
             E::NoAdapter => {
-                "install a driver; one in software is in Debian's packages: apt-get install mesa-vulkan-drivers libvulkan1"
+                "install a driver; Debian has one in software: apt-get install mesa-vulkan-drivers libvulkan1"
             }
             E::NoSuchAdapter(_) => {
-                "give hardware, software or a part of the name of an adapter that there is with --adapter"
+                "give hardware, software or a part of the name of an existing adapter with --adapter"
             }
             E::PictureSize(_) => "give another size with --size",
             E::Driver(_) => "try a smaller picture, or another driver with --adapter software",
@@ -130,7 +131,7 @@ impl RenderError {
     }
 }
 
-/// Refuses lengths \[m\] that are too large to be drawn.
+/// Checks that lengths \[m\] are small enough to be drawn.
 pub(super) fn check_lengths<'a>(
     lengths_m: impl IntoIterator<Item = &'a f64>,
     what: &str,

@@ -1,4 +1,4 @@
-//! A run as a 3-D scene that Foxglove shows without a plug-in.
+//! Foxglove scene of a run: 3-D entities that Foxglove shows without a plug-in.
 
 use std::io;
 
@@ -22,35 +22,35 @@ use tautline_report::flight_log::{Violations, attitudes_of};
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
-/// Scenes a second \[Hz\].
+/// Rate of scenes \[Hz\].
 pub const SCENE_HZ: f64 = 5.0;
-/// Most edges that are in a scene.
-const MOST_EDGES: usize = 300;
-/// Most vehicles that are, but for those that are too close to another.
-const MOST_VEHICLES: usize = 2000;
-/// Most quadrotors that are shown with arms and rotors: of more, each is a ball.
-const MOST_QUADROTORS: usize = 100;
+/// Largest number of edges in a scene.
+const MAX_EDGES: usize = 300;
+/// Largest number of vehicles in a scene, apart from vehicles in violation.
+const MAX_VEHICLES: usize = 2000;
+/// Largest number of quadrotors with arms and rotors; in a larger swarm each vehicle is a ball.
+const MAX_QUADROTORS: usize = 100;
 /// Width of an edge \[m\].
 const EDGE_M: f64 = 0.03;
-/// Side of the plate that stands for a half-space \[m\].
+/// Side of the plate that represents a half-space \[m\].
 const PLATE_M: f64 = 100.0;
-/// Times are products of steps.
+/// Tolerance of sample times, which are products of steps \[s\].
 const ROUNDING_S: f64 = 1e-6;
 
-/// Makes `foxglove.SceneUpdate` messages on `/scene`: vehicles as balls or quadrotors, keep-out shells, edges in the colour of their
-/// tension, in the colours of [`Theme::Dark`], [`SCENE_HZ`] times a second.
+/// Makes `foxglove.SceneUpdate` messages on `/scene` at [`SCENE_HZ`]: vehicles as balls or quadrotors, keep-out shells,
+/// and edges in the colour of their tension. Colours are those of [`Theme::Dark`].
 ///
-/// Of more than 2000 vehicles so many are shown, evenly chosen, and those that are closer than delta to another.
-/// A scene takes some 230 bytes for each vehicle, of which a half is its shell, and 140 for each edge (none where there
-/// are more than 300), so beside 72 bytes for each vehicle and sample at 60 Hz a recording grows by less than a third,
-/// and one of few vehicles by a half. Up to 100 quadrotors have arms and rotors, turned as they are, in some 1100 bytes
-/// each.
+/// A swarm of more than 2000 vehicles is reduced to 2000, evenly chosen, plus vehicles closer than delta to another.
+///
+/// A scene takes about 230 bytes per vehicle, half of it for the shell, and 140 per edge; more than 300 edges are not
+/// included. Relative to 72 bytes per vehicle and sample at 60 Hz a recording grows by less than a third, and one of
+/// few vehicles by a half. Up to 100 quadrotors have arms and rotors with their attitude, about 1100 bytes each.
 pub struct FoxgloveScene {
     plan: Plan,
     radius_m: Vec<f64>,
     shape: Option<QuadrotorShape>,
     delta_m: f64,
-    /// Height of shells over their width.
+    /// Ratio of height to width of shells.
     shell_ratio: f64,
     next_s: f64,
     schema: Option<Schema>,
@@ -58,7 +58,7 @@ pub struct FoxgloveScene {
 }
 
 impl FoxgloveScene {
-    /// Scenes of a flight of this scenario.
+    /// Creates scenes for a flight of this scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self {
@@ -82,11 +82,11 @@ impl FoxgloveScene {
         for pair in too_close.filter(|pair| pair.second() < count) {
             (alarm[pair.first()], alarm[pair.second()]) = (true, true);
         }
-        // The share of the vehicles up to this one passes a whole number at those that are chosen.
-        let share = |k: usize| k * MOST_VEHICLES / count;
-        let is_shown = |k: &usize| count <= MOST_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
+        // A vehicle is chosen where the share of vehicles up to it passes an integer.
+        let share = |k: usize| k * MAX_VEHICLES / count;
+        let is_shown = |k: &usize| count <= MAX_VEHICLES || alarm[*k] || share(*k) < share(*k + 1);
         let hull_colour = |k: usize| if alarm[k] { theme.alarm() } else { theme.vehicle_among(k, count) };
-        let attitudes = if count <= MOST_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
+        let attitudes = if count <= MAX_QUADROTORS { attitudes_of(sample) } else { Vec::new() };
         let attitude = |k: usize| attitudes.get(k).copied().flatten();
         let quadrotors = (0..count).filter_map(|k| {
             let shape = self.shape.unwrap_or_else(|| QuadrotorShape::within(self.radius_m[k]));
@@ -113,7 +113,7 @@ impl FoxgloveScene {
             thickness: EDGE_M,
             ..LinePrimitive::default()
         };
-        let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MOST_EDGES);
+        let few_edges = Some(&self.plan.graph).filter(|graph| graph.edge_count() <= MAX_EDGES);
         for (i, j) in few_edges.into_iter().flat_map(Graph::edges) {
             let tension = self.plan.tension(Pair::new(i, j), separation(positions_m, i, j), time_s);
             for place in [i, j].map(|k| row(positions_m, k)) {
@@ -171,7 +171,7 @@ fn sphere(positions_m: &Rows, k: usize, radius_m: f64, shown: Colour) -> SphereP
     ball(row(positions_m, k), radius_m, shown)
 }
 
-/// A box, or a half-space as a plate around its place.
+/// Returns the cube of a box, or a plate for a half-space.
 fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
     let (size, turn) = match obstacle.shape {
         Shape::Box { half_m, yaw_deg } => {
@@ -181,18 +181,18 @@ fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
         Shape::Ball { .. } | Shape::Capsule { .. } => return None,
     };
     Some(CubePrimitive {
-        pose: Some(turned(obstacle.place_m, turn)),
+        pose: Some(rotated_pose(obstacle.place_m, turn)),
         size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
         color: Some(colour(Theme::Dark.obstacle())),
     })
 }
 
-/// A capsule without its ends.
+/// Returns the cylinder of a capsule, without its round ends.
 fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
     let Shape::Capsule { from_m, to_m, radius_m } = obstacle.shape else { return None };
     let side = 2.0 * radius_m;
     Some(CylinderPrimitive {
-        pose: Some(turned(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
+        pose: Some(rotated_pose(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
         size: Some(Vector3 { x: side, y: side, z: (to_m - from_m).norm() + side }),
         bottom_scale: 1.0,
         top_scale: 1.0,
@@ -200,7 +200,7 @@ fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
     })
 }
 
-/// What turns the z axis to a direction.
+/// Returns the rotation of the z axis to a direction.
 fn from_z(direction: nalgebra::Vector3<f64>) -> UnitQuaternion<f64> {
     let z = nalgebra::Vector3::z();
     UnitQuaternion::rotation_between(&z, &direction)
@@ -213,7 +213,7 @@ fn timestamp(time_s: f64) -> Timestamp {
     Timestamp::new_checked(seconds, nanoseconds).unwrap_or(Timestamp::MAX)
 }
 
-/// In units of the arm: radius of the body, width of an arm, how far ahead its mark reaches, height of a rotor.
+/// Lengths relative to the arm: radius of the body, width of an arm, reach of the mark ahead, height of a rotor.
 const BODY: f64 = 0.3;
 const ARM: f64 = 0.11;
 const AHEAD: f64 = 0.72;
@@ -221,14 +221,14 @@ const ROTOR: f64 = 0.04;
 /// Opacity of a rotor.
 const OPACITY: f32 = 0.5;
 
-/// A quadrotor: its body, its rotors, and its arms with a mark ahead, all turned as it is.
+/// Quadrotor with its attitude: body, rotors, and arms with a mark ahead.
 struct QuadrotorParts {
     body: SpherePrimitive,
     rotors: [CylinderPrimitive; 4],
     arms: LinePrimitive,
 }
 
-/// The parts of a quadrotor at a place \[m\].
+/// Returns the parts of a quadrotor at a position \[m\].
 fn quadrotor(
     shape: &QuadrotorShape,
     place_m: nalgebra::Vector3<f64>,
@@ -237,7 +237,7 @@ fn quadrotor(
 ) -> QuadrotorParts {
     let (arm_m, side) = (shape.arm_m(), 2.0 * shape.rotor_radius_m);
     let rotors = shape.rotors_m.map(|rotor_m| CylinderPrimitive {
-        pose: Some(turned(place_m + attitude * rotor_m, attitude)),
+        pose: Some(rotated_pose(place_m + attitude * rotor_m, attitude)),
         size: Some(Vector3 { x: side, y: side, z: ROTOR * arm_m }),
         bottom_scale: 1.0,
         top_scale: 1.0,
@@ -247,7 +247,7 @@ fn quadrotor(
     let ends = shape.rotors_m.into_iter().chain([ahead_m]);
     let arms = LinePrimitive {
         r#type: LineType::LineList.into(),
-        pose: Some(turned(place_m, attitude)),
+        pose: Some(rotated_pose(place_m, attitude)),
         thickness: ARM * arm_m,
         points: ends.flat_map(|end| [Point3::default(), Point3 { x: end.x, y: end.y, z: end.z }]).collect(),
         color: Some(colour(shown)),
@@ -256,8 +256,8 @@ fn quadrotor(
     QuadrotorParts { body: ball(place_m, BODY * arm_m, shown), rotors, arms }
 }
 
-/// Moved to a place and turned.
-fn turned(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
+/// Returns the pose at a position with a rotation.
+fn rotated_pose(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
     let [x, y, z, w] = turn.coords.into();
     Pose {
         position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
@@ -265,7 +265,7 @@ fn turned(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
     }
 }
 
-/// A ball of a radius \[m\].
+/// Returns a ball with a radius \[m\].
 fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePrimitive {
     let side = 2.0 * radius_m;
     SpherePrimitive {
@@ -275,12 +275,12 @@ fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePr
     }
 }
 
-/// Moved to a place and not turned.
+/// Returns the pose at a position without a rotation.
 fn pose(position: Vector3) -> Pose {
     Pose { position: Some(position), orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }) }
 }
 
-/// The colour as Foxglove has it.
+/// Converts a colour to Foxglove's type.
 fn colour(colour: Colour) -> Color {
     let [r, g, b, a] = colour.rgba.map(|channel| f64::from(channel) / 255.0);
     Color { r, g, b, a }
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shell_is_as_high_as_the_ellipsoid_that_must_stay_empty() {
+    fn a_shell_has_the_shape_of_the_ellipsoid() {
         let scenario = Scenario {
             safety: tautline_sim::scenario::Safety::Ellipsoid { half_axes_m: [1.0, 1.0, 3.0] },
             ..pentagon()
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quadrotor_is_turned_as_it_flies_and_many_are_balls() {
+    fn a_quadrotor_has_its_attitude_and_a_large_swarm_has_balls() {
         let entity = |count: usize, tilt_rad: f64| {
             let start = Swarm::at_rest(tautline_laws::formation::Formation::grid(count, 3.0).slots_m);
             let formation = tautline_laws::formation::Formation { slots_m: start.positions_m.clone() };
@@ -372,7 +372,7 @@ mod tests {
         assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
         let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
         let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
-        // Ahead is down where it flies ahead.
+        // A vehicle that flies ahead tilts its front down.
         let x = QuadrotorShape::within(0.25).rotors_m[0].x;
         assert!(
             (at.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12 && (at.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
@@ -380,12 +380,12 @@ mod tests {
         assert!((turn.y - 0.2_f64.sin()).abs() < 1e-12 && (turn.w - 0.2_f64.cos()).abs() < 1e-12);
         let (level, place, _) = entity(2, 0.0);
         assert_eq!(front(&level).position.map(|at| at.z), Some(place.z));
-        let (many, ..) = entity(MOST_QUADROTORS + 1, 0.4);
-        assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MOST_QUADROTORS + 1), 0));
+        let (many, ..) = entity(MAX_QUADROTORS + 1, 0.4);
+        assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MAX_QUADROTORS + 1), 0));
     }
 
     #[test]
-    fn two_without_an_edge_between_them_are_red_too_while_the_judge_finds_them_too_close() {
+    fn a_pair_in_violation_is_red_with_or_without_an_edge() {
         let mut scenario = pentagon();
         scenario.graph = tautline_laws::graph::Graph::ring(5);
         let mut swarm = scenario.start.clone();
@@ -398,7 +398,7 @@ mod tests {
             assert!(entity.lines[0].pose.is_some());
             [0, 2, 4].map(|k| entity.spheres[k].color == Some(colour(Theme::Dark.alarm())))
         };
-        assert_eq!(red(&mut scene, 0.0), [false; 3], "the judge has said nothing");
+        assert_eq!(red(&mut scene, 0.0), [false; 3], "no violation was reported");
         let (pair, time_s, min_m) = (Pair::new(0, 2), 0.5, 1.9);
         scene.note(&Event::ViolationBegan { pair, time_s });
         assert_eq!(red(&mut scene, 1.0), [true, true, false]);
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_of_many_vehicles_holds_some_of_them_and_those_that_are_too_close() {
+    fn a_scene_of_a_large_swarm_holds_a_choice_and_all_violations() {
         let count = 4001;
         let formation = tautline_laws::formation::Formation::grid(count, 3.0);
         let start = Swarm::at_rest(formation.slots_m.clone());
@@ -417,16 +417,16 @@ mod tests {
             let bytes = message(scene, time_s, &start).expect("a message");
             SceneUpdate::decode(bytes.as_slice()).expect("a scene").entities[0].spheres.len()
         };
-        assert_eq!(shown(0.0, &mut scene), 2 * MOST_VEHICLES);
+        assert_eq!(shown(0.0, &mut scene), 2 * MAX_VEHICLES);
         for first in [0, 2, 3, 4000] {
             scene.note(&Event::ViolationBegan { pair: Pair::new(first, (first + 1) % count), time_s: 0.5 });
         }
-        let more = shown(1.0, &mut scene) / 2 - MOST_VEHICLES;
-        assert!((2..=4).contains(&more), "of 0 to 4 and 4000 some are shown anyway: {more}");
+        let more = shown(1.0, &mut scene) / 2 - MAX_VEHICLES;
+        assert!((2..=4).contains(&more), "some of the vehicles 0 to 4 and 4000 are chosen anyway: {more}");
     }
 
     #[test]
-    fn scenes_come_five_times_a_second_and_take_what_the_documentation_says() {
+    fn the_rate_and_size_of_scenes_are_as_documented() {
         let scenario = pentagon();
         let mut scene = FoxgloveScene::of(&scenario);
         let sizes: Vec<usize> = (0..=60_u32)

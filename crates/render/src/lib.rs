@@ -1,7 +1,13 @@
-//! Pictures, films and a window of a flight.
+//! Pictures, films and an interactive window of a flight.
 //!
-//! [`Timeline`] is a flight with its log, [`scene`] makes a draw list of any time of it, [`gpu`] draws that list
-//! without a screen into a [`Picture`], and [`Film`] strings pictures together. Only [`gpu`] and the window know of wgpu.
+//! The data flow:
+//!
+//! 1. [`Timeline`] holds a flight with its log.
+//! 2. [`scene`] turns any time of it into a draw list.
+//! 3. [`gpu`] draws the list off-screen into a [`Picture`].
+//! 4. [`Film`] encodes pictures.
+//!
+//! Only [`gpu`] and the window depend on wgpu.
 //!
 //! ```no_run
 //! use std::path::Path;

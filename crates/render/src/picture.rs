@@ -1,13 +1,13 @@
-//! Pictures in memory.
+//! Pictures in memory: PNG encoding, halving, and contact sheets.
 
 use super::error::RenderError;
 
-/// A picture: rows from the top, pixels from the left, red, green, blue and opacity in sRGB.
+/// Picture in sRGB: rows from the top, pixels from the left, with red, green, blue and opacity.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture {
     /// Width and height \[pixels\].
     pub size_px: [u32; 2],
-    /// 4 bytes a pixel.
+    /// Pixels, 4 bytes each.
     pub rgba: Vec<u8>,
 }
 
@@ -18,7 +18,7 @@ impl std::fmt::Debug for Picture {
 }
 
 impl Picture {
-    /// The colour of a pixel; `None` outside.
+    /// Returns the colour of a pixel; `None` outside the picture.
     #[must_use]
     pub fn pixel(&self, x: u32, y: u32) -> Option<[u8; 4]> {
         let [width, height] = self.size_px;
@@ -29,10 +29,10 @@ impl Picture {
         self.rgba.get(at..at + 4)?.try_into().ok()
     }
 
-    /// The picture as PNG, without its opacity, which is full.
+    /// Encodes the picture as PNG without opacity; all pictures are opaque.
     ///
     /// # Errors
-    /// [`RenderError::Picture`] when the number of bytes does not fit the size.
+    /// [`RenderError::Picture`] if the number of bytes does not match the size.
     pub fn to_png(&self) -> Result<Vec<u8>, RenderError> {
         let mut bytes = Vec::new();
         let write = |bytes| {
@@ -44,7 +44,7 @@ impl Picture {
         Ok(bytes)
     }
 
-    /// The picture at half its size: every pixel is the mean of four.
+    /// Returns the picture at half its size: every pixel is the mean of four.
     #[must_use]
     pub fn halved(&self) -> Self {
         let size_px = self.size_px.map(|size| size / 2);
@@ -59,13 +59,13 @@ impl Picture {
         Self { size_px, rgba }
     }
 
-    /// 3 bytes a pixel: without the opacity, which is full.
+    /// Returns 3 bytes per pixel, without opacity.
     pub(super) fn rgb(&self) -> Vec<u8> {
         self.rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
     }
 }
 
-/// What encodes pictures of this size as PNG.
+/// Returns a PNG encoder for pictures of this size.
 pub(super) fn png_encoder<W: std::io::Write>(out: W, [width, height]: [u32; 2]) -> png::Encoder<'static, W> {
     let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(png::ColorType::Rgb);
@@ -75,28 +75,32 @@ pub(super) fn png_encoder<W: std::io::Write>(out: W, [width, height]: [u32; 2]) 
     encoder
 }
 
-/// A PNG within an address, for pages that load nothing.
+/// Encodes a PNG as a data URI, for self-contained pages.
 #[must_use]
 pub fn data_uri(png: &[u8]) -> String {
     use base64::Engine as _;
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
 
-/// Pictures of one size side by side, so many in a row; what is left of the last row has the first pixel's colour.
+/// Arranges pictures of one size in rows of `columns`. The rest of the last row has the colour of the first pixel.
 ///
 /// # Errors
-/// [`RenderError::Picture`] when there is none, or they differ in size.
+/// [`RenderError::Picture`] without pictures, without columns, or if sizes differ.
 pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, RenderError> {
-    let Some(first) = pictures.first() else { return Err(RenderError::Picture("there are none".to_owned())) };
+    let Some(first) = pictures.first() else {
+        return Err(RenderError::Picture("a contact sheet needs at least one picture".to_owned()));
+    };
     let [width, height] = first.size_px;
     if columns == 0 || pictures.iter().any(|picture| picture.size_px != first.size_px) {
-        return Err(RenderError::Picture("a sheet needs a column and pictures of one size".to_owned()));
+        return Err(RenderError::Picture(
+            "a contact sheet needs at least one column, and pictures of one size".to_owned(),
+        ));
     }
     let rows = u32::try_from(pictures.len().div_ceil(columns as usize)).unwrap_or(u32::MAX);
     let size_px = [width.saturating_mul(columns), height.saturating_mul(rows)];
     let row_bytes = size_px[0] as usize * 4;
-    let ground = first.pixel(0, 0).unwrap_or([255; 4]);
-    let mut rgba = ground.repeat(size_px[0] as usize * size_px[1] as usize);
+    let filling = first.pixel(0, 0).unwrap_or([255; 4]);
+    let mut rgba = filling.repeat(size_px[0] as usize * size_px[1] as usize);
     for (k, picture) in pictures.iter().enumerate() {
         let (left, top) = (k % columns as usize * width as usize * 4, k / columns as usize * height as usize);
         for (y, row) in picture.rgba.chunks_exact(width as usize * 4).enumerate() {
@@ -116,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_comes_back_from_its_png() {
+    fn a_picture_survives_png_encoding() {
         let mut picture = plain([3, 2], [10, 20, 30, 255]);
         picture.rgba[..4].copy_from_slice(&[1, 2, 3, 255]);
         let png = picture.to_png().expect("a PNG");
@@ -128,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_holds_every_picture_in_its_place() {
+    fn a_contact_sheet_holds_every_picture_in_its_place() {
         let colours = [[1, 0, 0, 255], [2, 0, 0, 255], [3, 0, 0, 255]];
         let sheet = contact_sheet(&colours.map(|colour| plain([4, 2], colour)), 2).expect("a sheet");
         assert_eq!(sheet.size_px, [8, 4]);

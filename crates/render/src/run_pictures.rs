@@ -1,4 +1,4 @@
-//! The pictures that a run leaves in its folder and on its page.
+//! Pictures of a run for its folder and its page.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -19,7 +19,7 @@ use tautline_report::run::run_while;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 
-/// Draws runs with the graphics adapter of the machine.
+/// Draws pictures of runs with a graphics adapter.
 pub struct RunPictures {
     adapter: String,
     /// Whether snapshots are taken. The scene is recorded in any case.
@@ -28,13 +28,13 @@ pub struct RunPictures {
 }
 
 impl RunPictures {
-    /// Draws with the adapter of this name: `best`, `hardware`, `software`, or a part of its own name.
+    /// Selects the adapter: `best`, `hardware`, `software`, or a part of its name.
     #[must_use]
     pub fn new(adapter: &str) -> Self {
         Self { adapter: adapter.to_owned(), takes_snapshots: true, renderer: Mutex::new(None) }
     }
 
-    /// The same, perhaps without snapshots.
+    /// Enables or disables snapshots.
     #[must_use]
     pub fn with_snapshots(self, takes_snapshots: bool) -> Self {
         Self { takes_snapshots, ..self }
@@ -53,7 +53,7 @@ impl RunPictures {
 }
 
 impl Pictures for RunPictures {
-    /// Writes `snapshots/*.png`; those of an earlier run are removed.
+    /// Writes `snapshots/*.png`; files of an earlier run are removed.
     fn draw(
         &self,
         scenario: &Scenario,
@@ -67,9 +67,9 @@ impl Pictures for RunPictures {
             Vec::new()
         });
         let file = |name: &str| format!("{name}.png");
-        let room = PICTURES_BYTES / snapshots.len().max(1);
+        let max_bytes = PICTURES_BYTES / snapshots.len().max(1);
         let encoded: Vec<_> =
-            snapshots.par_iter().map(|snapshot| encoded(&snapshot.picture, room)).collect::<Result<_, _>>()?;
+            snapshots.par_iter().map(|snapshot| encode(&snapshot.picture, max_bytes)).collect::<Result<_, _>>()?;
         let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
         let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
             .map(|(Snapshot { name, description, .. }, [png, small])| {
@@ -88,7 +88,7 @@ impl Pictures for RunPictures {
             none => none.insert(Renderer::open(&self.adapter.as_str().into())?),
         };
         let view = View { theme: Theme::Light, ..View::default() };
-        let [_, small] = encoded(&renderer.shoot(&flown_to(scenario, at_s)?, at_s, &view)?, room_bytes)?;
+        let [_, small] = encode(&renderer.shoot(&fly_until(scenario, at_s)?, at_s, &view)?, room_bytes)?;
         Ok(data_uri(&small))
     }
 
@@ -97,41 +97,41 @@ impl Pictures for RunPictures {
     }
 }
 
-/// A flight up to just after an instant, with every step of it.
-fn flown_to(scenario: &Scenario, time_s: f64) -> Result<Timeline, Failure> {
+/// Flies a scenario until just after an instant, with every step recorded.
+fn fly_until(scenario: &Scenario, time_s: f64) -> Result<Timeline, Failure> {
     let mut scenario = scenario.clone();
     scenario.time.record_hz = 1.0 / scenario.time.dt_s;
     let mut log = FlightLog::of(&scenario);
-    let mut carry_on = |step: u64| {
+    let mut continue_until = |step: u64| {
         if scenario.time.end_s(step) > time_s { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    run_while(&scenario, &Preflight::of(&scenario)?, &mut log, &mut carry_on)?;
+    run_while(&scenario, &Preflight::of(&scenario)?, &mut log, &mut continue_until)?;
     Ok(Timeline::flown(&scenario, Arc::new(log)))
 }
 
-/// A picture with its name.
+/// Picture with its name and description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Name of its file without `.png`.
+    /// File name without `.png`.
     pub name: String,
-    /// What it shows, in a sentence.
+    /// Description, one sentence.
     pub description: String,
-    /// The picture.
+    /// Picture.
     pub picture: Picture,
 }
 
-/// Names of all pictures that [`snapshots_of_run`] can take.
+/// Returns the names of all pictures that [`snapshots_of_run`] can take.
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
     let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
     ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(violations).collect()
 }
 
-/// Pictures of the start, the closest approach, the end, the first violation of an obstacle's clearance and the first ten of two vehicles of a flight; none of a flight
-/// without samples.
+/// Draws the start, the closest approach, the end, the first violation of an obstacle's clearance, and the first ten
+/// violations of two vehicles. Returns no picture for a flight without samples.
 ///
 /// # Errors
-/// [`RenderError`] when the adapter fails.
+/// [`RenderError`] if the adapter fails.
 pub fn snapshots_of_run(
     renderer: &mut Renderer,
     timeline: &Timeline,
@@ -140,7 +140,7 @@ pub fn snapshots_of_run(
     let extent = Extent::of(timeline);
     let view = View { camera: CameraSpec::Iso, ..view.clone() };
     let mut snapshots = Vec::new();
-    // The whole flight, or one pair from near.
+    // The camera frames the whole flight, or the pair if one is given.
     let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
         let camera = match pair {
@@ -161,7 +161,7 @@ pub fn snapshots_of_run(
     shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
     if let Some((near, [vehicle, obstacle])) = timeline.log.violations().of_obstacles().next() {
         let (vehicle, obstacle) = (&timeline.vehicles[vehicle], timeline.obstacle(obstacle));
-        let what = format!("Vehicle {vehicle} came too near to {obstacle} at {:.2} s.", near.from_s);
+        let what = format!("Vehicle {vehicle} came too close to {obstacle} at {:.2} s.", near.from_s);
         shoot("obstacle", what, f64::midpoint(near.from_s, near.to_s.min(end_s)), None)?;
     }
     for (k, span) in timeline.log.violations().of_vehicles().take(PICTURED).enumerate() {
@@ -172,11 +172,11 @@ pub fn snapshots_of_run(
     Ok(snapshots)
 }
 
-/// A picture as PNG, and smaller where that takes more than its room on a page \[bytes\].
-fn encoded(picture: &Picture, room: usize) -> Result<[Vec<u8>; 2], RenderError> {
+/// Encodes a picture as PNG twice: in full size, and halved until it takes at most `room` bytes.
+fn encode(picture: &Picture, max_bytes: usize) -> Result<[Vec<u8>; 2], RenderError> {
     let png = picture.to_png()?;
     let (mut small, mut smaller) = (png.clone(), picture.clone());
-    while small.len() > room {
+    while small.len() > max_bytes {
         smaller = smaller.halved();
         small = smaller.to_png()?;
     }

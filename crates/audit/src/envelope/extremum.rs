@@ -1,4 +1,5 @@
-//! Enclosure of the largest value of a quantity over a polynomial, and of mean accelerations over windows of one length.
+//! Enclosure of the largest value of a quantity over a polynomial, and of mean accelerations over windows of fixed
+//! length.
 
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, VecDeque};
@@ -9,86 +10,86 @@ use super::limit::Quantity;
 use crate::polynomial::{BernsteinBasis, rescale, value};
 use crate::sweep::Interval;
 
-/// Parts of a polynomial that are looked at.
-const MOST_PARTS: usize = 2000;
-/// Part of what counts as exceeding that both bounds are brought together to.
+/// Largest number of parts of a polynomial that are examined.
+const MAX_PARTS: usize = 2000;
+/// Distance to which both bounds are brought, as a fraction of the allowance of the limit.
 pub(super) const WIDTH: f64 = 0.25;
 
-/// The largest value over a stretch of motion.
+/// Enclosure of the largest value over an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Enclosure {
-    /// It is at least this,
+    /// Lower bound.
     pub(super) lower: f64,
-    /// and at most this.
+    /// Upper bound.
     pub(super) upper: f64,
-    /// Where the lower bound is reached, as a fraction of the stretch.
+    /// Fraction of the interval at which the lower bound is reached.
     pub(super) at: f64,
 }
 
-/// A value over an interval of which it is the extreme, turned so that it must not exceed its bound.
-pub(super) type Found = (Interval, Enclosure);
+/// Interval with the enclosure of its largest value, negated for quantities that must not fall below their limit.
+pub(super) type EnclosedValue = (Interval, Enclosure);
 
-/// What the largest value is brought to.
+/// Precision to which the largest value is enclosed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Goal {
-    /// A value that was reached before: of one that is not above it, it is only shown to be no larger.
+    /// Largest value found before. A value that is not above it is only shown to be no larger.
     pub(super) known: f64,
-    /// What must not be exceeded.
+    /// Bound that the value must not exceed.
     pub(super) bound: f64,
-    /// How near both bounds are brought to each other,
+    /// Distance to which both bounds are brought.
     pub(super) width: f64,
-    /// and how near where the value is below what must not be exceeded, as a part of how far.
+    /// Distance to which both bounds are brought if the value is below `bound`, as a fraction of its distance from it.
     pub(super) coarse: f64,
 }
 
-/// A part of a polynomial by what it is at most.
+/// Part of a polynomial with an upper bound of its value.
 struct Part {
-    most: f64,
+    upper: f64,
     start: f64,
     length: f64,
 }
 
-/// A polynomial over the fractions from 0 to 1 by what is asked of its parts: the value at their start, at their end, and
-/// what it is at most in between. The part that may be largest is halved first.
+/// Encloses the largest value over the fractions from 0 to 1. `evaluate` returns the value at the start of a part, at
+/// its end, and an upper bound in between. The part with the largest upper bound is bisected first.
 pub(super) fn largest(
     c: &[Vector3<f64>],
     goal: Goal,
-    ask: impl Fn(&[Vector3<f64>], &BernsteinBasis) -> [f64; 3],
+    evaluate: impl Fn(&[Vector3<f64>], &BernsteinBasis) -> [f64; 3],
 ) -> Enclosure {
     let Goal { known, bound, width, coarse } = goal;
     let basis = BernsteinBasis::of_degree(c.len().saturating_sub(1));
     let rounding = 4.0 * c.len() as f64 * f64::EPSILON * c.iter().map(Vector3::norm).sum::<f64>();
     let mut found = Enclosure { lower: f64::NEG_INFINITY, upper: f64::NEG_INFINITY, at: 0.0 };
-    let look = |start: f64, length: f64, found: &mut Enclosure| {
+    let examine = |start: f64, length: f64, found: &mut Enclosure| {
         let mut part = c.to_vec();
         rescale(&mut part, start, length);
-        let [at_start, at_end, most] = ask(&part, &basis);
+        let [at_start, at_end, upper] = evaluate(&part, &basis);
         for (reached, at) in [(at_start, start), (at_end, start + length)] {
             if reached > found.lower {
                 (found.lower, found.at) = (reached, at);
             }
         }
-        Part { most, start, length }
+        Part { upper, start, length }
     };
-    let (mut open, mut looked_at) = (BinaryHeap::from([look(0.0, 1.0, &mut found)]), 1);
-    while let Some(Part { most, start, length }) = open.pop() {
-        let is_near = most <= found.lower.max(known) + width;
-        let is_below = most <= bound && most - found.lower <= coarse * (bound - most);
-        if is_near || is_below || looked_at >= MOST_PARTS {
-            // No other part is larger.
-            found.upper = most;
+    let (mut open, mut examined) = (BinaryHeap::from([examine(0.0, 1.0, &mut found)]), 1);
+    while let Some(Part { upper, start, length }) = open.pop() {
+        let is_near = upper <= found.lower.max(known) + width;
+        let is_below = upper <= bound && upper - found.lower <= coarse * (bound - upper);
+        if is_near || is_below || examined >= MAX_PARTS {
+            // No other part has a larger upper bound.
+            found.upper = upper;
             break;
         }
         let half = 0.5 * length;
-        open.extend([start, start + half].map(|start| look(start, half, &mut found)));
-        looked_at += 2;
+        open.extend([start, start + half].map(|start| examine(start, half, &mut found)));
+        examined += 2;
     }
     Enclosure { lower: found.lower - rounding, upper: found.upper.max(found.lower) + rounding, ..found }
 }
 
 impl Ord for Part {
     fn cmp(&self, other: &Self) -> Ordering {
-        self.most.total_cmp(&other.most).then(other.start.total_cmp(&self.start))
+        self.upper.total_cmp(&other.upper).then(other.start.total_cmp(&self.start))
     }
 }
 
@@ -106,45 +107,46 @@ impl PartialEq for Part {
 
 impl Eq for Part {}
 
-/// The largest value of a quantity of a polynomial, which is a convex function of it.
+/// Encloses the largest value of a quantity that is a convex function of a polynomial.
 pub(super) fn largest_of(quantity: Quantity, c: &[Vector3<f64>], goal: Goal) -> Enclosure {
     largest(c, goal, |part, basis| {
-        let most = basis.points(part).map(|point| quantity.of(point)).fold(f64::NEG_INFINITY, f64::max);
-        [quantity.of(part[0]), quantity.of(value(part, 1.0)), most]
+        let upper = basis.points(part).map(|point| quantity.of(point)).fold(f64::NEG_INFINITY, f64::max);
+        [quantity.of(part[0]), quantity.of(value(part, 1.0)), upper]
     })
 }
 
-/// The derivative by time of a polynomial of the fraction of a stretch so long \[s\]; at least a constant.
+/// Returns the derivative with respect to time of a polynomial of the fraction of an interval of length `length_s`
+/// \[s\]. It has at least one coefficient.
 pub(super) fn derivative(c: &[Vector3<f64>], length_s: f64) -> Vec<Vector3<f64>> {
     let rates: Vec<_> = c.iter().enumerate().skip(1).map(|(k, c)| c * (k as f64 / length_s)).collect();
     if rates.is_empty() { vec![Vector3::zeros()] } else { rates }
 }
 
-/// A velocity over a time.
+/// Velocity over an interval of time.
 #[derive(Clone, Debug)]
 pub(super) struct Velocity {
     pub(super) over: Interval,
-    /// Coefficients in powers of the fraction of that time \[m/s\], at least one.
+    /// Coefficients in powers of the fraction of the interval \[m/s\], at least one.
     pub(super) coefficients: Vec<Vector3<f64>>,
-    /// How much of it the last digits of places explain \[m/s\].
+    /// Error of the velocity due to the rounding of positions \[m/s\].
     pub(super) rounding_m_s: f64,
 }
 
-/// The velocity of a vehicle over the last window.
+/// Velocities of a vehicle over the last averaging window.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeanAcceleration {
     recent: VecDeque<Velocity>,
 }
 
 impl MeanAcceleration {
-    /// Forgets everything: nothing is known of the time before what comes next.
+    /// Discards all velocities, since the motion before the next one is unknown.
     pub(super) fn restart(&mut self) {
         self.recent.clear();
     }
 
-    /// Takes the velocity that follows, and tells the largest mean accelerations over windows of length `length_s` that end in its
-    /// time and lie in `within`.
-    pub(super) fn take(&mut self, next: Velocity, length_s: f64, within: Interval, goal: Goal) -> Vec<Found> {
+    /// Adds the next velocity. Returns the largest mean accelerations over windows of length `length_s` that end in its
+    /// interval and lie in `within`.
+    pub(super) fn take(&mut self, next: Velocity, length_s: f64, within: Interval, goal: Goal) -> Vec<EnclosedValue> {
         let needed_from_s = next.over.from_s - length_s;
         while self.recent.front().is_some_and(|first| first.over.to_s <= needed_from_s) {
             self.recent.pop_front();
@@ -157,8 +159,8 @@ impl MeanAcceleration {
     }
 }
 
-/// Over windows that begin in the time of one velocity and end in that of another.
-fn between(first: &Velocity, last: &Velocity, length_s: f64, within: Interval, goal: Goal) -> Option<Found> {
+/// Encloses the mean acceleration over windows that begin in the interval of one velocity and end in that of another.
+fn between(first: &Velocity, last: &Velocity, length_s: f64, within: Interval, goal: Goal) -> Option<EnclosedValue> {
     let from_s = first.over.from_s.max(last.over.from_s - length_s).max(within.from_s);
     let to_s = first.over.to_s.min(last.over.to_s - length_s).min(within.to_s - length_s);
     if from_s >= to_s {
@@ -177,7 +179,7 @@ fn between(first: &Velocity, last: &Velocity, length_s: f64, within: Interval, g
 }
 
 impl Velocity {
-    /// Its coefficients over a part of its time.
+    /// Returns the coefficients over a part of the interval.
     fn part(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
         let length_s = self.over.to_s - self.over.from_s;
         let mut part = self.coefficients.clone();
@@ -195,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_of_a_polynomial_is_enclosed_where_it_is_reached() {
+    fn the_largest_value_and_its_position_are_enclosed() {
         // z = 4 u (1 - u): 1 at the middle, 0 at both ends.
         let c = [0.0, 4.0, -4.0].map(|z| Vector3::new(0.0, 0.0, z));
         let found = largest_of(Quantity::Height, &c, to(1e-12));
@@ -207,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_never_below_what_fine_samples_show_nor_far_above() {
+    fn the_enclosure_matches_fine_sampling() {
         for degree in 1..9_u32 {
             let c: Vec<_> = (0..=degree)
                 .map(|k| {
@@ -215,10 +217,11 @@ mod tests {
                     Vector3::new(of(1), of(2), of(3))
                 })
                 .collect();
-            let seen = (0..=20_000).map(|k| Quantity::Speed.of(value(&c, f64::from(k) / 20_000.0))).fold(0.0, f64::max);
+            let sampled =
+                (0..=20_000).map(|k| Quantity::Speed.of(value(&c, f64::from(k) / 20_000.0))).fold(0.0, f64::max);
             let found = largest_of(Quantity::Speed, &c, to(1e-9));
-            assert!(seen <= found.upper && found.upper - found.lower < 2e-9, "{seen} {found:?}");
-            assert!(found.lower - seen < 1e-3, "{seen} {found:?}");
+            assert!(sampled <= found.upper && found.upper - found.lower < 2e-9, "{sampled} {found:?}");
+            assert!(found.lower - sampled < 1e-3, "{sampled} {found:?}");
         }
     }
 
@@ -239,21 +242,21 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_velocity_is_spread_over_the_window() {
+    fn a_velocity_jump_is_averaged_over_the_window() {
         let corner = [along_x(0.0, 1.0, &[1.0]), along_x(1.0, 2.0, &[-1.0])];
         for length_s in [0.1, 0.2, 1.0] {
-            let found = largest(&corner, length_s).expect("windows fit");
+            let found = largest(&corner, length_s).expect("a window fits");
             assert!((found - 2.0 / length_s).abs() < 1e-9, "{length_s}: {found}");
         }
         assert_eq!(largest(&corner, 2.5), None, "no window fits");
     }
 
     #[test]
-    fn a_steady_acceleration_is_its_own_mean_and_two_jumps_within_a_window_add_up() {
+    fn a_constant_acceleration_is_its_own_mean_and_jumps_within_a_window_add_up() {
         let steady = [along_x(0.0, 1.0, &[0.0, 3.0]), along_x(1.0, 3.0, &[3.0, 6.0])];
-        assert!((largest(&steady, 0.5).expect("windows fit") - 3.0).abs() < 1e-9);
+        assert!((largest(&steady, 0.5).expect("a window fits") - 3.0).abs() < 1e-9);
         let two = [along_x(0.0, 1.0, &[0.0]), along_x(1.0, 1.05, &[1.0]), along_x(1.05, 2.0, &[2.0])];
-        assert!((largest(&two, 0.1).expect("windows fit") - 20.0).abs() < 1e-9);
-        assert!((largest(&two, 0.04).expect("windows fit") - 25.0).abs() < 1e-9);
+        assert!((largest(&two, 0.1).expect("a window fits") - 20.0).abs() < 1e-9);
+        assert!((largest(&two, 0.04).expect("a window fits") - 25.0).abs() < 1e-9);
     }
 }

@@ -1,18 +1,18 @@
-//! Where vehicles must stay: within a polygon from above, between two heights.
+//! Fence: a polygon seen from above with optional heights, in which vehicles must stay.
 
 use nalgebra::{Vector2, Vector3};
 
 use crate::ledger::Interruption;
 use crate::sweep::MAX_LENGTH_M;
 
-/// Corners of a fence: every edge is compared with every other.
-const MOST_CORNERS: usize = 4096;
-/// Part of a distance outside that it is told to.
+/// Largest number of corners: every edge is compared with every other.
+const MAX_CORNERS: usize = 4096;
+/// Relative precision of a distance outside the fence.
 const RESOLUTION: f64 = 1e-9;
-/// Parts of a line outside that are looked at.
-const MOST_PARTS: usize = 100;
+/// Largest number of parts of a line outside that are examined.
+const MAX_PARTS: usize = 100;
 
-/// A polygon in the plane of x and y, convex or not, and perhaps a range of heights, that every vehicle must stay within.
+/// Polygon in the plane of x and y, convex or not, with an optional range of heights, in which every vehicle must stay.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::struct_field_names, reason = "each is in metres")]
 pub struct Fence {
@@ -21,53 +21,53 @@ pub struct Fence {
     margin_m: f64,
 }
 
-/// Why something is no fence.
+/// Error in the definition of a fence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FenceError {
-    /// Too few corners, or too many.
-    #[error("a fence has 3 to {MOST_CORNERS} corners, not {0}")]
+    /// The number of corners is out of range.
+    #[error("a fence has 3 to {MAX_CORNERS} corners, not {0}")]
     Corners(usize),
-    /// A number that is not finite or too large.
-    #[error("{what} of the fence must be a finite number below 1e70, not {value:?}")]
+    /// A number is not finite or too large.
+    #[error("{what} of the fence must be a finite number below 1e70, got {value:?}")]
     Number {
-        /// What it is.
+        /// Name of the number.
         what: String,
-        /// What was given.
+        /// Value.
         value: f64,
     },
-    /// Two corners that follow each other and are one place.
-    #[error("corners {0} and {1} of the fence are one place")]
-    OnePlace(usize, usize),
-    /// Two edges that cross or touch, by their first corners.
-    #[error("the edges of the fence from corner {0} and from corner {1} meet: a fence does not cross itself")]
+    /// Two consecutive corners have the same position.
+    #[error("corners {0} and {1} of the fence have the same position")]
+    SamePosition(usize, usize),
+    /// Two edges cross or touch, identified by their first corners.
+    #[error("the edges of the fence from corner {0} and from corner {1} cross or touch; list the corners in order")]
     Crosses(usize, usize),
-    /// Heights that hold nothing.
-    #[error("the heights of the fence go from {from_m:?} m to {to_m:?} m, which holds nothing")]
+    /// The range of heights is empty.
+    #[error("the heights of the fence must increase, got {from_m:?} m and {to_m:?} m")]
     Heights {
-        /// The lower \[m\].
+        /// Lower height \[m\].
         from_m: f64,
-        /// The upper \[m\].
+        /// Upper height \[m\].
         to_m: f64,
     },
-    /// A margin below 0.
-    #[error("the margin of the fence must be 0 m or more, not {0:?}")]
+    /// The margin is negative.
+    #[error("the margin of the fence must be at least 0 m, got {0:?} m")]
     Margin(f64),
 }
 
 impl Fence {
-    /// A fence through these corners \[m\], in either direction of turn; from one height to another \[m\], where heights are
-    /// given. Vehicles stay at least `margin_m` within.
+    /// Creates a fence through these corners \[m\], clockwise or counter-clockwise, with an optional range of heights
+    /// \[m\]. Vehicles must stay at least `margin_m` inside.
     ///
     /// # Errors
-    /// [`FenceError`] where that is no simple polygon, or a number is out of range.
+    /// [`FenceError`] if the polygon is not simple, or a number is out of range.
     pub fn new(corners_m: &[[f64; 2]], height_m: Option<[f64; 2]>, margin_m: f64) -> Result<Self, FenceError> {
         let mut corners_m: Vec<_> = corners_m.iter().map(|&[x, y]| Vector2::new(x, y)).collect();
-        // The first corner once more closes it.
+        // A first corner repeated at the end closes the polygon.
         if corners_m.len() > 3 && corners_m.first() == corners_m.last() {
             corners_m.pop();
         }
         let count = corners_m.len();
-        if !(3..=MOST_CORNERS).contains(&count) {
+        if !(3..=MAX_CORNERS).contains(&count) {
             return Err(FenceError::Corners(count));
         }
         let number = |what: String, value: f64| {
@@ -95,12 +95,12 @@ impl Fence {
         let edges: Vec<_> = self.edges().collect();
         for (first, one) in edges.iter().enumerate() {
             if one[0] == one[1] {
-                return Err(FenceError::OnePlace(first + 1, (first + 1) % count + 1));
+                return Err(FenceError::SamePosition(first + 1, (first + 1) % count + 1));
             }
             for (second, other) in edges.iter().enumerate().skip(first + 1) {
                 let are_neighbours = second == first + 1 || (first == 0 && second == count - 1);
                 let meet = if are_neighbours {
-                    // Neighbours share a corner; more of them only where one goes back over the other.
+                    // Neighbours share a corner. They overlap further only if one runs back along the other.
                     let (shared, [a, b]) =
                         if second == first + 1 { (one[1], [one[0], other[1]]) } else { (one[0], [one[1], other[0]]) };
                     let (a, b) = (a - shared, b - shared);
@@ -116,32 +116,32 @@ impl Fence {
         Ok(())
     }
 
-    /// How far within it vehicles must stay \[m\].
+    /// Distance that vehicles must keep from the fence \[m\].
     #[must_use]
     pub fn margin_m(&self) -> f64 {
         self.margin_m
     }
 
-    /// Its lowest and highest height \[m\], where it has a floor and a ceiling.
+    /// Lowest and highest allowed height \[m\], if given.
     #[must_use]
     pub fn height_m(&self) -> Option<[f64; 2]> {
         self.height_m
     }
 
-    /// Its corners from above \[m\].
+    /// Corners seen from above \[m\].
     #[must_use]
     pub fn corners_m(&self) -> &[Vector2<f64>] {
         &self.corners_m
     }
 
-    /// The least room \[m\] of a vehicle that flies straight from one place to another: its distance from the nearest wall, floor
-    /// or ceiling, below 0 by how far it gets outside.
+    /// Returns the smallest clearance margin \[m\] of a vehicle on a straight line between two positions: its distance
+    /// from the nearest wall, floor or ceiling, negative outside.
     #[must_use]
     pub fn clearance_margin_m(&self, from: Vector3<f64>, to: Vector3<f64>) -> f64 {
         self.margin_until(from, to, &Interruption::default())
     }
 
-    /// The same, or some number once the work is interrupted.
+    /// As [`clearance_margin_m`](Self::clearance_margin_m); returns an arbitrary number after an interruption.
     pub(super) fn margin_until(&self, from: Vector3<f64>, to: Vector3<f64>, interruption: &Interruption) -> f64 {
         if interruption.is_set() {
             return f64::INFINITY;
@@ -160,31 +160,32 @@ impl Fence {
 
     fn margin_across(&self, from: Vector2<f64>, to: Vector2<f64>, interruption: &Interruption) -> f64 {
         let wall_m = self.edges().map(|edge| distance(edge, [from, to])).fold(f64::INFINITY, f64::min);
-        if wall_m > 0.0 && self.holds(from) {
+        if wall_m > 0.0 && self.contains(from) {
             return wall_m;
         }
-        // It is outside, at least for a part.
+        // At least a part of the line is outside.
         let mut crossings: Vec<f64> = self.edges().filter_map(|edge| crossing([from, to], edge)).collect();
         crossings.extend([0.0, 1.0]);
         crossings.sort_unstable_by(f64::total_cmp);
         let parts = crossings.windows(2).map(|pair| [pair[0], pair[1]]);
         let parts = parts.take_while(|_| !interruption.is_set());
-        let is_outside = |&[start, end]: &[f64; 2]| !self.holds(from.lerp(&to, 0.5 * (start + end)));
+        let is_outside = |&[start, end]: &[f64; 2]| !self.contains(from.lerp(&to, 0.5 * (start + end)));
         let farthest =
             parts.filter(is_outside).map(|[start, end]| self.farthest_m(from.lerp(&to, start), from.lerp(&to, end)));
         0.0 - farthest.fold(0.0, f64::max)
     }
 
-    /// How far a line that is outside gets from the fence \[m\]. The distance from one edge is a convex function of the place, so
-    /// that over a part of the line it is largest at an end: parts are halved until the least of these is reached.
+    /// Returns the largest distance from the fence of a line that is outside \[m\]. The distance from one edge is a
+    /// convex function of the position, so over a part of the line it is largest at an end. Parts are bisected until
+    /// the least of these distances is reached.
     fn farthest_m(&self, from: Vector2<f64>, to: Vector2<f64>) -> f64 {
         let mut farthest_m = self.wall_m(from).max(self.wall_m(to));
-        let (mut open, mut looked_at) = (vec![[from, to]], 0);
+        let (mut open, mut examined) = (vec![[from, to]], 0);
         while let Some([from, to]) = open.pop() {
-            let most_m =
+            let upper_m =
                 self.edges().map(|edge| from_edge(from, edge).max(from_edge(to, edge))).fold(f64::INFINITY, f64::min);
-            looked_at += 1;
-            if most_m > farthest_m * (1.0 + RESOLUTION) && looked_at < MOST_PARTS {
+            examined += 1;
+            if upper_m > farthest_m * (1.0 + RESOLUTION) && examined < MAX_PARTS {
                 let middle = from.lerp(&to, 0.5);
                 farthest_m = farthest_m.max(self.wall_m(middle));
                 open.extend([[from, middle], [middle, to]]);
@@ -197,11 +198,11 @@ impl Fence {
         self.edges().map(|edge| from_edge(place, edge)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a place is within: a ray along x crosses an odd number of edges.
-    fn holds(&self, place: Vector2<f64>) -> bool {
+    /// Returns whether a position is inside: a ray along x crosses an odd number of edges.
+    fn contains(&self, place: Vector2<f64>) -> bool {
         let crosses = |[a, b]: [Vector2<f64>; 2]| {
             (a.y > place.y) != (b.y > place.y) && {
-                // To the left of the edge where it goes up, to the right where it goes down.
+                // The position is left of an edge that goes up, or right of one that goes down.
                 let side = (b - a).perp(&(place - a));
                 if b.y > a.y { side > 0.0 } else { side < 0.0 }
             }
@@ -210,7 +211,7 @@ impl Fence {
     }
 }
 
-/// The fraction of a line at which it crosses an edge.
+/// Returns the fraction of a line at which it crosses an edge.
 fn crossing([from, to]: [Vector2<f64>; 2], [a, b]: [Vector2<f64>; 2]) -> Option<f64> {
     let (line, edge) = (to - from, b - a);
     let turn = line.perp(&edge);
@@ -219,7 +220,7 @@ fn crossing([from, to]: [Vector2<f64>; 2], [a, b]: [Vector2<f64>; 2]) -> Option<
     ((0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&along)).then_some(u)
 }
 
-/// How far a place is from an edge.
+/// Returns the distance of a position from an edge.
 fn from_edge(place: Vector2<f64>, [a, b]: [Vector2<f64>; 2]) -> f64 {
     let edge = b - a;
     let squared = edge.norm_squared();
@@ -227,7 +228,7 @@ fn from_edge(place: Vector2<f64>, [a, b]: [Vector2<f64>; 2]) -> f64 {
     (place - (a + edge * along)).norm()
 }
 
-/// How far two straight lines are from each other.
+/// Returns the distance of two line segments.
 fn distance(one: [Vector2<f64>; 2], other: [Vector2<f64>; 2]) -> f64 {
     if crossing(one, other).is_some() {
         return 0.0;
@@ -240,72 +241,72 @@ fn distance(one: [Vector2<f64>; 2], other: [Vector2<f64>; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// An L: the square from 0 to 10 without its upper right quarter.
+    /// Returns an L-shaped fence: the square from 0 to 10 without its upper right quarter.
     fn l_shape() -> Fence {
         let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [5.0, 5.0], [5.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
         Fence::new(&corners, Some([0.0, 20.0]), 0.0).expect("a fence")
     }
 
-    fn room(from: [f64; 3], to: [f64; 3]) -> f64 {
+    fn margin(from: [f64; 3], to: [f64; 3]) -> f64 {
         l_shape().clearance_margin_m(Vector3::from(from), Vector3::from(to))
     }
 
     #[test]
-    fn the_room_is_that_of_the_nearest_wall_floor_or_ceiling() {
-        assert_eq!(room([2.0, 2.5, 10.0], [8.0, 2.5, 10.0]), 2.0);
-        assert_eq!(room([2.0, 2.5, 1.0], [8.0, 2.5, 10.0]), 1.0);
-        assert_eq!(room([2.0, 2.5, 3.0], [8.0, 2.5, 19.5]), 0.5);
-        assert_eq!(room([2.0, 2.0, 10.0], [2.0, 2.0, 10.0]), 2.0);
+    fn the_margin_is_that_of_the_nearest_wall_floor_or_ceiling() {
+        assert_eq!(margin([2.0, 2.5, 10.0], [8.0, 2.5, 10.0]), 2.0);
+        assert_eq!(margin([2.0, 2.5, 1.0], [8.0, 2.5, 10.0]), 1.0);
+        assert_eq!(margin([2.0, 2.5, 3.0], [8.0, 2.5, 19.5]), 0.5);
+        assert_eq!(margin([2.0, 2.0, 10.0], [2.0, 2.0, 10.0]), 2.0);
     }
 
     #[test]
-    fn a_line_from_inside_to_inside_that_cuts_a_corner_is_outside_in_between() {
-        let cut = room([9.0, 4.0, 10.0], [4.0, 9.0, 10.0]);
-        // Its middle is (6.5, 6.5), 1.5 m from either wall.
+    fn a_line_that_cuts_a_corner_is_outside_in_between() {
+        let cut = margin([9.0, 4.0, 10.0], [4.0, 9.0, 10.0]);
+        // The middle of the line is (6.5, 6.5), 1.5 m from either wall.
         assert!((cut + 1.5).abs() < 1e-12, "{cut}");
-        assert!(room([4.0, 4.0, 10.0], [4.5, 4.5, 10.0]) > 0.0);
+        assert!(margin([4.0, 4.0, 10.0], [4.5, 4.5, 10.0]) > 0.0);
     }
 
     #[test]
-    fn outside_is_below_zero_by_how_far_and_the_wall_itself_is_zero() {
-        assert_eq!(room([12.0, 2.0, 10.0], [12.0, 2.0, 10.0]), -2.0);
-        assert_eq!(room([2.0, 2.0, 10.0], [2.0, 2.0, 21.0]), -1.0);
-        assert_eq!(room([0.0, 1.0, 10.0], [0.0, 9.0, 10.0]), 0.0);
-        assert_eq!(room([-3.0, 2.0, 10.0], [13.0, 2.0, 10.0]), -3.0);
-        // Along a wall, and past it: farthest where neither end nor middle is.
-        assert_eq!(room([12.0, 1.0, 10.0], [12.0, 4.0, 10.0]), -2.0);
-        let past = room([10.0, 5.5, 10.0], [5.5, 10.0, 10.0]);
+    fn the_margin_is_negative_outside_and_zero_on_the_wall() {
+        assert_eq!(margin([12.0, 2.0, 10.0], [12.0, 2.0, 10.0]), -2.0);
+        assert_eq!(margin([2.0, 2.0, 10.0], [2.0, 2.0, 21.0]), -1.0);
+        assert_eq!(margin([0.0, 1.0, 10.0], [0.0, 9.0, 10.0]), 0.0);
+        assert_eq!(margin([-3.0, 2.0, 10.0], [13.0, 2.0, 10.0]), -3.0);
+        // Along a wall, and past it: the farthest point is neither an end nor the middle.
+        assert_eq!(margin([12.0, 1.0, 10.0], [12.0, 4.0, 10.0]), -2.0);
+        let past = margin([10.0, 5.5, 10.0], [5.5, 10.0, 10.0]);
         assert!((past + 2.75).abs() < 1e-8, "{past}");
         let (low, high) = (Vector3::new(9.0, 5.5, 10.0), Vector3::new(6.0, 9.5, 10.0));
-        let seen = (0..=3000)
+        let sampled = (0..=3000)
             .map(|k| low.lerp(&high, f64::from(k) / 3000.0))
             .map(|place| l_shape().clearance_margin_m(place, place));
-        let seen = seen.fold(0.0, f64::min);
-        let told = l_shape().clearance_margin_m(low, high);
-        assert!(told <= seen + 1e-12 && seen - told < 1e-3, "{told} {seen}");
+        let sampled = sampled.fold(0.0, f64::min);
+        let computed = l_shape().clearance_margin_m(low, high);
+        assert!(computed <= sampled + 1e-12 && sampled - computed < 1e-3, "{computed} {sampled}");
     }
 
     #[test]
-    fn the_same_polygon_the_other_way_round_is_the_same_fence() {
-        let turned: Vec<_> = l_shape().corners_m.iter().rev().map(|corner| [corner.x, corner.y]).collect();
-        let turned = Fence::new(&turned, None, 0.0).expect("a fence");
+    fn the_order_of_the_corners_may_be_reversed() {
+        let reversed: Vec<_> = l_shape().corners_m.iter().rev().map(|corner| [corner.x, corner.y]).collect();
+        let reversed = Fence::new(&reversed, None, 0.0).expect("a fence");
         for (x, y) in [(1.0, 1.0), (7.0, 7.0), (-1.0, 2.0), (4.999, 9.0), (9.9, 4.9)] {
             let place = Vector3::new(x, y, 5.0);
             assert_eq!(
-                turned.clearance_margin_m(place, place).signum(),
+                reversed.clearance_margin_m(place, place).signum(),
                 l_shape().clearance_margin_m(place, place).signum()
             );
         }
     }
 
     #[test]
-    fn what_is_no_fence_is_refused_by_its_corner() {
+    fn an_invalid_fence_is_refused_with_its_corner() {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
         let bow_tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         let refused = |corners: &[[f64; 2]]| Fence::new(corners, None, 0.0).expect_err("no fence");
         assert_eq!(refused(&bow_tie), FenceError::Crosses(1, 3));
         assert_eq!(refused(&square[..2]), FenceError::Corners(2));
-        assert_eq!(refused(&[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), FenceError::OnePlace(1, 2));
+        assert_eq!(refused(&[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]), FenceError::SamePosition(1, 2));
         assert_eq!(refused(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]]), FenceError::Crosses(1, 2));
         assert!(matches!(refused(&[[f64::NAN, 0.0], [2.0, 0.0], [1.0, 1.0]]), FenceError::Number { .. }));
         assert!(matches!(Fence::new(&square, Some([2.0, 2.0]), 0.0), Err(FenceError::Heights { .. })));

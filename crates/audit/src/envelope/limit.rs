@@ -1,4 +1,4 @@
-//! Limits on single vehicles, and what was found of each limit.
+//! Limits on single vehicles, and the findings for each limit.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -7,36 +7,36 @@ use super::fence::Fence;
 use crate::findings::Tally;
 use crate::outcome::Status;
 
-/// Part of a limit, or of 1 where it is less, by which it counts as exceeded.
+/// Excess that counts as rounding, as a fraction of the limit or of 1, whichever is larger.
 const ALLOWANCE: f64 = 1e-9;
 
-/// What of a vehicle's motion is limited.
+/// Limited quantity of a vehicle's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Quantity {
-    /// Its speed \[m/s\].
+    /// Speed \[m/s\].
     Speed,
-    /// Its speed over ground, along x and y \[m/s\].
+    /// Horizontal speed, along x and y \[m/s\].
     HorizontalSpeed,
-    /// How fast it rises along z \[m/s\].
+    /// Climb rate along z \[m/s\].
     Climb,
-    /// How fast it sinks along z \[m/s\].
+    /// Sink rate along z \[m/s\].
     Descent,
-    /// Its acceleration \[m/s^2\].
+    /// Acceleration \[m/s^2\].
     Acceleration,
-    /// Its height z, from above \[m\].
+    /// Height z, with an upper limit \[m\].
     Height,
-    /// Its height z, from below \[m\].
+    /// Height z, with a lower limit \[m\].
     Floor,
-    /// Its room to the fence, from below \[m\].
+    /// Clearance margin inside the fence, with a lower limit \[m\].
     Fence,
 }
 
 impl Quantity {
-    /// Those that are limited by a number alone.
+    /// Quantities that are limited by a number alone.
     pub const NUMBERS: [Self; 7] =
         [Self::Speed, Self::HorizontalSpeed, Self::Climb, Self::Descent, Self::Acceleration, Self::Height, Self::Floor];
 
-    /// Name on the command line, key in files, and unit.
+    /// Returns the name on the command line, the key in files, and the unit.
     fn names(self) -> [&'static str; 3] {
         match self {
             Self::Speed => ["speed", "speed_m_s", "m/s"],
@@ -50,43 +50,43 @@ impl Quantity {
         }
     }
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.names()[0]
     }
 
-    /// Key in files, with the unit.
+    /// Returns the key in files, with the unit.
     #[must_use]
     pub fn key(self) -> &'static str {
         self.names()[1]
     }
 
-    /// Unit.
+    /// Returns the unit.
     #[must_use]
     pub fn unit(self) -> &'static str {
         self.names()[2]
     }
 
-    /// Whether it depends on heights, and has no value in the plane of x and y.
+    /// Returns whether the quantity depends on heights, and so is unknown in the plane of x and y.
     #[must_use]
     pub fn needs_height(self) -> bool {
         matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
     }
 
-    /// Whether it depends on what positions are measured from.
+    /// Returns whether the quantity depends on the origin of the positions.
     #[must_use]
     pub fn needs_origin(self) -> bool {
         matches!(self, Self::Height | Self::Floor | Self::Fence)
     }
 
-    /// Whether it must not fall below its limit, where the others must not exceed theirs.
+    /// Returns whether the quantity must not fall below its limit; the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {
         matches!(self, Self::Floor | Self::Fence)
     }
 
-    /// Which derivative of the position it is a function of.
+    /// Returns the order of the derivative of the position that the quantity is a function of.
     pub(crate) fn derivative(self) -> usize {
         match self {
             Self::Height | Self::Floor | Self::Fence => 0,
@@ -95,7 +95,8 @@ impl Quantity {
         }
     }
 
-    /// What must not exceed its bound, of that derivative: convex, and no steeper than 1.
+    /// Returns the value for this derivative, negated if it must not fall below its limit. It is convex, and no steeper
+    /// than 1.
     pub(super) fn of(self, derivative: Vector3<f64>) -> f64 {
         match self {
             Self::Speed | Self::Acceleration => derivative.norm(),
@@ -107,138 +108,139 @@ impl Quantity {
     }
 }
 
-/// A quantity and what it may be.
+/// Limit of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// What is limited.
+    /// Limited quantity.
     pub quantity: Quantity,
-    /// What it must not exceed, or fall below ([`Quantity::is_least`]), in its unit.
+    /// Largest allowed value, or the least if [`Quantity::is_least`], in the unit of the quantity.
     pub allowed: f64,
 }
 
 impl Limit {
-    /// What must not be exceeded, with what rounding may cost: least quantities are turned around.
+    /// Returns the upper bound of the normalized value, with an allowance for rounding.
     pub(super) fn bound(self) -> f64 {
-        self.turned(self.allowed) + self.allowance()
+        self.normalized(self.allowed) + self.allowance()
     }
 
     pub(super) fn allowance(self) -> f64 {
         ALLOWANCE * self.allowed.abs().max(1.0)
     }
 
-    /// Between what must not be exceeded and what is said of it.
-    pub(super) fn turned(self, value: f64) -> f64 {
+    /// Returns the value, negated if the quantity must not fall below its limit.
+    pub(super) fn normalized(self, value: f64) -> f64 {
         if self.quantity.is_least() { -value } else { value }
     }
 }
 
-/// Everything that is asked of each vehicle by itself.
+/// All limits on single vehicles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Envelope {
     /// Limits by a number alone.
     pub limits: Vec<Limit>,
-    /// Where each must stay.
+    /// Fence in which each vehicle must stay.
     pub fence: Option<Fence>,
 }
 
 impl Envelope {
-    /// Whether nothing is asked.
+    /// Returns whether no limit is given.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.limits.is_empty() && self.fence.is_none()
     }
 
-    /// All limits, that of the fence last.
+    /// Returns all limits, that of the fence last.
     pub(super) fn all(&self) -> Vec<Limit> {
         let fence = self.fence.as_ref().map(|fence| Limit { quantity: Quantity::Fence, allowed: fence.margin_m() });
         self.limits.iter().copied().chain(fence).collect()
     }
 
-    /// Some quantity of a derivative of the position, which vehicles that jump do not have.
-    pub(crate) fn of_motion(&self) -> Option<Quantity> {
+    /// Returns a limited speed or acceleration, if any; these are undefined for vehicles that jump.
+    pub(crate) fn limited_motion(&self) -> Option<Quantity> {
         self.limits.iter().map(|limit| limit.quantity).find(|quantity| quantity.derivative() > 0)
     }
 }
 
-/// What was found of all that is asked of each vehicle by itself.
+/// Findings for all limits on single vehicles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EnvelopeOutcome {
-    /// Limit by limit, in the order in which they were given; that of the fence last.
+    /// Findings for each limit, in the given order; that of the fence last.
     pub limits: Vec<LimitOutcome>,
 }
 
-/// What was found of one limit.
+/// Findings for one limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitOutcome {
-    /// What was asked.
+    /// Limit.
     pub limit: Limit,
-    /// The verdict.
+    /// Verdict.
     pub status: Status,
-    /// The value that came nearest to the limit, or went farthest beyond it; none where nothing tells any.
+    /// Value that came nearest to the limit, or went farthest beyond it; `None` if no value is known.
     pub extreme: Option<Exceeding>,
-    /// Times that a vehicle was beyond it, in order of time; of many the worst, and the first of each vehicle.
+    /// Times at which a vehicle was beyond the limit, in order of time. A long list is shortened to the worst and the
+    /// first of each vehicle.
     pub violations: Vec<Exceeding>,
-    /// Times of which it cannot be told, likewise.
+    /// Undecided times, shortened likewise.
     pub undecided: Vec<Exceeding>,
-    /// How many times a vehicle was beyond it.
+    /// Number of times at which a vehicle was beyond the limit.
     pub violations_tally: Tally,
-    /// How many times it cannot be told.
+    /// Number of undecided times.
     pub undecided_tally: Tally,
-    /// Vehicles of which nothing tells it at all.
+    /// Vehicles for which no value is known.
     pub unknown: Vec<usize>,
-    /// What was taken for granted to tell it, beyond what happens between samples.
+    /// Assumption about the quantity, in addition to the motion between samples.
     pub assumes: Option<String>,
-    /// Corners of curves, which are not held against it; none where there are none.
+    /// Corners of curves, which are not compared with the limit; `None` without corners.
     pub corners: Option<Corners>,
 }
 
-/// Instants at which the velocity of a recorded curve jumps: no vehicle flies them as they are drawn.
+/// Instants at which the velocity of a recorded curve jumps. No vehicle can fly them exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corners {
-    /// How many there are, of all vehicles.
+    /// Number of corners of all vehicles.
     pub count: u64,
-    /// The one at which the velocity jumps most.
+    /// Corner with the largest velocity jump.
     pub largest: Corner,
 }
 
-/// An instant at which a velocity jumps.
+/// Instant at which a velocity jumps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Corner {
-    /// The vehicle.
+    /// Index of the vehicle.
     #[serde(skip)]
     pub vehicle: usize,
-    /// When \[s\].
+    /// Time \[s\].
     pub at_s: f64,
-    /// By how much \[m/s\].
+    /// Size of the velocity jump \[m/s\].
     pub by_m_s: f64,
 }
 
-/// A vehicle over a time. The time is that of the samples or pieces around.
+/// Value of a vehicle over an interval of time, which is that of the surrounding samples or pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Exceeding {
-    /// The vehicle.
+    /// Index of the vehicle.
     #[serde(skip)]
     pub vehicle: usize,
-    /// From \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// To \[s\].
+    /// End \[s\].
     pub to_s: f64,
-    /// The worst value within is at least this, in the unit of its limit.
+    /// Lower bound of the worst value in the interval, in the unit of the limit.
     pub lower: f64,
-    /// And at most this.
+    /// Upper bound of the worst value.
     pub upper: f64,
-    /// When the worst that is certain is reached \[s\].
+    /// Time at which the certain value is reached \[s\].
     pub at_s: f64,
 }
 
 impl EnvelopeOutcome {
-    /// Whether some limit is exceeded.
+    /// Returns whether some limit is exceeded.
     #[must_use]
     pub fn is_exceeded(&self) -> bool {
         self.limits.iter().any(|limit| limit.status == Status::Violation)
     }
 
-    /// Whether everything is known of every limit but for what it lists as undecided.
+    /// Returns whether everything except the listed undecided times is known for every limit.
     #[must_use]
     pub fn is_else_known(&self) -> bool {
         let is_listed = |limit: &LimitOutcome| {
@@ -248,7 +250,7 @@ impl EnvelopeOutcome {
         self.limits.iter().all(|limit| limit.unknown.is_empty() && is_listed(limit))
     }
 
-    /// Whether every limit is known to be kept, or nothing is asked.
+    /// Returns whether every limit is known to be kept, or no limit is given.
     #[must_use]
     pub fn is_kept(&self) -> bool {
         self.limits.iter().all(|limit| limit.status == Status::Clear)

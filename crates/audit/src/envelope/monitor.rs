@@ -1,8 +1,10 @@
-//! Limits on single vehicles, followed through a recording.
+//! Monitor of the limits on single vehicles while a recording is read.
 
 use nalgebra::Vector3;
 
-use super::extremum::{Enclosure, Found, Goal, MeanAcceleration, Velocity, WIDTH, derivative, largest, largest_of};
+use super::extremum::{
+    EnclosedValue, Enclosure, Goal, MeanAcceleration, Velocity, WIDTH, derivative, largest, largest_of,
+};
 use super::fence::Fence;
 use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
@@ -12,45 +14,45 @@ use crate::polynomial::{rescale, stray_across, value};
 use crate::sweep::Interval;
 use tautline_core::track::{Item, Piece, Sample};
 
-/// Pieces of a curve that meet within this \[m\], and whose velocities do within this \[m/s\], are one smooth curve: files
+/// Largest jump at which two pieces form one smooth curve: of the position \[m\] and of the velocity \[m/s\]. Files
 /// write coefficients with about this resolution.
 const SMOOTH: f64 = 1e-3;
-/// Pieces whose times are within this \[s\] meet.
+/// Largest time between two pieces that meet \[s\].
 const SAME_INSTANT_S: f64 = 1e-6;
-/// Resolution of the smallest clearance margin of a curve, as a part of the margin that is left.
+/// Resolution of the smallest clearance margin of a curve, as a fraction of the margin.
 const COARSE: f64 = 1e-3;
-/// What is taken of accelerations between samples where nothing bounds them.
+/// Assumption about accelerations between samples without a bound.
 const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
 
-/// What is taken of accelerations that are means over windows \[s\].
+/// Returns the assumption about accelerations averaged over windows \[s\].
 fn by_windows(length_s: f64) -> String {
     format!("accelerations are means over {length_s:?} s")
 }
 
-/// Context of an item.
+/// Context in which an item is judged.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
-    /// Added to its times \[s\].
+pub(crate) struct ItemContext {
+    /// Clock offset, added to the item's times \[s\].
     pub(crate) offset_s: f64,
-    /// Whether nothing is known of the time before it.
+    /// Whether a gap precedes the item.
     pub(crate) after_gap: bool,
-    /// Largest acceleration between samples \[m/s^2\]; none where they are joined by straight lines.
+    /// Largest acceleration between samples \[m/s^2\]; `None` if samples are joined by straight lines.
     pub(crate) bounded_by_m_s2: Option<f64>,
 }
 
-/// Follows every limit, vehicle by vehicle.
+/// Monitors every limit, vehicle by vehicle.
 #[derive(Clone, Debug)]
 pub(crate) struct LimitMonitor {
     fence: Option<MonitoredFence>,
     window: Interval,
     of: Vec<LimitRecord>,
-    vehicles: Vec<Last>,
+    vehicles: Vec<LastState>,
     /// Length of the averaging window of accelerations \[s\], and the recent velocities of each vehicle.
     accel_window_s: Option<f64>,
     means: Vec<MeanAcceleration>,
 }
 
-/// A fence, and the flag that ends the search for the clearance margin.
+/// Fence with the flag that ends the search for the clearance margin.
 #[derive(Clone, Debug)]
 struct MonitoredFence {
     fence: Fence,
@@ -65,11 +67,11 @@ impl MonitoredFence {
 
 /// Last state of a vehicle.
 #[derive(Clone, Copy, Debug, Default)]
-struct Last {
+struct LastState {
     sample: Option<Sample>,
-    /// Velocity at the end of its last piece \[m/s\].
+    /// Velocity at the end of the last piece \[m/s\].
     curve_end: Option<Vector3<f64>>,
-    /// Mean velocity over its last interval \[m/s\], and how long that was \[s\].
+    /// Mean velocity over the last interval \[m/s\], and its length \[s\].
     interval: Option<(Vector3<f64>, f64)>,
 }
 
@@ -86,18 +88,18 @@ impl LimitMonitor {
         }
     }
 
-    /// Takes the next item of a vehicle.
-    pub(crate) fn take(&mut self, item: &Item, seen: Seen) {
+    /// Adds the next item of a vehicle.
+    pub(crate) fn take(&mut self, item: &Item, seen: ItemContext) {
         let vehicle = item.vehicle();
         if self.vehicles.len() <= vehicle {
-            self.vehicles.resize(vehicle + 1, Last::default());
+            self.vehicles.resize(vehicle + 1, LastState::default());
             self.means.resize(vehicle + 1, MeanAcceleration::default());
         }
         if seen.after_gap {
             self.means[vehicle].restart();
         }
         let last = std::mem::take(&mut self.vehicles[vehicle]);
-        let last = if seen.after_gap { Last::default() } else { last };
+        let last = if seen.after_gap { LastState::default() } else { last };
         self.vehicles[vehicle] = match item {
             Item::Sample(sample) => {
                 self.sample(last, Sample { time_s: sample.time_s + seen.offset_s, ..*sample }, seen)
@@ -106,31 +108,31 @@ impl LimitMonitor {
         };
     }
 
-    fn sample(&mut self, last: Last, seen: Sample, Seen { bounded_by_m_s2, .. }: Seen) -> Last {
+    fn sample(&mut self, last: LastState, seen: Sample, ItemContext { bounded_by_m_s2, .. }: ItemContext) -> LastState {
         let Some(before) = last.sample else {
-            self.instant(&seen);
-            return Last { sample: Some(seen), ..Last::default() };
+            self.judge_instant(&seen);
+            return LastState { sample: Some(seen), ..LastState::default() };
         };
         let over = Interval { from_s: before.time_s, to_s: seen.time_s };
         let h = over.to_s - over.from_s;
         let mean = (seen.position_m - before.position_m) / h;
         let bound_m_s2 = bounded_by_m_s2.unwrap_or(0.0);
         self.each(seen.vehicle, |limit, fence, window, known| match limit.quantity.derivative() {
-            0 => place_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
+            0 => position_value_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
             1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
             _ => None,
         });
         if self.accel_window_s.is_some() {
             let rounding_m_s = 2.0 * rounding_m(&before, &seen) / h;
-            self.windows(seen.vehicle, &Velocity { over, coefficients: vec![mean], rounding_m_s });
+            self.judge_mean_accelerations(seen.vehicle, &Velocity { over, coefficients: vec![mean], rounding_m_s });
         } else {
-            self.corner(&before, &seen, (last.interval, mean), bounded_by_m_s2);
+            self.judge_acceleration(&before, &seen, (last.interval, mean), bounded_by_m_s2);
         }
-        Last { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
+        LastState { sample: Some(seen), interval: Some((mean, h)), curve_end: None }
     }
 
-    /// Mean accelerations over windows that end in the time of a velocity.
-    fn windows(&mut self, vehicle: usize, velocity: &Velocity) {
+    /// Judges mean accelerations over windows that end in the interval of a velocity.
+    fn judge_mean_accelerations(&mut self, vehicle: usize, velocity: &Velocity) {
         let Some(length_s) = self.accel_window_s else { return };
         let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
         for of in accelerations {
@@ -143,8 +145,8 @@ impl LimitMonitor {
         }
     }
 
-    /// Accelerations around a sample, from the mean velocities on both sides and its own velocity.
-    fn corner(
+    /// Judges accelerations around a sample, from the mean velocities on both sides and the recorded velocities.
+    fn judge_acceleration(
         &mut self,
         before: &Sample,
         seen: &Sample,
@@ -163,7 +165,7 @@ impl LimitMonitor {
         let from_s = before.time_s - last.map_or(0.0, |(_, h_before)| h_before);
         self.each(seen.vehicle, |limit, _, window, _| {
             let needed = needed.filter(|_| limit.quantity == Quantity::Acceleration)?;
-            // Of a bounded motion it is known that it needed as much somewhere between the samples, and not where.
+            // A bounded motion has this acceleration somewhere between the samples; the instant is unknown.
             let is_whole = window.from_s <= from_s && seen.time_s <= window.to_s;
             let lower = if is_whole || bounded_by_m_s2.is_none() { needed } else { f64::NEG_INFINITY };
             let upper = bounded_by_m_s2.map_or(lower, |most| most.max(lower));
@@ -179,28 +181,28 @@ impl LimitMonitor {
     }
 
     /// Judges the first sample of a vehicle, or the first sample after a gap.
-    fn instant(&mut self, seen: &Sample) {
+    fn judge_instant(&mut self, seen: &Sample) {
         let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
         self.each(seen.vehicle, |limit, fence, window, _| {
-            let is_asked = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
+            let is_in_window = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
             let exact = match (limit.quantity, limit.quantity.derivative()) {
                 (Quantity::Fence, _) => -fence?.clearance_margin_m(seen.position_m, seen.position_m),
                 (quantity, 0) => quantity.of(seen.position_m),
                 (quantity, 1) => quantity.of(seen.velocity_m_s?),
                 _ => return None,
             };
-            is_asked.then_some((over, Enclosure { lower: exact, upper: exact, at: 0.0 }))
+            is_in_window.then_some((over, Enclosure { lower: exact, upper: exact, at: 0.0 }))
         });
     }
 
-    fn piece(&mut self, last: Last, piece: &Piece, offset_s: f64) -> Last {
+    fn piece(&mut self, last: LastState, piece: &Piece, offset_s: f64) -> LastState {
         let over = Interval { from_s: piece.from_s + offset_s, to_s: piece.to_s + offset_s };
         let (vehicle, length_s) = (piece.vehicle, over.to_s - over.from_s);
         let mut whole = piece.coefficients.clone();
         rescale(&mut whole, 0.0, length_s);
         let (start, start_m_s) = (whole[0], derivative(&whole, length_s)[0]);
         let (end, end_m_s) = (value(&whole, 1.0), value(&derivative(&whole, length_s), 1.0));
-        self.join(&last, vehicle, (over.from_s, start), start_m_s);
+        self.judge_transition(&last, vehicle, (over.from_s, start), start_m_s);
         let clip = Interval { from_s: over.from_s.max(self.window.from_s), to_s: over.to_s.min(self.window.to_s) };
         if clip.from_s < clip.to_s {
             let mut part = piece.coefficients.clone();
@@ -227,21 +229,27 @@ impl LimitMonitor {
         }
         if self.accel_window_s.is_some() {
             let coefficients = derivative(&whole, length_s);
-            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+            self.judge_mean_accelerations(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
         }
         let sample = Sample { vehicle, time_s: over.to_s, position_m: end, velocity_m_s: None, radius_m: None };
-        Last { sample: Some(sample), curve_end: Some(end_m_s), interval: None }
+        LastState { sample: Some(sample), curve_end: Some(end_m_s), interval: None }
     }
 
-    /// Where a piece does not go on where the one before it ended, no speed is known; where it goes on at another velocity, the
-    /// curve has a corner.
-    fn join(&mut self, last: &Last, vehicle: usize, (from_s, start): (f64, Vector3<f64>), start_m_s: Vector3<f64>) {
+    /// Judges the transition between two pieces: no speed is known across a position jump, and a velocity jump is a
+    /// corner.
+    fn judge_transition(
+        &mut self,
+        last: &LastState,
+        vehicle: usize,
+        (from_s, start): (f64, Vector3<f64>),
+        start_m_s: Vector3<f64>,
+    ) {
         let Some((before, end_m_s)) = last.sample.zip(last.curve_end) else { return };
         let jumps = (start - before.position_m).norm() > SMOOTH;
         let by_m_s = (start_m_s - end_m_s).norm();
-        // Pieces that are parted in time are joined by a straight line.
+        // Pieces that are separated in time are joined by a straight line.
         let apart_s = from_s - before.time_s;
-        let (is_parted, is_mean) = (apart_s > SAME_INSTANT_S, self.accel_window_s.is_some());
+        let (is_separated, is_mean) = (apart_s > SAME_INSTANT_S, self.accel_window_s.is_some());
         let over = Interval { from_s: before.time_s.min(from_s), to_s: from_s };
         let is_in = |window: Interval| window.from_s <= from_s && from_s <= window.to_s;
         self.each(vehicle, |limit, fence, window, _| {
@@ -249,7 +257,7 @@ impl LimitMonitor {
                 0 if limit.quantity == Quantity::Fence => -fence?.clearance_margin_m(before.position_m, start),
                 0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
                 _ if jumps => f64::NEG_INFINITY,
-                2 if is_parted && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
+                2 if is_separated && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
                 _ => return None,
             };
             let upper = if limit.quantity.derivative() == 0 { lower } else { f64::INFINITY };
@@ -257,20 +265,20 @@ impl LimitMonitor {
         });
         if jumps {
             self.means[vehicle].restart();
-        } else if is_parted {
+        } else if is_separated {
             let coefficients = vec![(start - before.position_m) / apart_s];
-            self.windows(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
+            self.judge_mean_accelerations(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
         } else if by_m_s > SMOOTH && !is_mean && is_in(self.window) {
             let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
             accelerations.for_each(|of| of.note_corner(vehicle, from_s, by_m_s));
         }
     }
 
-    /// Asks for what was found of each limit, given the worst value that is known of it, and notes it.
+    /// Calls `find` for each limit with its worst known value, and records the result.
     fn each(
         &mut self,
         vehicle: usize,
-        mut find: impl FnMut(Limit, Option<&MonitoredFence>, Interval, f64) -> Option<Found>,
+        mut find: impl FnMut(Limit, Option<&MonitoredFence>, Interval, f64) -> Option<EnclosedValue>,
     ) {
         let Self { fence, window, of, .. } = self;
         for of in of {
@@ -279,21 +287,22 @@ impl LimitMonitor {
         }
     }
 
-    /// The verdicts, for vehicles that are judged; `is_whole` says that nothing of any was missed, and nothing contradicts what
-    /// was taken for granted.
+    /// Returns the verdicts for the judged vehicles. `is_whole` states that no motion was missed and no assumption
+    /// contradicted.
     pub(crate) fn finish(self, judged: &[bool], is_whole: bool) -> EnvelopeOutcome {
         EnvelopeOutcome { limits: self.of.into_iter().map(|of| of.finish(judged, is_whole)).collect() }
     }
 }
 
-/// Heights and the room to a fence between two samples: those of the straight line, and of whatever is within A h^2 / 8 of it.
-fn place_between(
+/// Encloses heights and the clearance margin of a fence between two samples: those of the straight line, widened by A
+/// h^2 / 8.
+fn position_value_between(
     limit: Limit,
     fence: Option<&MonitoredFence>,
     window: Interval,
     (before, seen): (&Sample, &Sample),
     (bound_m_s2, known): (f64, f64),
-) -> Option<Found> {
+) -> Option<EnclosedValue> {
     let whole_s = seen.time_s - before.time_s;
     let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
     let place = |time_s: f64| before.position_m.lerp(&seen.position_m, (time_s - before.time_s) / whole_s);
@@ -323,14 +332,14 @@ fn place_between(
     (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + stray_m, at }))
 }
 
-/// Speeds between two samples: that of the mean velocity, those that are recorded, and what a bounded acceleration adds.
+/// Encloses speeds between two samples from the mean velocity, the recorded velocities, and the bound on acceleration.
 fn speed_between(
     limit: Limit,
     window: Interval,
     (before, seen): (&Sample, &Sample),
     mean: Vector3<f64>,
     bound_m_s2: f64,
-) -> Option<Found> {
+) -> Option<EnclosedValue> {
     let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
     let recorded = |of: &Sample| {
         let in_window = window.from_s <= of.time_s && of.time_s <= window.to_s;
@@ -338,26 +347,26 @@ fn speed_between(
     };
     let (start, end) = (recorded(before), recorded(seen));
     let added = bound_m_s2 * (seen.time_s - before.time_s);
-    // What the digits of its places leave open is no speed.
+    // The rounding of positions counts as no speed.
     let drawn = limit.quantity.of(mean) - 2.0 * rounding_m(before, seen) / (seen.time_s - before.time_s);
     let drawn = if over.from_s < over.to_s { drawn } else { f64::NEG_INFINITY };
     let is_whole = over.from_s == before.time_s && over.to_s == seen.time_s;
     let of_mean = if is_whole || bound_m_s2 == 0.0 { drawn } else { f64::NEG_INFINITY };
-    let seen_most = start.into_iter().chain(end).fold(f64::NEG_INFINITY, f64::max);
-    let lower = of_mean.max(seen_most);
+    let largest_recorded = start.into_iter().chain(end).fold(f64::NEG_INFINITY, f64::max);
+    let lower = of_mean.max(largest_recorded);
     let by_ends = start.zip(end).map_or(f64::INFINITY, |(start, end)| 0.5 * (start + end + added));
     let upper = if bound_m_s2 == 0.0 { lower } else { lower.max((drawn + 0.5 * added).min(by_ends)) };
     let at = if end == Some(lower) { 1.0 } else { 0.0 };
-    let is_told = over.from_s < over.to_s || (over.from_s == over.to_s && seen_most.is_finite());
-    is_told.then_some((over, Enclosure { lower, upper, at }))
+    let is_observed = over.from_s < over.to_s || (over.from_s == over.to_s && largest_recorded.is_finite());
+    is_observed.then_some((over, Enclosure { lower, upper, at }))
 }
 
-/// How far places of two samples may be off by their digits \[m\].
+/// Returns a bound on the rounding of the positions of two samples \[m\].
 fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
     f64::EPSILON * before.position_m.amax().max(seen.position_m.amax())
 }
 
-/// How far outside of a fence a curve gets.
+/// Encloses the largest distance of a curve outside the fence.
 fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
     largest(part, goal, |part, _| {
         let (from, to) = (part[0], value(part, 1.0));
@@ -369,38 +378,38 @@ fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Goal) -> Enclosu
     })
 }
 
-/// A limit as far as the recording was read.
+/// Findings for a limit so far.
 #[derive(Clone, Debug)]
 pub(super) struct LimitRecord {
     pub(super) limit: Limit,
     extreme: Option<Exceeding>,
-    violations: Times,
-    undecided: Times,
-    /// Which vehicles something was told of.
-    told: Vec<bool>,
-    /// What was taken for granted to tell it.
+    violations: ExceedingIntervals,
+    undecided: ExceedingIntervals,
+    /// Whether any value is known, for each vehicle.
+    observed: Vec<bool>,
+    /// Assumption about the quantity.
     pub(super) assumes: Option<String>,
-    /// Corners at which a velocity jumps; nothing is held against a limit there.
+    /// Corners at which a velocity jumps; these are not compared with the limit.
     corners: Option<Corners>,
 }
 
 impl LimitRecord {
     pub(super) fn new(limit: Limit) -> Self {
-        let (violations, undecided) = (Times::default(), Times::default());
-        Self { limit, extreme: None, violations, undecided, told: Vec::new(), assumes: None, corners: None }
+        let (violations, undecided) = (ExceedingIntervals::default(), ExceedingIntervals::default());
+        Self { limit, extreme: None, violations, undecided, observed: Vec::new(), assumes: None, corners: None }
     }
 
-    /// The worst value that is known.
+    /// Returns the worst known value.
     pub(super) fn known(&self) -> f64 {
         self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
     }
 
-    pub(super) fn note(&mut self, vehicle: usize, found: Option<Found>) {
+    pub(super) fn note(&mut self, vehicle: usize, found: Option<EnclosedValue>) {
         let Some((over, Enclosure { lower, upper, at })) = found else { return };
-        if self.told.len() <= vehicle {
-            self.told.resize(vehicle + 1, false);
+        if self.observed.len() <= vehicle {
+            self.observed.resize(vehicle + 1, false);
         }
-        self.told[vehicle] = true;
+        self.observed[vehicle] = true;
         let at_s = over.from_s + at * (over.to_s - over.from_s);
         let found = Exceeding { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
         let bound = self.limit.bound();
@@ -417,7 +426,7 @@ impl LimitRecord {
         }
     }
 
-    /// Takes note of a corner at which the velocity jumps \[m/s\].
+    /// Records a corner at which the velocity jumps \[m/s\].
     pub(super) fn note_corner(&mut self, vehicle: usize, at_s: f64, by_m_s: f64) {
         let corner = Corner { vehicle, at_s, by_m_s };
         let corners = self.corners.get_or_insert(Corners { count: 0, largest: corner });
@@ -428,23 +437,27 @@ impl LimitRecord {
     }
 
     pub(super) fn finish(self, judged: &[bool], is_whole: bool) -> LimitOutcome {
-        let Self { limit, extreme, violations, undecided, told, assumes, corners } = self;
-        let is_told = |vehicle: usize| told.get(vehicle).copied().unwrap_or(false);
-        let unknown: Vec<_> =
-            judged.iter().enumerate().filter(|&(vehicle, &asked)| asked && !is_told(vehicle)).map(|(k, _)| k).collect();
-        let turned = |of: Exceeding| {
+        let Self { limit, extreme, violations, undecided, observed, assumes, corners } = self;
+        let is_observed = |vehicle: usize| observed.get(vehicle).copied().unwrap_or(false);
+        let unknown: Vec<_> = judged
+            .iter()
+            .enumerate()
+            .filter(|&(vehicle, &is_judged)| is_judged && !is_observed(vehicle))
+            .map(|(k, _)| k)
+            .collect();
+        let signed = |of: Exceeding| {
             let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
             Exceeding { lower, upper, ..of }
         };
-        let listed = |times: Times| {
+        let listed = |times: ExceedingIntervals| {
             let (list, tally) = times.finish();
-            (list.into_iter().map(turned).collect::<Vec<_>>(), tally)
+            (list.into_iter().map(signed).collect::<Vec<_>>(), tally)
         };
         let ((violations, violations_tally), (undecided, undecided_tally)) = (listed(violations), listed(undecided));
         let decided = is_whole && undecided.is_empty() && unknown.is_empty() && extreme.is_some();
         LimitOutcome {
             status: Status::new(!violations.is_empty(), decided),
-            extreme: extreme.map(turned),
+            extreme: extreme.map(signed),
             violations,
             undecided,
             violations_tally,
@@ -457,16 +470,16 @@ impl LimitRecord {
     }
 }
 
-/// Times of vehicles, those of one that go on as one. All are counted; the worst and the first of each vehicle are kept.
+/// Intervals of vehicles, merged where they touch. All are counted; the worst and the first of each vehicle are kept.
 #[derive(Clone, Debug)]
-struct Times {
-    /// The last one of each vehicle, which may go on.
+struct ExceedingIntervals {
+    /// Last interval of each vehicle, which may be extended.
     open: Vec<Option<Exceeding>>,
     ended: Shortlist<Exceeding>,
     count: u64,
 }
 
-impl Times {
+impl ExceedingIntervals {
     fn add(&mut self, found: Exceeding) {
         if self.open.len() <= found.vehicle {
             self.open.resize(found.vehicle + 1, None);
@@ -484,7 +497,7 @@ impl Times {
         }
     }
 
-    /// Those that are kept, in order of time, and how many there are.
+    /// Returns the kept intervals in order of time, and their number.
     fn finish(mut self) -> (Vec<Exceeding>, Tally) {
         self.ended.extend(self.open.into_iter().flatten());
         let list = self.ended.into_list();
@@ -493,16 +506,16 @@ impl Times {
     }
 }
 
-impl Default for Times {
+impl Default for ExceedingIntervals {
     fn default() -> Self {
         Self { open: Vec::new(), ended: Shortlist::new(LISTED), count: 0 }
     }
 }
 
 impl Finding for Exceeding {
-    type On = usize;
+    type Subject = usize;
 
-    fn on(&self) -> usize {
+    fn subject(&self) -> usize {
         self.vehicle
     }
 
@@ -510,7 +523,7 @@ impl Finding for Exceeding {
         [self.from_s, self.to_s]
     }
 
-    /// What is certain, or else what is possible.
+    /// Returns the certain excess, or the possible one if none is certain.
     fn excess(&self) -> f64 {
         if self.lower == f64::NEG_INFINITY { self.upper } else { self.lower }
     }

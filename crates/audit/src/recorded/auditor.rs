@@ -1,9 +1,9 @@
-//! The audit of a recording, as it is read.
+//! Audit of a recording while it is read.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, alone};
+use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, vehicles_alone};
 use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::Smallest;
 use super::vehicle::Vehicle;
@@ -15,21 +15,22 @@ use crate::outcome::Status;
 use crate::sweep::Interval;
 use tautline_core::track::Item;
 
-/// Segments of a vehicle in a window, about.
+/// Approximate number of segments of a vehicle in a window.
 const SEGMENTS: usize = 16;
-/// Fewest items between two windows.
-const FEWEST_ITEMS: usize = 48;
-/// Vehicles that are first seen farther apart in time than this \[s\] are not on one clock. They would never be present
-/// together, and no distance between them would be judged.
+/// Smallest number of items between two windows.
+const MIN_ITEMS: usize = 48;
+/// Largest time between the first samples of two vehicles with one clock \[s\]. Beyond, the vehicles would never be
+/// present together, and no distance between them would be judged.
 const ONE_CLOCK_S: f64 = 30.0 * DAY_S;
 const DAY_S: f64 = 86_400.0;
-/// Names that an error lists.
+/// Largest number of names that an error lists.
 const NAMES_LISTED: usize = 12;
 
-/// Judges a recording as it is read.
+/// Audits a recording while it is read.
 ///
-/// [`push`](TrackAuditor::push) takes items in order of time, any number at a time; the first push should hold some samples of
-/// each vehicle, since usual intervals are learnt from it. [`finish`](TrackAuditor::finish) gives the verdict.
+/// [`push`](TrackAuditor::push) takes items in order of time, any number per call. The usual intervals of vehicles are
+/// learnt from the first call, which should hold some samples of each vehicle. [`finish`](TrackAuditor::finish) returns
+/// the verdict.
 #[derive(Clone, Debug)]
 pub struct TrackAuditor {
     settings: Settings,
@@ -42,19 +43,19 @@ pub struct TrackAuditor {
     envelope: Option<LimitMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
-    /// Time of the last item, and of the last one before that time \[s\].
+    /// Time of the last item, and the latest item time before it \[s\].
     now_s: f64,
     before_s: f64,
-    /// Up to when everything was judged \[s\].
+    /// Time up to which everything was judged \[s\].
     done_s: f64,
     pending: usize,
     segments: u64,
 }
 
-/// Judges a recording in memory: the items of vehicles with these names, in order of time.
+/// Audits a recording in memory: items in order of time, of vehicles with these names.
 ///
 /// # Errors
-/// [`RecordedError`] where the settings or the recording are wrong.
+/// [`RecordedError`] if the settings or the recording are invalid.
 pub fn audit(names: &[String], items: &[Item], settings: Settings) -> Result<Outcome, RecordedError> {
     let mut auditor = TrackAuditor::new(settings)?;
     auditor.push(names, items)?;
@@ -62,10 +63,10 @@ pub fn audit(names: &[String], items: &[Item], settings: Settings) -> Result<Out
 }
 
 impl TrackAuditor {
-    /// An auditor with settings.
+    /// Creates an auditor with these settings.
     ///
     /// # Errors
-    /// [`RecordedError`] where a number of the settings is out of range.
+    /// [`RecordedError`] if a number of the settings is out of range.
     pub fn new(settings: Settings) -> Result<Self, RecordedError> {
         settings.check()?;
         Ok(Self {
@@ -87,15 +88,16 @@ impl TrackAuditor {
         })
     }
 
-    /// Follows the smallest distance over time too: see [`Outcome::smallest`]. It is asked for before anything is judged.
+    /// Also records the smallest distance over time: see [`Outcome::smallest`]. Call it before the first
+    /// [`push`](Self::push).
     #[must_use]
     pub fn with_smallest(mut self) -> Self {
         self.smallest = Some(Smallest::new(&self.settings));
         self
     }
 
-    /// Ends the work soon after the flag is set: [`push`](Self::push) and [`finish`](Self::finish) give
-    /// [`RecordedError::Interrupted`] then. It is given before anything is judged.
+    /// Stops soon after the flag is set: [`push`](Self::push) and [`finish`](Self::finish) then return
+    /// [`RecordedError::Interrupted`]. Call it before the first [`push`](Self::push).
     #[must_use]
     pub fn with_interruption(mut self, flag: Arc<AtomicBool>) -> Self {
         let interruption = Interruption::new(flag);
@@ -113,10 +115,10 @@ impl TrackAuditor {
         if self.results.interruption.is_set() { Err(RecordedError::Interrupted) } else { Ok(()) }
     }
 
-    /// Judges what comes next. `names` are those of all vehicles known so far.
+    /// Judges the next items. `names` are those of all vehicles known so far.
     ///
     /// # Errors
-    /// [`RecordedError`] where an item is wrong, or the work is interrupted; nothing more can be judged then.
+    /// [`RecordedError`] if an item is invalid, or the work is interrupted. The auditor cannot be used after an error.
     pub fn push(&mut self, names: &[String], items: &[Item]) -> Result<(), RecordedError> {
         if self.rates.is_none() && !items.is_empty() {
             let given = self.settings.max_gap_s.is_some();
@@ -137,16 +139,16 @@ impl TrackAuditor {
     fn take(&mut self, item: &Item) -> Result<(), RecordedError> {
         let (index, time_s) = (item.vehicle(), item.time_s());
         if time_s != self.now_s {
-            self.turn_to(time_s, index)?;
+            self.begin_instant(time_s, index)?;
         }
         let Some(vehicle) = self.vehicles.get_mut(index) else {
             return Err(RecordedError::Unnamed { vehicle: index });
         };
-        if !vehicle.asked_for {
+        if !vehicle.is_selected {
             return Ok(());
         }
         let unseen = vehicle.is_unseen();
-        // Matched in place: moving the gap out of the result first takes longer than all else that is done with a sample here.
+        // Matched in place: moving the gap out of the result first takes longer than the rest of this function.
         let after_gap = match vehicle.take(item) {
             Ok(None) => false,
             Ok(Some(gap)) => {
@@ -159,7 +161,7 @@ impl TrackAuditor {
             vehicle.check(&self.settings)?;
         }
         if let Some(envelope) = &mut self.envelope {
-            envelope.take(item, vehicle.seen(after_gap));
+            envelope.take(item, vehicle.item_context(after_gap));
             if self.results.interruption.is_set() {
                 return Err(RecordedError::Interrupted);
             }
@@ -168,9 +170,9 @@ impl TrackAuditor {
         Ok(())
     }
 
-    /// A new instant: everything before it has been read.
+    /// Begins a new instant: every earlier item has been read.
     #[inline(never)]
-    fn turn_to(&mut self, time_s: f64, vehicle: usize) -> Result<(), RecordedError> {
+    fn begin_instant(&mut self, time_s: f64, vehicle: usize) -> Result<(), RecordedError> {
         let name = || self.vehicles.get(vehicle).map(|vehicle| vehicle.name.clone()).unwrap_or_default();
         if !time_s.is_finite() || time_s.abs() > LARGEST {
             return Err(RecordedError::Item {
@@ -185,68 +187,68 @@ impl TrackAuditor {
         (self.before_s, self.now_s) = (self.now_s, time_s);
         if self.before_s == f64::NEG_INFINITY {
             self.done_s = time_s + self.least_offset_s;
-        } else if self.pending >= (SEGMENTS * self.vehicles.len()).max(FEWEST_ITEMS) {
+        } else if self.pending >= (SEGMENTS * self.vehicles.len()).max(MIN_ITEMS) {
             self.advance();
         }
         self.check_interruption()
     }
 
-    /// Judges up to where every vehicle that may still be there is known.
+    /// Judges up to the time up to which every vehicle that may still be present is known.
     fn advance(&mut self) {
         let read_s = self.now_s + self.least_offset_s;
         let seen = self.vehicles.iter().filter(|vehicle| !vehicle.is_unseen());
-        let there = seen.filter(|vehicle| read_s - vehicle.known_s() <= vehicle.max_gap_s);
-        let until_s = there.map(Vehicle::known_s).fold(self.before_s + self.least_offset_s, f64::min);
+        let present = seen.filter(|vehicle| read_s - vehicle.known_s() <= vehicle.max_gap_s);
+        let until_s = present.map(Vehicle::known_s).fold(self.before_s + self.least_offset_s, f64::min);
         if until_s > self.done_s {
             self.judge_until(until_s);
             self.pending = 0;
         } else {
-            // Some vehicle has a lower rate: look again after as many items.
+            // A vehicle has a lower rate: try again after half the items.
             self.pending /= 2;
         }
     }
 
     fn judge_until(&mut self, to_s: f64) {
         let window = Interval { from_s: self.done_s, to_s };
-        if self.asks_for_separation() {
+        if self.has_separation_limit() {
             self.windows.judge(&self.vehicles, window, &mut self.results);
         }
         if let Some(smallest) = &mut self.smallest {
             smallest.follow(&self.vehicles, window);
         }
         for vehicle in &mut self.vehicles {
-            self.segments += vehicle.forget(to_s) as u64;
+            self.segments += vehicle.discard_until(to_s) as u64;
         }
         self.done_s = to_s;
     }
 
-    /// Whether anything says how close two may come: where single vehicles alone are asked about, a recording's own radii
-    /// do.
-    fn asks_for_separation(&self) -> bool {
-        self.settings.asks_for_separation() || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
+    /// Returns whether a limit on separations exists, from the settings or from the recording's radii.
+    fn has_separation_limit(&self) -> bool {
+        self.settings.has_separation_limit() || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
     }
 
-    /// Whether the verdict is on pairs too: always where the question is about them. Limits that a recording brings of its own
-    /// count beside a question about single vehicles where there are two, or one and an obstacle, and each vehicle has one.
-    fn is_separation_asked(&self) -> bool {
-        let is_own = self.settings.is_own_limit || !self.settings.asks_for_separation();
+    /// Returns whether the verdict includes separations. It always does if the settings limit them. If the only limits
+    /// are those of the recording, and the settings limit single vehicles, two conditions must hold. There are two
+    /// vehicles, or one and an obstacle, and each vehicle has a limit.
+    fn judges_separation(&self) -> bool {
+        let is_own = self.settings.is_own_limit || !self.settings.has_separation_limit();
         let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
         if !is_own || self.settings.envelope.is_empty() {
             return true;
         }
-        let are_two = match judged.clone().count() {
+        let is_a_pair_present = match judged.clone().count() {
             0 => false,
             1 => !self.settings.obstacles.is_empty(),
             _ => true,
         };
-        are_two && judged.all(|vehicle| vehicle.has_limit(&self.settings)) && self.asks_for_separation()
+        is_a_pair_present && judged.all(|vehicle| vehicle.has_limit(&self.settings)) && self.has_separation_limit()
     }
 
-    /// The verdict over everything judged.
+    /// Returns the verdict over everything judged.
     ///
     /// # Errors
-    /// [`RecordedError::UnknownVehicle`] where the settings name a vehicle that the recording does not have,
-    /// [`RecordedError::TwoClocks`] where two vehicles are first seen more than a month apart.
+    /// [`RecordedError::UnknownVehicle`] if the settings name a vehicle that the recording does not have,
+    /// [`RecordedError::TwoClocks`] if the first samples of two vehicles are more than a month apart.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
         let end_s = self.vehicles.iter().map(Vehicle::known_s).fold(self.done_s, f64::max);
@@ -256,12 +258,13 @@ impl TrackAuditor {
         self.check_interruption()?;
         self.check_clocks()?;
         let presence: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.presence).collect();
-        let there = || presence.iter().flatten();
-        let span_s = there().map(|there| (there.from_s, there.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let present = || presence.iter().flatten();
+        let span_s =
+            present().map(|present| (present.from_s, present.to_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let contradiction =
             self.vehicles.iter().filter_map(|v| v.contradiction).max_by(|a, b| a.needs_m_s2.total_cmp(&b.needs_m_s2));
-        let separates = self.is_separation_asked();
-        if !separates {
+        let is_separation_judged = self.judges_separation();
+        if !is_separation_judged {
             self.results = Results::default();
         }
         let envelope = self.envelope.take().map(|envelope| {
@@ -277,21 +280,23 @@ impl TrackAuditor {
             return Err(RecordedError::Interrupted);
         }
         let Results { ledger, closest, obstacles, swept, .. } = self.results;
-        let looked_at = !(closest.kept.is_empty() && obstacles.kept.is_empty());
-        let alone = if obstructed || !separates { Vec::new() } else { alone(&presence) };
-        let decided = looked_at && ledger.is_decided() && is_gapless && contradiction.is_none();
+        let has_approach = !(closest.kept.is_empty() && obstacles.kept.is_empty());
+        let alone = if obstructed || !is_separation_judged { Vec::new() } else { vehicles_alone(&presence) };
+        let decided = has_approach && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
-        let of_pairs = looked_at && parry.disagreements == 0 && contradiction.is_none();
+        let are_pairs_known = has_approach && parry.disagreements == 0 && contradiction.is_none();
         let Lists { violations, undecided, violations_tally, undecided_tally, deciding_rate_hz } = ledger.into_lists();
         let tallies = Tallies { violations: violations_tally, undecided: undecided_tally, gaps: gaps_tally };
-        let is_everyone_there = !self.settings.require_presence || absences.is_empty();
+        let is_presence_satisfied = !self.settings.require_presence || absences.is_empty();
         Ok(Outcome {
             status: Status::new(
                 !violations.is_empty() || envelope.is_exceeded(),
-                (decided || !separates) && envelope.is_kept() && is_everyone_there,
+                (decided || !is_separation_judged) && envelope.is_kept() && is_presence_satisfied,
             ),
-            is_else_known: (of_pairs || !separates) && envelope.is_else_known() && !tallies.are_shortened(),
-            separation: separates.then(|| Status::new(!violations.is_empty(), decided)),
+            is_else_known: (are_pairs_known || !is_separation_judged)
+                && envelope.is_else_known()
+                && !tallies.are_shortened(),
+            separation: is_separation_judged.then(|| Status::new(!violations.is_empty(), decided)),
             envelope,
             max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
@@ -300,7 +305,7 @@ impl TrackAuditor {
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
-            smallest: self.smallest.filter(|_| separates).map_or_else(Vec::new, Smallest::finish),
+            smallest: self.smallest.filter(|_| is_separation_judged).map_or_else(Vec::new, Smallest::finish),
             violations,
             undecided,
             gaps,
@@ -329,9 +334,9 @@ impl TrackAuditor {
     }
 
     fn check_names(&self) -> Result<(), RecordedError> {
-        let asked = self.settings.vehicles.keys().chain(self.settings.only.iter().flatten());
+        let named = self.settings.vehicles.keys().chain(self.settings.only.iter().flatten());
         let known: Vec<&str> = self.vehicles.iter().map(|vehicle| vehicle.name.as_str()).collect();
-        for name in asked {
+        for name in named {
             if !known.contains(&name.as_str()) {
                 let mut listed = known.iter().take(NAMES_LISTED).copied().collect::<Vec<_>>().join(", ");
                 if known.len() > NAMES_LISTED {

@@ -1,23 +1,24 @@
-//! The audit of recorded motion: did any two vehicles come too close, by what a recording says?
+//! Audit of recorded motion: finds every time at which two vehicles of a recording come closer than their limit.
 //!
-//! A recording is a stream of [`Item`](tautline_core::track::Item)s, each vehicle at times of its own. What happens between two samples is stated
-//! ([`Interpolation`]), never assumed silently, and the answer is one of three: **clear** (proved, under that motion), a
-//! **violation**, or **undecided**, with the interval in which the smallest distance lies.
+//! A recording is a stream of [`Item`](tautline_core::track::Item)s, each vehicle at its own times. The motion between
+//! two samples is a stated assumption ([`Interpolation`]). The verdict is one of three: **clear** (proved, under that
+//! motion), **violation**, or **undecided**, with the interval in which the smallest distance lies.
 //!
 //! - Straight flight and jumps are swept in closed form, like the steps of [`super::Auditor`].
 //! - On curves the smallest distance is enclosed by Bernstein coefficients to [`WIDTH_M`].
-//! - Under bounded acceleration A a vehicle is within A h^2 / 8 of the straight line between two samples h apart, or within
-//!   A h^2 / 16 of the cubic where the samples have velocities. Two vehicles are at least as far apart as drawn, less both
-//!   deviations; they are too close for certain only where even the deviations cannot keep them apart, such as at a sample.
-//! - What bounds on the motion do not prove clear is judged a second time, by parry; where it contradicts, nothing is
-//!   clear.
+//! - Under bounded acceleration A a vehicle is within A h^2 / 8 of the straight line between two samples h apart. With
+//!   velocities it is within A h^2 / 16 of the cubic. The separation of two vehicles is at least that of their curves
+//!   less both deviations. A violation is certain only where it remains under both deviations, such as at a sample.
+//! - Each approach that bounds on the motion do not prove clear is checked by parry too; if the results contradict, the
+//!   motion is not clear.
 //!
-//! Not every pair is swept: a window of time at a time, pairs are left out that bounds on their motion prove to be neither
-//! too close nor among the ten closest, to 1e-12 of a distance. Memory is that of a window, and of what was found.
+//! Not every pair is swept. In each window of time bounds on the motion leave out pairs that are neither below their
+//! limit nor among the ten closest, to 1e-12 of a distance. Memory holds one window and the findings.
 //!
-//! Every instant counts, the first and the last too, and a vehicle that was seen once is judged where it was seen. A
-//! vehicle that is late or leaves early is judged while it is there. While a vehicle is not seen for longer than
-//! [`Settings::max_gap_s`], nothing is known of it. Where there never were two to keep apart nothing is clear.
+//! Every instant is judged, including the first and the last. A vehicle with a single sample is judged at that sample.
+//! A vehicle that arrives late or leaves early is judged while it is present. In a gap longer than
+//! [`Settings::max_gap_s`] the motion of a vehicle is unknown. Without two objects to keep apart the verdict is never
+//! clear.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -25,7 +26,7 @@
 //! use tautline_audit::recorded::{Settings, audit};
 //! use tautline_core::track::{Item, Sample};
 //!
-//! // Past each other in one second: far apart in every sample, 1 m apart in between.
+//! // Past each other in one second: 10 m apart in every sample, 1 m apart in between.
 //! let seen = |vehicle, time_s, x, y| {
 //!     let position_m = Vector3::new(x, y, 0.0);
 //!     Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })

@@ -14,18 +14,18 @@ use crate::slices::Slice;
 use crate::sweep::Interval;
 use tautline_core::track::Item;
 
-/// A time during which a vehicle was not seen.
+/// Time during which a vehicle has no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gap {
-    /// The vehicle.
+    /// Index of the vehicle.
     #[serde(skip)]
     pub vehicle: usize,
-    /// When it was last seen before \[s\].
+    /// Last sample before the gap \[s\].
     pub from_s: f64,
-    /// When it was seen again \[s\].
+    /// First sample after the gap \[s\].
     pub to_s: f64,
-    /// The [`max_gap_s`](super::Settings::max_gap_s) that would join what is before it to what is after it \[s\]; longer than
-    /// the gap where that is cut by the window.
+    /// Smallest [`max_gap_s`](super::Settings::max_gap_s) that would close the gap \[s\]; longer than the gap if the
+    /// window cuts it.
     pub joined_by_s: f64,
 }
 
@@ -34,45 +34,45 @@ impl Gap {
         Self { vehicle, from_s, to_s, joined_by_s: to_s - from_s }
     }
 
-    /// As far as it lies in a window.
+    /// Returns the part of the gap in a window, if any.
     pub(super) fn within(self, window: Interval) -> Option<Self> {
         let (from_s, to_s) = (self.from_s.max(window.from_s), self.to_s.min(window.to_s));
         (from_s < to_s).then_some(Self { from_s, to_s, ..self })
     }
 }
 
-/// When a vehicle is there.
+/// Interval from the first to the last sample of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Presence {
-    /// First seen \[s\].
+    /// First sample \[s\].
     pub from_s: f64,
-    /// Last seen \[s\].
+    /// Last sample \[s\].
     pub to_s: f64,
 }
 
-/// A vehicle that is not seen over the whole window.
+/// Vehicle that is not present over the whole window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absence {
-    /// The vehicle.
+    /// Index of the vehicle.
     pub vehicle: usize,
-    /// When it is seen; `None` where it is not seen in the window at all.
+    /// Interval in which it is present; `None` if it has no sample in the window.
     pub seen: Option<Presence>,
 }
 
-/// How many findings of each kind there are, and how many of them are listed: the worst [`LISTED`](crate::LISTED), and the
-/// first of each of as many pairs or vehicles.
+/// Numbers of findings of each kind, and of listed ones. A list holds the worst [`LISTED`](crate::LISTED) findings, and
+/// the first finding of each of at most that number of pairs or vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Tallies {
-    /// Of violations.
+    /// Violations.
     pub violations: Tally,
-    /// Of times that could not be decided.
+    /// Undecided times.
     pub undecided: Tally,
-    /// Of gaps; the worst are the longest.
+    /// Gaps; the worst are the longest.
     pub gaps: Tally,
 }
 
 impl Tallies {
-    /// Whether some list is shorter than what was found.
+    /// Returns whether some list is shorter than the number of findings.
     #[must_use]
     pub fn are_shortened(&self) -> bool {
         [self.violations, self.undecided, self.gaps].iter().any(Tally::is_shortened)
@@ -80,14 +80,14 @@ impl Tallies {
 }
 
 /// Returns the vehicles that are never present together with another vehicle. No pair of such a vehicle is judged.
-pub(super) fn alone(presence: &[Option<Presence>]) -> Vec<usize> {
-    let there = presence.iter().enumerate().filter_map(|(vehicle, there)| Some((there.as_ref()?, vehicle)));
-    let mut there: Vec<_> = there.collect();
-    there.sort_by(|(a, _), (b, _)| a.from_s.total_cmp(&b.from_s));
+pub(super) fn vehicles_alone(presence: &[Option<Presence>]) -> Vec<usize> {
+    let present = presence.iter().enumerate().filter_map(|(vehicle, present)| Some((present.as_ref()?, vehicle)));
+    let mut present: Vec<_> = present.collect();
+    present.sort_by(|(a, _), (b, _)| a.from_s.total_cmp(&b.from_s));
     let mut last_s = f64::NEG_INFINITY;
     let mut alone = Vec::new();
-    for (place, &(of, vehicle)) in there.iter().enumerate() {
-        let next_s = there.get(place + 1).map_or(f64::INFINITY, |(next, _)| next.from_s);
+    for (place, &(of, vehicle)) in present.iter().enumerate() {
+        let next_s = present.get(place + 1).map_or(f64::INFINITY, |(next, _)| next.from_s);
         if last_s < of.from_s && of.to_s < next_s {
             alone.push(vehicle);
         }
@@ -97,85 +97,85 @@ pub(super) fn alone(presence: &[Option<Presence>]) -> Vec<usize> {
     alone
 }
 
-/// Where a recording contradicts the bound on acceleration that it is judged by.
+/// Contradiction between a recording and the assumed bound on acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contradiction {
-    /// The vehicle.
+    /// Index of the vehicle.
     #[serde(skip)]
     pub vehicle: usize,
-    /// When \[s\].
+    /// Time \[s\].
     pub time_s: f64,
-    /// The samples there need at least this \[m/s^2\].
+    /// Smallest acceleration that the samples need there \[m/s^2\].
     pub needs_m_s2: f64,
-    /// What was assumed \[m/s^2\].
+    /// Assumed bound on the acceleration \[m/s^2\].
     pub assumed_m_s2: f64,
 }
 
-/// The verdict and its evidence.
+/// Verdict on a recording, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// Clear where everything asked for was judged and nothing came too close; undecided where something could not be
-    /// told, or there never were two to keep apart; a violation, whatever else there was, where two came too close or a
-    /// vehicle was beyond a limit.
+    /// Verdict. Clear if everything was judged and every limit was kept. Violation if a separation or a vehicle was
+    /// beyond its limit, whatever else was found. Undecided if something could not be decided, or if there never were
+    /// two objects to keep apart.
     pub status: Status,
-    /// The verdict on how close any two came alone; none where only single vehicles were asked about.
+    /// Verdict on separations alone; `None` if only single vehicles were judged.
     pub separation: Option<Status>,
-    /// What was found of each vehicle by itself.
+    /// Findings for the limits on single vehicles.
     pub envelope: EnvelopeOutcome,
-    /// Names of the vehicles, as the recording has them; those that were not asked for are among them.
+    /// Names of all vehicles of the recording, including those that are not selected.
     pub vehicles: Vec<String>,
-    /// When each vehicle is there within what was asked; `None` where it is not, or was not asked for.
+    /// Presence of each vehicle within the window; `None` if it is absent or not selected.
     pub presence: Vec<Option<Presence>>,
-    /// Vehicles that were asked for and are not seen over the whole window, by their numbers.
+    /// Selected vehicles that are not present over the whole window, by index.
     pub absences: Vec<Absence>,
-    /// Longest interval between two samples of each vehicle that was no gap \[s\]: as asked, or one and a half of the
-    /// usual one.
+    /// Longest interval between two samples of each vehicle without a gap \[s\]: that of the settings, or one and a
+    /// half of the usual interval.
     pub max_gaps_s: Vec<f64>,
-    /// First and last instant judged \[s\]; `None` where there was nothing to judge.
+    /// First and last judged instant \[s\]; `None` if nothing was judged.
     pub span_s: Option<(f64, f64)>,
-    /// The ten pairs that came closest, the closest first, each at its closest.
+    /// Ten closest pairs, each at its closest approach, the closest first.
     pub closest: Vec<Approach>,
-    /// The ten closest approaches to obstacles, likewise.
+    /// Ten closest approaches to obstacles, likewise.
     pub obstacles: Vec<Approach>,
-    /// The closest approach of all pairs of vehicles in one slice of time after the other, about a sample long, of a long
-    /// recording longer; of times at which no two are there, or both are on the ground, nothing is known. Empty unless it was
-    /// asked for.
+    /// Closest approach of all pairs of vehicles in consecutive slices of time. A slice is about one sample long;
+    /// slices of a long recording are longer. Nothing is known while fewer than two vehicles are present, or while both
+    /// are on the ground. Empty unless requested by [`with_smallest`](super::TrackAuditor::with_smallest).
     pub smallest: Vec<Slice>,
-    /// Violations in order of time, as many as [`Tallies`] says.
+    /// Listed violations in order of time; [`Tallies`] counts all.
     pub violations: Vec<Violation<ObjectPair>>,
-    /// Times that could not be decided, in order of time, as many as [`Tallies`] says.
+    /// Listed undecided times in order of time; [`Tallies`] counts all.
     pub undecided: Vec<Undecided<ObjectPair>>,
-    /// The sampling rate that would decide everything that is undecided of pairs \[Hz\]; `None` where there is none that would.
+    /// Sampling rate that would decide all undecided times of pairs \[Hz\]; `None` if no rate would.
     pub deciding_rate_hz: Option<f64>,
-    /// How many findings there are.
+    /// Numbers of findings.
     pub tallies: Tallies,
-    /// Listed gaps in order of time; [`Tallies`] counts all. A gap counts if another vehicle or an obstacle is present, or if
-    /// limits of single vehicles are judged. The motion in a gap is not known.
+    /// Listed gaps in order of time; [`Tallies`] counts all. A gap counts if another vehicle or an obstacle is present,
+    /// or if limits of single vehicles are judged. The motion in a gap is not known.
     pub gaps: Vec<Gap>,
-    /// Vehicles that are never there together with another, where they are to keep apart from nothing else: a wrong clock would
-    /// look like that.
+    /// Vehicles that are never present together with another, if there are no obstacles. A wrong clock has the same
+    /// effect.
     pub alone: Vec<usize>,
-    /// The largest contradiction to the assumed bound on acceleration, if there is one: then nothing is proved clear.
+    /// Largest contradiction to the assumed bound on acceleration, if any; nothing is proved clear then.
     pub contradiction: Option<Contradiction>,
-    /// Whether everything is known but for the lists above.
+    /// Whether everything except the lists above is known.
     pub is_else_known: bool,
-    /// Segments of motion that were judged, over all vehicles.
+    /// Number of judged segments of motion of all vehicles.
     pub segments: u64,
-    /// Segments of pairs (and of vehicles and obstacles) that were swept; all others were proved, by bounds on where
-    /// vehicles were, to be neither too close nor among the closest.
+    /// Number of swept pairs of segments, including those of vehicles and obstacles. All others were proved, by bounds
+    /// on the positions, to be neither below a limit nor among the closest.
     pub swept: u64,
-    /// What the second detector says.
+    /// Result of the second detector.
     pub parry: ParryEvidence<ObjectPair>,
 }
 
 impl Outcome {
-    /// The name of a vehicle: its number from 1 where there is no name.
+    /// Returns the name of a vehicle, or its number from 1 if it has no name.
     #[must_use]
     pub fn name(&self, vehicle: usize) -> String {
         self.vehicles.get(vehicle).cloned().unwrap_or_else(|| (vehicle + 1).to_string())
     }
 
-    /// The names of a pair, given the obstacles that were judged.
+    /// Returns the names of a pair, given the judged obstacles.
     #[must_use]
     pub fn names(&self, pair: ObjectPair, obstacles: &[Obstacle]) -> [String; 2] {
         match pair {
@@ -190,35 +190,35 @@ impl Outcome {
 /// Relative rounding of a mean interval.
 const ROUNDING: f64 = 1e-6;
 
-/// The window that a verdict is about \[s\]: what was asked for, or what was seen of any vehicle.
+/// Returns the window of the verdict \[s\]: that of the settings, completed by the span of all samples.
 pub(super) fn window(settings: &Settings, span_s: Option<(f64, f64)>) -> Option<Interval> {
     let (first_s, last_s) = span_s.map_or((None, None), |(from_s, to_s)| (Some(from_s), Some(to_s)));
     Some(Interval { from_s: settings.from_s.or(first_s)?, to_s: settings.to_s.or(last_s)? })
 }
 
-/// The vehicles that were asked for and are not seen over the whole window, by their numbers. Vehicles are sampled at times of
-/// their own: less than one mean interval of a vehicle at either end is no absence.
+/// Returns the selected vehicles that are not present over the whole window, by index. Vehicles have their own sample
+/// times, so less than one mean interval of a vehicle at either end is no absence.
 pub(super) fn absences(vehicles: &[Vehicle], settings: &Settings, span_s: Option<(f64, f64)>) -> Vec<Absence> {
     let window = window(settings, span_s);
     let is_throughout = |vehicle: &Vehicle| {
         let allowed_s = vehicle.mean_interval_s() * (1.0 - ROUNDING);
-        vehicle.presence.zip(window).is_some_and(|(there, Interval { from_s, to_s })| {
+        vehicle.presence.zip(window).is_some_and(|(present, Interval { from_s, to_s })| {
             let is_within = |missing_s: f64| missing_s <= 0.0 || missing_s < allowed_s;
-            is_within(there.from_s - from_s) && is_within(to_s - there.to_s)
+            is_within(present.from_s - from_s) && is_within(to_s - present.to_s)
         })
     };
-    let asked = vehicles.iter().enumerate().filter(|(_, vehicle)| vehicle.asked_for);
-    let absent = asked.filter(|(_, vehicle)| !is_throughout(vehicle));
+    let selected = vehicles.iter().enumerate().filter(|(_, vehicle)| vehicle.is_selected);
+    let absent = selected.filter(|(_, vehicle)| !is_throughout(vehicle));
     absent.map(|(vehicle, of)| Absence { vehicle, seen: of.presence }).collect()
 }
 
-/// Gaps that are held before the longest and the first of each vehicle alone are kept.
-const MOST_HELD: usize = 8 * LISTED;
+/// Largest number of gaps that are held before all but the longest and the first of each vehicle are dropped.
+const MAX_HELD: usize = 8 * LISTED;
 
 impl Finding for Gap {
-    type On = usize;
+    type Subject = usize;
 
-    fn on(&self) -> usize {
+    fn subject(&self) -> usize {
         self.vehicle
     }
 
@@ -231,18 +231,18 @@ impl Finding for Gap {
     }
 }
 
-/// The gaps of all vehicles, as they are found.
+/// Gaps of all vehicles so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gaps {
     held: Vec<Gap>,
-    /// Those of a vehicle that are no longer held: how many, and from the first of them to the last.
+    /// Dropped gaps of each vehicle: their number, and the interval from the first to the last.
     dropped: BTreeMap<usize, (u64, Gap)>,
 }
 
 impl Gaps {
     pub(super) fn extend(&mut self, gap: Option<Gap>) {
         self.held.extend(gap);
-        if self.held.len() > MOST_HELD {
+        if self.held.len() > MAX_HELD {
             self.shorten();
         }
     }
@@ -266,8 +266,8 @@ impl Gaps {
         self.held = kept;
     }
 
-    /// Those that matter, how many there are, and whether there is none of those that matter for pairs: during a gap in which no
-    /// other vehicle is there and no obstacle is in the way nothing can come too close.
+    /// Returns the gaps that matter, their number, and whether no gap matters for pairs. A gap does not matter for
+    /// pairs if no other vehicle is present during it and there is no obstacle.
     pub(super) fn finish(
         mut self,
         presence: &[Option<Presence>],
@@ -277,17 +277,17 @@ impl Gaps {
         let matters = |gap: &Gap| {
             let others = presence.iter().enumerate().filter(|(vehicle, _)| *vehicle != gap.vehicle);
             let meets = |other: &Presence| other.from_s < gap.to_s && gap.from_s < other.to_s;
-            is_obstructed || others.filter_map(|(_, there)| there.as_ref()).any(meets)
+            is_obstructed || others.filter_map(|(_, present)| present.as_ref()).any(meets)
         };
         let is_gapless = !self.held.iter().chain(self.dropped.values().map(|(_, all)| all)).any(matters);
         if !do_all_count {
             self.held.retain(matters);
             self.dropped.retain(|_, (_, all)| matters(all));
         }
-        // Of those that are no longer held it is known that all matter where another vehicle is there throughout.
+        // The dropped gaps of a vehicle are known to matter if another vehicle is present throughout.
         let is_covered = |gap: &Gap| {
             let others = presence.iter().enumerate().filter(|(vehicle, _)| *vehicle != gap.vehicle);
-            others.filter_map(|(_, there)| *there).any(|other| other.from_s <= gap.from_s && gap.to_s <= other.to_s)
+            others.filter_map(|(_, present)| *present).any(|other| other.from_s <= gap.from_s && gap.to_s <= other.to_s)
         };
         let is_exact = do_all_count || is_obstructed || self.dropped.values().all(|(_, all)| is_covered(all));
         let dropped = if is_exact { self.dropped.values().map(|(count, _)| count).sum() } else { 0 };
@@ -303,16 +303,17 @@ impl Gaps {
     }
 }
 
-/// Items that are looked at.
+/// Number of items from which usual intervals are learnt.
 const OPENING: usize = 65_536;
-/// Intervals of one vehicle that are looked at.
-const MOST_INTERVALS: usize = 64;
-/// Fewest intervals of a vehicle that make a rate of its own; with fewer, all vehicles' intervals do.
-const FEWEST_INTERVALS: usize = 3;
+/// Largest number of intervals of one vehicle that are used.
+const MAX_INTERVALS: usize = 64;
+/// Smallest number of intervals that give a vehicle its own usual interval; with fewer, the intervals of all vehicles
+/// are used.
+const MIN_INTERVALS: usize = 3;
 /// Ratio of an interval to the usual interval above which a sample is missing.
 const GAP_OVER_USUAL: f64 = 1.5;
 
-/// Longest interval without a gap, for each vehicle and for those that are not known yet \[s\].
+/// Longest interval without a gap, for each vehicle and for vehicles without enough intervals \[s\].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rates {
     own_s: Vec<Option<f64>>,
@@ -335,23 +336,23 @@ impl Rates {
             let Some(intervals_s) = intervals_s.get_mut(vehicle) else { continue };
             match item {
                 Item::Piece(_) => curves[vehicle] = true,
-                Item::Sample(_) if intervals_s.len() == MOST_INTERVALS => {}
+                Item::Sample(_) if intervals_s.len() == MAX_INTERVALS => {}
                 Item::Sample(sample) => {
                     let last_s = last_s[vehicle].replace(sample.time_s);
                     intervals_s.extend(last_s.map(|last_s| sample.time_s - last_s));
-                    known += usize::from(intervals_s.len() == MOST_INTERVALS);
+                    known += usize::from(intervals_s.len() == MAX_INTERVALS);
                 }
             }
         }
         let mut all_s = intervals_s.concat();
         let own_s = intervals_s
             .iter_mut()
-            .map(|intervals_s| if intervals_s.len() < FEWEST_INTERVALS { None } else { median(intervals_s) })
+            .map(|intervals_s| if intervals_s.len() < MIN_INTERVALS { None } else { median(intervals_s) })
             .collect();
         Self { own_s, common_s: median(&mut all_s), curves }
     }
 
-    /// Longest interval of a vehicle without a gap \[s\].
+    /// Returns the longest interval of a vehicle without a gap \[s\].
     pub(super) fn max_gap_s(&self, vehicle: usize) -> f64 {
         if self.curves.get(vehicle).copied().unwrap_or(false) {
             return 0.0;
@@ -361,7 +362,7 @@ impl Rates {
     }
 }
 
-/// The lower median.
+/// Returns the lower median.
 fn median(numbers: &mut [f64]) -> Option<f64> {
     let middle = numbers.len().checked_sub(1)? / 2;
     Some(*numbers.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -381,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn many_gaps_are_counted_and_the_longest_are_listed_with_the_first() {
+    fn many_gaps_are_counted_and_the_longest_and_first_are_listed() {
         let everywhere = Some(Presence { from_s: 0.0, to_s: 1e9 });
         let (listed, tally, is_gapless) = gaps(50_000).finish(&[everywhere; 2], false, false);
         assert_eq!((tally, is_gapless), (Tally { count: 50_000, listed: LISTED + 1, is_exact: true }, false));
@@ -391,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_while_no_other_is_there_do_not_matter_however_many_they_are() {
+    fn gaps_without_another_vehicle_do_not_matter() {
         let (first, late) = (Presence { from_s: 0.0, to_s: 1e5 }, Presence { from_s: 2e5, to_s: 3e5 });
         let (listed, tally, is_gapless) = gaps(50_000).finish(&[Some(first), Some(late)], false, false);
         assert!(listed.is_empty() && is_gapless && tally.count == 0);
@@ -411,14 +412,14 @@ mod rates_tests {
     }
 
     #[test]
-    fn every_vehicle_has_its_own_rate_and_one_seen_too_seldom_that_of_all() {
+    fn every_vehicle_has_its_own_rate_and_one_with_few_samples_the_common_rate() {
         let mut items: Vec<_> = (0..20).map(|k| seen(0, 0.1 * f64::from(k))).collect();
         items.extend((0..5).map(|k| seen(1, f64::from(k))));
         items.extend([seen(2, 0.0), seen(2, 2.0)]);
         let rates = Rates::learn(&items, 3);
         let gaps: Vec<_> = (0..4).map(|vehicle| (rates.max_gap_s(vehicle) * 1e3).round()).collect();
         assert_eq!(gaps, [150.0, 1500.0, 150.0, 150.0]);
-        // One that is known well leaves those still to be known.
+        // The first vehicle has all its intervals before the second appears.
         items = (0..100).map(|k| seen(0, 0.1 * f64::from(k))).collect();
         items.extend((0..5).map(|k| seen(1, 10.0 + f64::from(k))));
         assert!((Rates::learn(&items, 2).max_gap_s(1) - 1.5).abs() < 1e-9);

@@ -1,5 +1,5 @@
-//! A recording read again after it was judged: positions at given times, distances of one pair over time, and the proof of
-//! the smallest separation.
+//! Second pass over a judged recording: positions at given times, distances of one pair over time, and the proof of the
+//! smallest separation.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -17,28 +17,29 @@ use crate::sweep::Interval;
 use tautline_core::swarm::{Rows, set_row};
 use tautline_core::track::Item;
 
-/// The vehicles of a recording that was audited by these settings with this outcome, before their first items.
+/// Returns the vehicles of a recording with this outcome, before their first items.
 fn vehicles(settings: &Settings, outcome: &Outcome) -> Vec<Vehicle> {
     let gaps_s = outcome.vehicles.iter().zip(&outcome.max_gaps_s);
     gaps_s.map(|(name, &max_gap_s)| Vehicle::new(name, settings, max_gap_s)).collect()
 }
 
-/// Looks where vehicles are at given times, while a recording is read again: by the same clocks, in the same window and on the
-/// same motion as they were judged. Where nothing is known of one, such as in a gap, it is not there.
+/// Looks up the positions of vehicles at given times while a recording is read again. It uses the same clocks, window
+/// and motion as the audit. A vehicle whose motion is unknown, for example in a gap, has no position.
 #[derive(Clone, Debug)]
 pub struct PositionLookup {
     times_s: Vec<f64>,
     vehicles: Vec<Vehicle>,
-    /// For each vehicle, how many of the times are done with.
+    /// Number of times already done for each vehicle.
     done: Vec<usize>,
-    /// The axes of the ellipsoid, which motion is counted in.
+    /// Axes of the ellipsoid, by which the motion is divided.
     scale: Vector3<f64>,
     positions_m: Vec<Rows>,
     gaps: Vec<Gap>,
 }
 
 impl PositionLookup {
-    /// At these times \[s\], in ascending order, of a recording that was audited by these settings with this outcome.
+    /// Creates a lookup at these times \[s\], in ascending order, for a recording that was audited with these settings
+    /// and this outcome.
     #[must_use]
     pub fn new(settings: &Settings, outcome: &Outcome, times_s: Vec<f64>) -> Self {
         let vehicles = vehicles(settings, outcome);
@@ -53,14 +54,14 @@ impl PositionLookup {
         }
     }
 
-    /// Looks at what the recording says next.
+    /// Adds the next items of the recording.
     ///
     /// # Errors
-    /// [`RecordedError`] where an item is wrong.
+    /// [`RecordedError`] if an item is invalid.
     pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
         for item in items {
             let index = item.vehicle();
-            let Some(vehicle) = self.vehicles.get_mut(index).filter(|vehicle| vehicle.asked_for) else { continue };
+            let Some(vehicle) = self.vehicles.get_mut(index).filter(|vehicle| vehicle.is_selected) else { continue };
             let gap = vehicle.take(item)?;
             self.gaps.extend(gap);
             for segment in vehicle.segments.drain(..) {
@@ -69,7 +70,7 @@ impl PositionLookup {
                 while let Some(&time_s) = self.times_s.get(*done).filter(|&&time_s| time_s <= segment.to_s) {
                     let at = segment.position(time_s).component_mul(&self.scale);
                     set_row(&mut self.positions_m[*done], index, at);
-                    // The next segment begins where this one ends, and may look at that time again.
+                    // The next segment begins where this one ends, and may use that time again.
                     if time_s == segment.to_s {
                         break;
                     }
@@ -80,68 +81,68 @@ impl PositionLookup {
         Ok(())
     }
 
-    /// When vehicles were not seen for a while.
+    /// Returns the gaps of the vehicles.
     #[must_use]
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
     }
 
-    /// Radius of each vehicle \[m\], as it is judged; none where it is not known.
+    /// Returns the judged radius of each vehicle \[m\]; `None` if unknown.
     #[must_use]
     pub fn radius_m(&self) -> Vec<Option<f64>> {
         self.vehicles.iter().map(|vehicle| vehicle.radius_m).collect()
     }
 
-    /// The times \[s\], and positions N x 3 at each \[m\], NaN for a vehicle that is not there.
+    /// Returns the times \[s\], and the N x 3 positions at each time \[m\], NaN for an absent vehicle.
     #[must_use]
     pub fn finish(self) -> (Vec<f64>, Vec<Rows>) {
         (self.times_s, self.positions_m)
     }
 }
 
-/// Parts of a segment at which a curve is looked at.
-const PLACES_ON_A_CURVE: u32 = 8;
-/// Samples that are kept, at most; beyond, neighbours become one.
-const MOST_SAMPLES: usize = 4096;
+/// Number of parts of a curve segment between which it is sampled.
+const PARTS_OF_A_CURVE: u32 = 8;
+/// Largest number of kept samples; beyond, neighbours are merged.
+const MAX_SAMPLES: usize = 4096;
 
-/// Two at a moment.
+/// Pair at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairSample {
-    /// When \[s\].
+    /// Time \[s\].
     pub time_s: f64,
-    /// Their distance as drawn \[m\], scaled with an ellipsoid.
+    /// Distance of the interpolated positions \[m\], scaled with an ellipsoid.
     pub distance_m: f64,
-    /// How much smaller or larger it can be \[m\].
+    /// Bound on the error of the distance \[m\].
     pub deviation_m: f64,
-    /// Where both are \[m\].
+    /// Interpolated positions of both \[m\].
     pub positions_m: [Vector3<f64>; 2],
-    /// Nothing is known of the time since the sample before.
+    /// Whether the motion since the previous sample is unknown.
     pub unseen_before: bool,
 }
 
-/// Follows two through a recording that is read again.
+/// Distance of one pair over time, computed while a recording is read again.
 ///
-/// Its samples are those of the recording, and the closest between them; of a long recording the closest of several neighbours is kept,
-/// so that nothing that comes near is lost.
+/// Samples lie at the ends of segments and at the closest approach between them. In a long recording only the closest
+/// of several neighbours is kept, so no approach is lost.
 #[derive(Clone, Debug)]
 pub struct PairSeries {
     vehicles: Vec<(usize, Vehicle)>,
-    /// The path of the obstacle, if it is one, and its shape.
+    /// Shape and path of the obstacle, if one of the pair is an obstacle.
     obstacle: Option<(Shape, Vec<Segment>)>,
     scale: Vector3<f64>,
     samples: Vec<PairSample>,
-    /// Up to when they were followed without a break \[s\].
+    /// Time up to which the pair was followed without a gap \[s\].
     known_s: f64,
-    /// Samples that one of the kept ones stands for.
+    /// Number of samples that each kept sample represents.
     stride: usize,
     skipped: usize,
 }
 
 impl PairSeries {
-    /// Follows two of those that were audited by these settings, with this outcome.
+    /// Creates the series of a pair for a recording that was audited with these settings and this outcome.
     ///
     /// # Errors
-    /// [`RecordedError::Unnamed`] where there is no such vehicle or obstacle.
+    /// [`RecordedError::Unnamed`] if there is no such vehicle or obstacle.
     pub fn new(settings: &Settings, outcome: &Outcome, pair: ObjectPair) -> Result<Self, RecordedError> {
         let all = vehicles(settings, outcome);
         let vehicle = |index: usize| -> Result<_, RecordedError> {
@@ -150,8 +151,9 @@ impl PairSeries {
         let (vehicles, obstacle) = match pair {
             ObjectPair::Vehicles(pair) => (vec![vehicle(pair.first())?, vehicle(pair.second())?], None),
             ObjectPair::Obstacle { vehicle: index, obstacle } => {
-                let thing = settings.obstacles.get(obstacle).ok_or(RecordedError::Unnamed { vehicle: index })?;
-                (vec![vehicle(index)?], Some((thing.shape, thing.segments())))
+                let obstacle_settings =
+                    settings.obstacles.get(obstacle).ok_or(RecordedError::Unnamed { vehicle: index })?;
+                (vec![vehicle(index)?], Some((obstacle_settings.shape, obstacle_settings.segments())))
             }
         };
         Ok(Self {
@@ -165,10 +167,10 @@ impl PairSeries {
         })
     }
 
-    /// Follows them on.
+    /// Adds the next items of the recording.
     ///
     /// # Errors
-    /// [`RecordedError`] where an item is wrong.
+    /// [`RecordedError`] if an item is invalid.
     pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
         for item in items {
             let of = self.vehicles.iter_mut().find(|(index, _)| *index == item.vehicle());
@@ -181,7 +183,7 @@ impl PairSeries {
         Ok(())
     }
 
-    /// All samples, in order of time.
+    /// Returns all samples, in order of time.
     #[must_use]
     pub fn finish(mut self) -> Vec<PairSample> {
         self.follow(f64::INFINITY);
@@ -212,7 +214,7 @@ impl PairSeries {
             self.keep(PairSample { positions_m: sample.positions_m.map(|at| at.component_mul(&scale)), ..sample });
         }
         for (_, vehicle) in &mut self.vehicles {
-            vehicle.forget(until_s);
+            vehicle.discard_until(until_s);
         }
     }
 
@@ -221,29 +223,30 @@ impl PairSeries {
             && self.skipped + 1 < self.stride
         {
             self.skipped += 1;
-            *last = last.nearer(sample);
+            *last = last.closer(sample);
             return;
         }
         self.skipped = 0;
         self.samples.push(sample);
-        if self.samples.len() >= MOST_SAMPLES {
+        if self.samples.len() >= MAX_SAMPLES {
             self.stride *= 2;
             let halves = self.samples.chunks(2);
-            self.samples = halves.filter_map(|two| two.iter().copied().reduce(PairSample::nearer)).collect();
+            self.samples = halves.filter_map(|two| two.iter().copied().reduce(PairSample::closer)).collect();
         }
     }
 }
 
 impl PairSample {
-    /// The nearer of two neighbours, which stands for both.
-    fn nearer(self, later: Self) -> Self {
+    /// Returns the closer of two neighbours, which represents both.
+    fn closer(self, later: Self) -> Self {
         let is_later = later.distance_m - later.deviation_m < self.distance_m - self.deviation_m;
         let unseen_before = self.unseen_before || later.unseen_before;
         Self { unseen_before, ..if is_later { later } else { self } }
     }
 }
 
-/// The samples of a time that two segments share: its ends and the closest, and places between on a curve. At least one.
+/// Samples the time that two segments share: its ends, the closest approach of straight segments, and points in between
+/// on curves. Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
     let Overlap { first, second, over: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {
@@ -261,62 +264,62 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         };
         times_s.push(from_s + (to_s - from_s) * closest);
     } else {
-        let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PLACES_ON_A_CURVE);
-        times_s.extend((1..PLACES_ON_A_CURVE).map(place));
+        let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PARTS_OF_A_CURVE);
+        times_s.extend((1..PARTS_OF_A_CURVE).map(place));
     }
     times_s.sort_unstable_by(f64::total_cmp);
     times_s.dedup();
     found.extend(times_s.into_iter().map(at));
 }
 
-/// Segments of the vehicle that has most of them in a window.
+/// Number of segments per window of the vehicle with the most segments.
 const SEGMENTS: usize = 8;
 
-/// The smallest separation of straight lines between samples, and boxes that show that no other pair comes closer.
+/// Proof of the smallest separation of straight lines between samples, with boxes that show that no other pair comes
+/// closer.
 ///
-/// `python/tautline/check_proof.py` shares no code with this crate and confirms a proof by exact arithmetic.
+/// `python/tautline/check_proof.py` shares no code with this crate and checks a proof by exact arithmetic.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proof {
-    /// The largest double that the separation of no pair falls below \[m\].
+    /// Largest double that is at most the smallest separation \[m\].
     pub separation_m: f64,
-    /// Names of the two vehicles that come as close as that.
+    /// Names of the two vehicles with the smallest separation.
     pub pair: [String; 2],
-    /// The largest double that the first time of it, between two samples, is not before \[s\].
+    /// Largest double that is at most the first time of the smallest separation \[s\].
     pub time_s: f64,
     /// Windows that cover the recording, in order of time.
     #[serde(skip)]
     pub windows: Vec<ProofWindow>,
 }
 
-/// Where vehicles are in a window of time.
+/// Bounding boxes of vehicles in a window of time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProofWindow {
-    /// From \[s\].
+    /// Start \[s\].
     pub from_s: f64,
-    /// To \[s\].
+    /// End \[s\].
     pub to_s: f64,
-    /// For each vehicle that is there its index, and the least and greatest x, y and z \[m\] of all segments that meet the
-    /// window: index, least x, y, z, greatest x, y, z.
+    /// For each present vehicle: index, least x, y, z, greatest x, y, z \[m\] over all segments that meet the window.
     pub boxes: Vec<(usize, f64, f64, f64, f64, f64, f64)>,
 }
 
-/// Collects the motion of a recording that is read again after it was judged.
+/// Builds a proof while a recording is read again.
 #[derive(Clone, Debug)]
 pub struct ProofBuilder {
     vehicles: Vec<Vehicle>,
 }
 
 impl ProofBuilder {
-    /// Of a recording that was audited by these settings with this outcome.
+    /// Creates a builder for a recording that was audited with these settings and this outcome.
     #[must_use]
     pub fn new(settings: &Settings, outcome: &Outcome) -> Self {
         Self { vehicles: vehicles(settings, outcome) }
     }
 
-    /// Takes what the recording holds next.
+    /// Adds the next items of the recording.
     ///
     /// # Errors
-    /// [`RecordedError`] where an item is wrong.
+    /// [`RecordedError`] if an item is invalid.
     pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
         for item in items {
             if let Some(vehicle) = self.vehicles.get_mut(item.vehicle()) {
@@ -326,15 +329,15 @@ impl ProofBuilder {
         Ok(())
     }
 
-    /// The proof; `None` where there is none: no pair was judged, a limit is that of radii, or the motion is not straight
-    /// between samples.
+    /// Returns the proof. `None` if no pair was judged, a limit comes from radii, or the motion between samples is not
+    /// straight.
     #[must_use]
     pub fn finish(self, outcome: &Outcome) -> Option<Proof> {
         let closest = outcome.closest.first()?;
         let (pair, separation_m) = (closest.pair.vehicles()?, closest.lower_m);
         let [first, second] = [pair.first(), pair.second()].map(|of| self.vehicles.get(of));
         let (first, second) = first.zip(second)?;
-        let is_sampled = |segment: &Segment| segment.whole.is_none();
+        let is_sampled = |segment: &Segment| segment.parent.is_none();
         let is_plain = |vehicle: &Vehicle| vehicle.radius_m.is_none() && vehicle.segments.iter().all(is_sampled);
         if !self.vehicles.iter().all(is_plain) {
             return None;
@@ -383,7 +386,7 @@ mod tests {
     use tautline_core::track::Sample;
 
     #[test]
-    fn vehicles_are_where_they_are_judged_by_their_clocks_and_nowhere_in_a_gap() {
+    fn positions_use_the_clock_offsets_and_are_unknown_in_gaps() {
         let seen = |vehicle: usize, time_s: f64, x: f64| {
             let position_m = Vector3::new(x, 9.0 * vehicle as f64, 0.0);
             Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
@@ -394,13 +397,13 @@ mod tests {
         let mut settings = Settings::delta(1.0);
         settings.vehicles.entry("b".to_owned()).or_default().offset_s = 0.25;
         let outcome = audit(&names, &items, settings.clone()).expect("judged");
-        let asked = vec![0.0, 0.5, 2.0, 3.0, 6.5, 8.0, 9.0];
-        let mut places = PositionLookup::new(&settings, &outcome, asked.clone());
-        items.chunks(3).for_each(|items| places.push(items).expect("right"));
-        let gaps: Vec<_> = places.gaps().iter().map(|gap| (gap.vehicle, gap.from_s, gap.to_s)).collect();
+        let times_to_look_up = vec![0.0, 0.5, 2.0, 3.0, 6.5, 8.0, 9.0];
+        let mut lookup = PositionLookup::new(&settings, &outcome, times_to_look_up.clone());
+        items.chunks(3).for_each(|items| lookup.push(items).expect("valid items"));
+        let gaps: Vec<_> = lookup.gaps().iter().map(|gap| (gap.vehicle, gap.from_s, gap.to_s)).collect();
         assert_eq!(gaps, [(0, 2.0, 6.0), (1, 2.25, 6.25)]);
-        let (times_s, positions_m) = places.finish();
-        assert_eq!(times_s, asked);
+        let (times_s, positions_m) = lookup.finish();
+        assert_eq!(times_s, times_to_look_up);
         let x = |vehicle: usize| positions_m.iter().map(|at| at[(vehicle, 0)]).collect::<Vec<_>>();
         let is = |found: Vec<f64>, expected: [f64; 7]| {
             let same = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-12 || (a.is_nan() && b.is_nan());

@@ -1,4 +1,4 @@
-//! Settings of an audit, the limits that follow from the settings, and errors in the settings or in the recording.
+//! Settings of an audit, the limits that follow from them, and errors in the settings or in the recording.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,30 +9,30 @@ use crate::envelope::{Envelope, Limit, Quantity};
 use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 
-/// Largest number that is accepted, be it a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
+/// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;
 
-/// How vehicles are taken to move between two samples.
+/// Assumed motion of vehicles between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Interpolation {
-    /// On a straight line at constant speed. The sweep is exact.
+    /// Straight line at constant speed. The sweep is exact.
     Linear,
-    /// Not at all, with a jump at each sample. The jump is swept like a straight flight that takes no time; vehicles that
-    /// jump at the same instant are swept together.
+    /// Rest, with a jump at each sample. A jump is swept like a straight flight of zero duration; vehicles that jump at
+    /// the same instant are swept together.
     Hold,
-    /// On the curves that the recording holds; each minimum is enclosed to [`super::WIDTH_M`].
+    /// Curves of the recording; each minimum is enclosed to [`super::WIDTH_M`].
     Polynomial,
-    /// On any path whose acceleration stays within a bound: true distances lie within an interval around those of the
-    /// line, or of the cubic where the recording has velocities.
+    /// Any path whose acceleration stays within a bound. The true distance lies within an interval around that of the
+    /// line, or of the cubic if the recording has velocities.
     Bounded,
 }
 
 impl Interpolation {
-    /// All motions.
+    /// All kinds of interpolation.
     pub const ALL: [Self; 4] = [Self::Linear, Self::Hold, Self::Polynomial, Self::Bounded];
 
-    /// The name of the motion for `--motion`.
+    /// Returns the name for the option `--motion`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -44,64 +44,65 @@ impl Interpolation {
     }
 }
 
-/// What is said of one vehicle.
+/// Settings of one vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleSettings {
-    /// Radius \[m\]; where the recording has one, this one counts.
+    /// Radius \[m\]; overrides that of the recording.
     pub radius_m: Option<f64>,
-    /// Added to the vehicle's times \[s\].
+    /// Clock offset, added to the vehicle's times \[s\].
     pub offset_s: f64,
-    /// Largest acceleration \[m/s^2\]; without it, that of the [`Settings`].
+    /// Largest acceleration \[m/s^2\]; by default that of the [`Settings`].
     pub max_accel_m_s2: Option<f64>,
 }
 
-/// What is asked.
+/// Settings of an audit.
 ///
-/// Two vehicles i and j must stay `max(delta, r_i + r_j)` apart, centre to centre, where each part counts that is given.
-/// A separation **strictly** below that is a violation. With an ellipsoid lengths are divided by its axes first, so two
-/// equal ellipsoids touch at a scaled distance of 2, and delta, if given, is a scaled distance too.
+/// Vehicles i and j must stay `max(delta, r_i + r_j)` apart, centre to centre, where a part that is not given is
+/// ignored. A separation **strictly** below that is a violation. With an ellipsoid, lengths are first divided by its
+/// axes. Two equal ellipsoids touch at a scaled distance of 2, and delta is a scaled distance too.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Settings {
     /// Safety distance delta \[m\].
     pub delta_m: Option<f64>,
-    /// What happens between samples. `None` asks for straight lines between samples, and curves where the recording has
-    /// curves.
+    /// Motion between samples. The default `None` uses straight lines between samples, and the curves of the recording
+    /// where it has curves.
     pub motion: Option<Interpolation>,
-    /// Largest acceleration \[m/s^2\] of every vehicle, for [`Interpolation::Bounded`].
+    /// Largest acceleration of every vehicle \[m/s^2\], for [`Interpolation::Bounded`].
     pub max_accel_m_s2: Option<f64>,
-    /// Radius \[m\] of every vehicle of which nothing else is said; it goes before those of the recording.
+    /// Radius of every vehicle without its own setting \[m\]; overrides those of the recording.
     pub radius_m: Option<f64>,
-    /// Half axes \[m\] of the ellipsoid around each vehicle, such as a downwash that reaches far down.
+    /// Half axes of the ellipsoid around each vehicle \[m\], for example for a downwash that extends far down.
     pub ellipsoid_m: Option<Vector3<f64>>,
-    /// Judge from here on \[s\].
+    /// Start of the judged window \[s\].
     pub from_s: Option<f64>,
-    /// Judge up to here \[s\].
+    /// End of the judged window \[s\].
     pub to_s: Option<f64>,
-    /// Pairs are not judged while both vehicles are at or below this height \[m\], and obstacles not while the vehicle is.
+    /// Height at or below which vehicles are on the ground \[m\]. A pair is not judged while both are, and an obstacle
+    /// not while the vehicle is.
     pub above_m: Option<f64>,
-    /// Samples farther apart in time than this \[s\] have a gap between them, which nothing is known of. `None` lets each
-    /// vehicle's usual interval decide: a gap is more than one and a half of it.
+    /// Largest time between two samples without a gap \[s\]; the motion in a gap is unknown. The default `None` uses
+    /// one and a half of each vehicle's usual interval.
     pub max_gap_s: Option<f64>,
-    /// Whether it is undecided where a vehicle is not seen over the whole window.
+    /// Whether the verdict is undecided if a vehicle is not present over the whole window.
     pub require_presence: bool,
-    /// What is said of single vehicles, by name.
+    /// Settings of single vehicles, by name.
     pub vehicles: BTreeMap<String, VehicleSettings>,
-    /// The vehicles to judge, by name; `None` for all.
+    /// Names of the vehicles to judge; `None` for all.
     pub only: Option<BTreeSet<String>>,
-    /// What else is in the way.
+    /// Obstacles.
     pub obstacles: Vec<Obstacle>,
-    /// What each vehicle may do by itself. Where it is all that is asked, nothing is said of how close two came.
+    /// Limits on single vehicles. If they are the only limits, separations are not judged.
     pub envelope: Envelope,
-    /// Accelerations are means over windows of this length \[s\]: how much the velocity changes over one, over its length.
-    /// `None` takes accelerations at instants, and does not hold corners of curves against a limit.
+    /// Length of the windows over which accelerations are averaged \[s\]: change of velocity over the window, divided
+    /// by its length. `None` uses instantaneous accelerations, and does not compare corners of curves with a limit.
     pub accel_window_s: Option<f64>,
-    /// Whether delta or the ellipsoid are what the recording says of itself: beside an `envelope` that asks nothing of a
-    /// vehicle that is alone, without an obstacle.
+    /// Whether delta or the ellipsoid comes from the recording itself. With limits on single vehicles, separations are
+    /// then judged only if the recording has a pair to judge.
     pub is_own_limit: bool,
 }
 
 impl Settings {
-    /// Whether any two vehicles came closer than delta \[m\].
+    /// Creates settings with the safety distance delta \[m\].
     #[must_use]
     pub fn delta(delta_m: f64) -> Self {
         Self { delta_m: Some(delta_m), ..Self::default() }
@@ -111,10 +112,10 @@ impl Settings {
         Interval { from_s: self.from_s.unwrap_or(f64::NEG_INFINITY), to_s: self.to_s.unwrap_or(f64::INFINITY) }
     }
 
-    /// Whether something beside a recording's own radii says how close two may come, or a vehicle and an obstacle.
-    pub(super) fn asks_for_separation(&self) -> bool {
-        let asks = [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.radius_m.is_some()];
-        asks.contains(&true)
+    /// Returns whether the settings limit separations or distances from obstacles, apart from a recording's own radii.
+    pub(super) fn has_separation_limit(&self) -> bool {
+        let is_given = [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.radius_m.is_some()];
+        is_given.contains(&true)
             || !self.obstacles.is_empty()
             || self.vehicles.values().any(|of| of.radius_m.is_some())
             || self.envelope.is_empty()
@@ -129,7 +130,7 @@ impl Settings {
         }
     }
 
-    /// Whether every number is in range.
+    /// Checks that every number is in range.
     pub(super) fn check(&self) -> Result<(), RecordedError> {
         const POSITIVE: (f64, &str) = (MIN_LIMIT_M, "above 0, and finite");
         const RADIUS: (f64, &str) = (0.0, "0 m or more, and finite");
@@ -148,7 +149,7 @@ impl Settings {
             check("each axis of the ellipsoid", Some(*axis), POSITIVE)?;
         }
         check("the start of the window", self.from_s, FINITE)?;
-        check("its end", self.to_s, FINITE)?;
+        check("the end of the window", self.to_s, FINITE)?;
         check("the height", self.above_m, FINITE)?;
         if let Some(value) = self.max_gap_s.filter(|gap_s| gap_s.is_nan() || *gap_s < 0.0) {
             return Err(RecordedError::OutOfRange { what: "the longest gap".to_owned(), range: "0 s or more", value });
@@ -171,7 +172,7 @@ impl Settings {
         if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Interpolation::Bounded)) {
             return Err(RecordedError::NoAccelWindow);
         }
-        if let Some(quantity) = self.envelope.of_motion().filter(|_| self.motion == Some(Interpolation::Hold)) {
+        if let Some(quantity) = self.envelope.limited_motion().filter(|_| self.motion == Some(Interpolation::Hold)) {
             return Err(RecordedError::LimitOfJumps { limit: quantity.name() });
         }
         if self.ellipsoid_m.is_some() && !self.obstacles.is_empty() {
@@ -184,151 +185,149 @@ impl Settings {
 /// Scaled distance at which two equal ellipsoids touch.
 pub const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 
-/// What keeps two apart: lengths in metres or, around ellipsoids, over their half axes.
+/// Limits on distances, in metres, or relative to the half axes of the ellipsoid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    /// Distance that any two vehicles must keep.
+    /// Limit for any two vehicles.
     pub(super) delta: f64,
     /// Whether the vehicles' radii count.
     pub(super) by_radii: bool,
-    /// Height at or below which two need not keep it.
+    /// Height at or below which vehicles are on the ground.
     pub(super) above: Option<f64>,
 }
 
 impl Limits {
-    /// What two vehicles of these radii must keep between their centres.
+    /// Returns the limit for the centres of two vehicles with these radii.
     pub(super) fn of_vehicles(self, first: f64, second: f64) -> f64 {
         if self.by_radii { self.delta.max(first + second) } else { self.delta }
     }
 
-    /// What the centre of a vehicle of this radius must keep from an obstacle's surface.
+    /// Returns the limit for the centre of a vehicle with this radius and an obstacle's surface.
     pub(super) fn of_obstacle(self, obstacle: &Obstacle, radius: f64) -> f64 {
         obstacle.clearance_m.unwrap_or(if self.by_radii { (0.5 * self.delta).max(radius) } else { 0.5 * self.delta })
     }
 }
 
-/// Why a recording cannot be judged as asked.
+/// Reason why a recording cannot be judged with the settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{what} must be {range}, not {value:?}")]
+    #[error("{what} must be {range}, got {value:?}")]
     OutOfRange {
-        /// What it is.
+        /// Name of the setting.
         what: String,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
-        /// What was given.
+        /// Value.
         value: f64,
     },
     /// The window is empty.
-    #[error("the window from {from_s:?} s to {to_s:?} s holds no time")]
+    #[error("the window from {from_s:?} s to {to_s:?} s is empty; its end must not be before its start")]
     EmptyWindow {
-        /// Its start \[s\].
+        /// Start \[s\].
         from_s: f64,
-        /// Its end \[s\].
+        /// End \[s\].
         to_s: f64,
     },
-    /// Bounded motion without a bound.
+    /// Bounded motion without a bound on the acceleration.
     #[error("bounded motion of vehicle {vehicle} needs its largest acceleration")]
     NoBound {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
     },
-    /// Neither a safety distance nor a radius.
-    #[error("nothing says how close vehicle {vehicle} may come: there is no delta, and no radius for it")]
+    /// Neither a safety distance nor a radius is given.
+    #[error("vehicle {vehicle} has no limit: neither delta nor its radius is given")]
     NoLimit {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
     },
-    /// Something was said of a vehicle that is not there.
+    /// The settings name a vehicle that the recording does not have.
     #[error("the recording has no vehicle {name}; it has {known}")]
     UnknownVehicle {
-        /// The name.
+        /// Name in the settings.
         name: String,
-        /// The names there are, shortened.
+        /// Names in the recording, shortened.
         known: String,
     },
-    /// Samples where curves were asked for.
-    #[error("vehicle {vehicle} has samples and no curve: what happens between samples must be stated")]
+    /// The recording has samples, but the motion is polynomial.
+    #[error("vehicle {vehicle} has samples and no curve; choose another motion between samples than polynomial")]
     NotACurve {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
     },
-    /// Curves where a motion between samples was asked for.
-    #[error("vehicle {vehicle} has a curve: there is nothing between samples to be stated")]
+    /// The recording has curves, but another motion is given.
+    #[error("vehicle {vehicle} has a curve; a motion between samples cannot be chosen for it")]
     NotSamples {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
     },
-    /// A vehicle that has no name.
-    #[error("there is no name for vehicle {} (from 1)", vehicle + 1)]
+    /// A vehicle has no name.
+    #[error("vehicle {} (from 1) has no name", vehicle + 1)]
     Unnamed {
-        /// The vehicle.
+        /// Index of the vehicle.
         vehicle: usize,
     },
-    /// A time not later than the one before.
+    /// The time is not later than the previous one.
     #[error("vehicle {vehicle}: the time {time_s:?} s is not later than {previous_s:?} s before it")]
     TimeNotIncreasing {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
-        /// The time before \[s\].
+        /// Previous time \[s\].
         previous_s: f64,
-        /// The time \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// Items out of order.
+    /// Items are out of order.
     #[error("the item of vehicle {vehicle} at {time_s:?} s comes after one at {previous_s:?} s")]
     OutOfOrder {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
-        /// The time before \[s\].
+        /// Time of the previous item \[s\].
         previous_s: f64,
-        /// The time \[s\].
+        /// Time \[s\].
         time_s: f64,
     },
-    /// Vehicles whose times cannot be of one clock.
-    #[error("vehicles {first} and {second} are first seen {days} days apart, which is no flight by one clock")]
+    /// The times of two vehicles cannot come from one clock.
+    #[error("the first samples of vehicles {first} and {second} are {days} days apart; their clocks differ")]
     TwoClocks {
-        /// The one that is seen first.
+        /// Name of the vehicle with the earliest first sample.
         first: String,
-        /// The one that is seen last.
+        /// Name of the vehicle with the latest first sample.
         second: String,
-        /// How long after it \[days\].
+        /// Time between both \[days\].
         days: u64,
     },
     /// Invalid sample or curve: a number that is not finite or too large, or a curve without coefficients.
     #[error("vehicle {vehicle} at {time_s:?} s: {what}")]
     Item {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// What is wrong with it.
+        /// Problem.
         what: String,
     },
-    /// A radius that is not the same throughout.
+    /// The radius of a vehicle changes.
     #[error("vehicle {vehicle} at {time_s:?} s: the radius changes to {radius_m:?} m")]
     RadiusChanges {
-        /// The vehicle.
+        /// Name of the vehicle.
         vehicle: String,
-        /// When \[s\].
+        /// Time \[s\].
         time_s: f64,
-        /// What it changes to \[m\].
+        /// New radius \[m\].
         radius_m: f64,
     },
-    /// A limit on speeds or accelerations of vehicles that jump.
-    #[error("vehicles that are held between samples jump: nothing can be said of their {limit}")]
+    /// A speed or an acceleration is limited for vehicles that jump.
+    #[error("{limit}: vehicles that are held between samples jump and have no {limit}; choose another motion")]
     LimitOfJumps {
-        /// What was to be limited.
+        /// Name of the limited quantity.
         limit: &'static str,
     },
-    /// A window of accelerations where none are limited, or where a bound on them is assumed.
-    #[error(
-        "a window of accelerations says nothing where no acceleration is limited, or where accelerations are bounded"
-    )]
+    /// An averaging window without a limit on the acceleration, or with an assumed bound on it.
+    #[error("the window of accelerations has no effect without a limit on the acceleration, or if motion is bounded")]
     NoAccelWindow,
-    /// Obstacles and an ellipsoid.
-    #[error("obstacles cannot be judged by an ellipsoid")]
+    /// Obstacles are combined with an ellipsoid.
+    #[error("obstacles cannot be combined with an ellipsoid")]
     ObstaclesAndEllipsoid,
     /// The work was interrupted ([`super::TrackAuditor::with_interruption`]).
     #[error("interrupted")]

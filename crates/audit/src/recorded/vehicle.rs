@@ -1,58 +1,58 @@
-//! One vehicle of a recording, from items to segments.
+//! One vehicle of a recording: turns items into segments.
 
 use nalgebra::Vector3;
 
 use super::outcome::{Contradiction, Gap, Presence};
 use super::settings::{Interpolation, RecordedError, Settings};
-use crate::envelope::Seen;
+use crate::envelope::ItemContext;
 use crate::exact::compare_height;
-use crate::polynomial::{BernsteinBasis, parts_told};
+use crate::polynomial::{BernsteinBasis, classify_parts};
 use crate::segment::{Curve, Deviation, Segment};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use tautline_core::track::{Item, Piece, Sample};
 
-/// Pieces of a curve that follow each other within this \[s\] leave no gap: files write times with about this resolution. A
-/// jump of the position is swept.
+/// Largest time between two pieces of a curve without a gap \[s\]: files write times with about this resolution. A jump
+/// of the position is swept.
 const SAME_INSTANT_S: f64 = 1e-6;
-/// Shortest part of a curve, as a fraction of it, that is looked at for when the ground is left.
+/// Shortest part of a curve, as a fraction of it, to which the crossing of the ground is narrowed.
 const SHORTEST_PART: f64 = 1e-12;
-/// Parts of a curve that are looked at for that.
-const MOST_PARTS: usize = 2000;
-/// Coefficients of a piece of a curve: the work on a part of it grows with their square.
-const MOST_COEFFICIENTS: usize = 64;
-/// Shortest interval between two samples of a vehicle \[s\]: it can be divided by, twice.
+/// Largest number of parts of a curve that are examined for it.
+const MAX_PARTS: usize = 2000;
+/// Largest number of coefficients of a piece of a curve: the work on a part grows with their square.
+const MAX_COEFFICIENTS: usize = 64;
+/// Shortest interval between two samples of a vehicle \[s\]: it can be divided by twice without overflow.
 const SHORTEST_INTERVAL_S: f64 = 1e-70;
 /// Relative excess over the assumed acceleration that rounding explains.
 const ROUNDING: f64 = 1e-9;
 
-/// A vehicle as far as it has been read, and how it is judged.
+/// Vehicle with its current segments and settings.
 #[derive(Clone, Debug)]
 pub(super) struct Vehicle {
     pub(super) name: String,
-    /// Whether it is judged.
-    pub(super) asked_for: bool,
+    /// Whether the settings select the vehicle.
+    pub(super) is_selected: bool,
     offset_s: f64,
     motion: Option<Interpolation>,
-    /// Largest acceleration \[m/s^2\]; NaN where none is given.
+    /// Largest acceleration \[m/s^2\]; NaN if none is given.
     max_accel_m_s2: f64,
-    /// 1 over the axes of the ellipsoid.
+    /// Reciprocal axes of the ellipsoid.
     scale: Option<Vector3<f64>>,
     window: Interval,
     above_m: Option<f64>,
     pub(super) max_gap_s: f64,
-    /// Radius \[m\]; none where neither the recording nor the settings have one.
+    /// Radius \[m\]; `None` if neither the recording nor the settings have one.
     pub(super) radius_m: Option<f64>,
     /// Whether the radius was taken from the recording and must not change.
     radius_recorded: bool,
-    /// Segments not yet done with, in order of time.
+    /// Segments that are still needed, in order of time.
     pub(super) segments: Vec<Segment>,
-    /// When the vehicle was there, as far as it was forgotten.
+    /// Interval covered by the discarded segments.
     pub(super) presence: Option<Presence>,
-    /// Where it was last seen, by its clock.
+    /// Last sample, with the clock offset.
     last: Option<Sample>,
-    /// How many intervals between samples were joined, and how long they were in all \[s\].
+    /// Number of joined intervals between samples, and their total length \[s\].
     joined: (u64, f64),
-    /// Speed over the last interval \[m/s\] and its length \[s\].
+    /// Mean velocity over the last interval \[m/s\], and its length \[s\].
     last_interval: Option<(Vector3<f64>, f64)>,
     pub(super) contradiction: Option<Contradiction>,
 }
@@ -63,7 +63,7 @@ impl Vehicle {
         let radius_m = own.radius_m.or(settings.radius_m);
         Self {
             name: name.to_owned(),
-            asked_for: settings.only.as_ref().is_none_or(|only| only.contains(name)),
+            is_selected: settings.only.as_ref().is_none_or(|only| only.contains(name)),
             offset_s: own.offset_s,
             motion: settings.motion,
             max_accel_m_s2: own.max_accel_m_s2.or(settings.max_accel_m_s2).unwrap_or(f64::NAN),
@@ -82,32 +82,32 @@ impl Vehicle {
         }
     }
 
-    /// Whether it can be judged, once it was seen.
+    /// Checks after the first sample that the vehicle can be judged.
     pub(super) fn check(&self, settings: &Settings) -> Result<(), RecordedError> {
         if self.motion == Some(Interpolation::Bounded) && self.max_accel_m_s2.is_nan() {
             return Err(RecordedError::NoBound { vehicle: self.name.clone() });
         }
-        if settings.asks_for_separation() && !self.has_limit(settings) {
+        if settings.has_separation_limit() && !self.has_limit(settings) {
             return Err(RecordedError::NoLimit { vehicle: self.name.clone() });
         }
         Ok(())
     }
 
-    /// Whether something says how close another may come to it.
+    /// Returns whether the vehicle has a limit on its separation.
     pub(super) fn has_limit(&self, settings: &Settings) -> bool {
         let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some();
         limited || self.radius_m.is_some_and(|radius_m| radius_m >= MIN_LIMIT_M)
     }
 
-    /// Whether it was asked for and there.
+    /// Returns whether the vehicle is selected and present.
     pub(super) fn is_judged(&self) -> bool {
-        self.asked_for && self.presence.is_some()
+        self.is_selected && self.presence.is_some()
     }
 
-    /// How its items are taken by what follows it alone.
-    pub(super) fn seen(&self, after_gap: bool) -> Seen {
+    /// Returns the context for the limits on single vehicles.
+    pub(super) fn item_context(&self, after_gap: bool) -> ItemContext {
         let bounded_by_m_s2 = (self.motion == Some(Interpolation::Bounded)).then_some(self.max_accel_m_s2);
-        Seen { offset_s: self.offset_s, after_gap, bounded_by_m_s2 }
+        ItemContext { offset_s: self.offset_s, after_gap, bounded_by_m_s2 }
     }
 
     #[inline]
@@ -115,18 +115,18 @@ impl Vehicle {
         self.last.is_none()
     }
 
-    /// Mean interval between two of its samples \[s\]; 0 of curves.
+    /// Returns the mean interval between two samples \[s\]; 0 for curves.
     pub(super) fn mean_interval_s(&self) -> f64 {
         let (count, all_s) = self.joined;
         if count > 0 { all_s / count as f64 } else { 0.0 }
     }
 
-    /// Up to when the vehicle is known \[s\].
+    /// Returns the time up to which the motion is known \[s\].
     pub(super) fn known_s(&self) -> f64 {
         self.last.map_or(f64::NEG_INFINITY, |last| last.time_s)
     }
 
-    /// Takes what is said of it next; returns the gap before it, if there is one.
+    /// Adds the next item; returns the gap before it, if any.
     #[inline]
     pub(super) fn take(&mut self, item: &Item) -> Result<Option<Gap>, RecordedError> {
         match item {
@@ -135,7 +135,7 @@ impl Vehicle {
         }
     }
 
-    /// Takes a sample; returns the gap before it, if there is one.
+    /// Adds a sample; returns the gap before it, if any.
     #[inline]
     fn sample(&mut self, sample: &Sample) -> Result<Option<Gap>, RecordedError> {
         let motion = self.motion.unwrap_or(Interpolation::Linear);
@@ -164,15 +164,15 @@ impl Vehicle {
                 self.joined = (self.joined.0 + 1, self.joined.1 + (time_s - from_s));
                 let to = self.scaled(sample.position_m);
                 match motion {
-                    Interpolation::Linear | Interpolation::Polynomial => self.keep_straight((from_s, time_s), from, to),
+                    Interpolation::Linear | Interpolation::Polynomial => self.add_straight((from_s, time_s), from, to),
                     Interpolation::Hold => {
-                        self.keep_straight((from_s, time_s), from, from);
-                        self.keep_straight((time_s, time_s), from, to);
+                        self.add_straight((from_s, time_s), from, from);
+                        self.add_straight((time_s, time_s), from, to);
                     }
                     Interpolation::Bounded => {
                         let last = *last;
-                        self.compare_with_bound(&last, &seen);
-                        self.keep_bounded(&last, &seen);
+                        self.check_bound(&last, &seen);
+                        self.add_bounded(&last, &seen);
                     }
                 }
             }
@@ -180,14 +180,14 @@ impl Vehicle {
                 gap = last.map(|last| Gap::new(sample.vehicle, last.time_s, time_s));
                 self.last_interval = None;
                 let at = self.scaled(sample.position_m);
-                self.keep_straight((time_s, time_s), at, at);
+                self.add_straight((time_s, time_s), at, at);
             }
         }
         self.last = Some(seen);
         Ok(gap)
     }
 
-    /// Takes a piece of a curve; returns the gap before it, if there is one.
+    /// Adds a piece of a curve; returns the gap before it, if any.
     fn piece(&mut self, piece: &Piece) -> Result<Option<Gap>, RecordedError> {
         if !matches!(self.motion, None | Some(Interpolation::Polynomial)) {
             return Err(RecordedError::NotSamples { vehicle: self.name.clone() });
@@ -204,40 +204,38 @@ impl Vehicle {
             }
             Some(last) if from_s - last.time_s <= self.max_gap_s.max(SAME_INSTANT_S) => {
                 if last.position_m != start || last.time_s != from_s {
-                    self.keep_straight((last.time_s.min(from_s), from_s), last.position_m, start);
+                    self.add_straight((last.time_s.min(from_s), from_s), last.position_m, start);
                 }
             }
             last => gap = last.map(|last| Gap::new(piece.vehicle, last.time_s, from_s)),
         }
-        self.keep(&segment);
+        self.add_segment(&segment);
         Ok(gap)
     }
 
     fn curve(&self, curve: Curve) -> Result<Segment, RecordedError> {
-        let wrong = |what: &str| Err(self.wrong(curve.from_s, what.to_owned()));
-        if !(1..=MOST_COEFFICIENTS).contains(&curve.coefficients.len()) {
+        let invalid = |what: &str| Err(self.invalid(curve.from_s, what.to_owned()));
+        if !(1..=MAX_COEFFICIENTS).contains(&curve.coefficients.len()) {
             let count = curve.coefficients.len();
-            return wrong(&format!(
-                "the piece has {count} coefficients, and can be judged with 1 to {MOST_COEFFICIENTS}"
-            ));
+            return invalid(&format!("the piece must have 1 to {MAX_COEFFICIENTS} coefficients, got {count}"));
         }
         if !(curve.from_s.is_finite() && curve.to_s.is_finite() && curve.to_s > curve.from_s) {
-            return wrong("the piece does not end after it begins");
+            return invalid("the piece must end after it begins");
         }
         let length = curve.to_s - curve.from_s;
         let reach = curve.coefficients.iter().rev().fold(0.0, |sum, c| sum * length + c.abs().sum());
         if reach.is_nan() || reach > MAX_LENGTH_M {
-            return wrong("a coefficient is not a finite number, or leads beyond 1e70 m");
+            return invalid("a coefficient is not a finite number, or exceeds 1e70 m");
         }
         Ok(Segment::curved(curve))
     }
 
-    /// Keeps the chord, or the cubic, between two samples, and how far the vehicle can be from it.
+    /// Adds the chord, or the cubic, between two samples, with the bound on the vehicle's distance from it.
     #[inline(never)]
-    fn keep_bounded(&mut self, last: &Sample, seen: &Sample) {
+    fn add_bounded(&mut self, last: &Sample, seen: &Sample) {
         let h = seen.time_s - last.time_s;
         let (from, to) = (self.scaled(last.position_m), self.scaled(seen.position_m));
-        // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest.
+        // Lengths are divided by the axes of the ellipsoid, so deviations by its shortest axis.
         let accel = self.max_accel_m_s2 * self.scale.map_or(1.0, |scale| scale.max()) * (1.0 + 4.0 * f64::EPSILON);
         let (coefficients, deviation) = match last.velocity_m_s.zip(seen.velocity_m_s) {
             Some((start, end)) => {
@@ -249,11 +247,11 @@ impl Vehicle {
             None => (vec![from, (to - from) / h], Deviation { peak: accel * h * h / 8.0, hermite: false }),
         };
         let curve = Curve { from_s: last.time_s, to_s: seen.time_s, coefficients, deviation };
-        self.keep(&Segment { from, to, ..Segment::curved(curve) });
+        self.add_segment(&Segment { from, to, ..Segment::curved(curve) });
     }
 
-    /// Notes where two samples, or three without velocities, cannot be joined within the bound.
-    fn compare_with_bound(&mut self, last: &Sample, seen: &Sample) {
+    /// Records a contradiction if two samples, or three without velocities, cannot be joined within the bound.
+    fn check_bound(&mut self, last: &Sample, seen: &Sample) {
         let h = seen.time_s - last.time_s;
         let mean = (seen.position_m - last.position_m) / h;
         let rounding = 4.0 * f64::EPSILON * (seen.position_m.norm() + last.position_m.norm()) / (h * h);
@@ -281,20 +279,19 @@ impl Vehicle {
         }
     }
 
-    /// Keeps what is asked for of a straight segment. Where that is all of it, it is written in place: it is what most
-    /// recordings consist of.
+    /// Adds the part of a straight segment in the window. The common case of a whole segment is written in place.
     #[inline]
-    fn keep_straight(&mut self, (from_s, to_s): (f64, f64), from: Vector3<f64>, to: Vector3<f64>) {
+    fn add_straight(&mut self, (from_s, to_s): (f64, f64), from: Vector3<f64>, to: Vector3<f64>) {
         if self.window.from_s <= from_s && to_s <= self.window.to_s && self.above_m.is_none() {
             self.segments.push(Segment::straight(from_s, to_s, from, to));
         } else {
-            self.keep(&Segment::straight(from_s, to_s, from, to));
+            self.add_segment(&Segment::straight(from_s, to_s, from, to));
         }
     }
 
-    /// Keeps what is asked for of any segment.
+    /// Adds the part of a segment in the window, split at the height of the ground.
     #[inline(never)]
-    fn keep(&mut self, segment: &Segment) {
+    fn add_segment(&mut self, segment: &Segment) {
         let Some(segment) = segment.clipped(self.window) else { return };
         match self.above_m {
             None => self.segments.push(segment),
@@ -317,20 +314,20 @@ impl Vehicle {
     fn check_sample(&self, sample: &Sample) -> Result<(), RecordedError> {
         let what = if !sample.time_s.is_finite() {
             "the time"
-        } else if !is_near(&sample.position_m) {
+        } else if !is_in_range(&sample.position_m) {
             "the position"
-        } else if sample.velocity_m_s.is_some_and(|v| !is_near(&v)) {
+        } else if sample.velocity_m_s.is_some_and(|v| !is_in_range(&v)) {
             "the velocity"
         } else if sample.radius_m.is_some_and(|radius_m| !(0.0..=MAX_LENGTH_M).contains(&radius_m)) {
             "the radius, which must not be below 0 m,"
         } else {
             return Ok(());
         };
-        Err(self.wrong(sample.time_s, format!("{what} is not a finite number below 1e70")))
+        Err(self.invalid(sample.time_s, format!("{what} is not a finite number below 1e70")))
     }
 
     #[cold]
-    fn wrong(&self, time_s: f64, what: String) -> RecordedError {
+    fn invalid(&self, time_s: f64, what: String) -> RecordedError {
         RecordedError::Item { vehicle: self.name.clone(), time_s, what }
     }
 
@@ -339,8 +336,8 @@ impl Vehicle {
         RecordedError::TimeNotIncreasing { vehicle: self.name.clone(), previous_s, time_s }
     }
 
-    /// Forgets what ended by a time, and says how many segments that were.
-    pub(super) fn forget(&mut self, until_s: f64) -> usize {
+    /// Discards the segments that ended by a time; returns their number.
+    pub(super) fn discard_until(&mut self, until_s: f64) -> usize {
         let all = self.segments.last().is_none_or(|last| last.to_s <= until_s);
         let done = if all { self.segments.len() } else { self.segments.partition_point(|part| part.to_s <= until_s) };
         if let Some((first, last)) = self.segments[..done].first().zip(self.segments[..done].last()) {
@@ -351,12 +348,12 @@ impl Vehicle {
     }
 }
 
-fn is_near(v: &Vector3<f64>) -> bool {
+fn is_in_range(v: &Vector3<f64>) -> bool {
     (v.x.abs() <= MAX_LENGTH_M) & (v.y.abs() <= MAX_LENGTH_M) & (v.z.abs() <= MAX_LENGTH_M)
 }
 
-/// Splits a segment where it passes a height and says which parts are on the ground. A jump is on the ground if both ends
-/// are; what cannot be told on a curve within some work is left open.
+/// Splits a segment where it passes a height and marks the parts on the ground. A jump is on the ground if both ends
+/// are. A part of a curve that is not classified within the allowed work stays unknown.
 fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
     let (low, high) = (segment.from.z.min(segment.to.z), segment.from.z.max(segment.to.z));
     if segment.curve().is_some() {
@@ -367,7 +364,7 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
         let share = (height - segment.from.z) / (segment.to.z - segment.from.z);
         let starts_low = segment.from.z <= height;
         let mut at_s = segment.from_s + (segment.to_s - segment.from_s) * share.clamp(0.0, 1.0);
-        // Rounded towards the time on the ground, so that no time in the air is left out.
+        // Rounded towards the time on the ground, so that no time in the air is lost.
         let line = segment.line();
         while segment.from_s < at_s && at_s < segment.to_s && compare_height(&line, at_s, height).is_gt() {
             at_s = if starts_low { at_s.next_down() } else { at_s.next_up() };
@@ -391,12 +388,12 @@ fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>
         match BernsteinBasis::of_degree(above.len() - 1).range(&above) {
             (_, high) if high <= 0.0 => Some(true),
             (low, _) if low > 0.0 => Some(false),
-            // Where the height is passed: so short that it is not worth a doubt.
+            // The height is crossed here; so short a part counts as in the air.
             _ if length <= SHORTEST_PART => Some(false),
             _ => None,
         }
     };
-    for (start, end, grounded) in parts_told(0.0, MOST_PARTS, on_ground) {
+    for (start, end, grounded) in classify_parts(0.0, MAX_PARTS, on_ground) {
         let part = segment.clipped(Interval { from_s: at(start), to_s: at(end) });
         into.extend(part.map(|part| Segment { grounded, ..part }));
     }
@@ -413,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn a_climb_leaves_the_ground_where_it_passes_the_height() {
+    fn a_climb_is_split_at_the_height_of_the_ground() {
         let climb = Segment::straight(0.0, 4.0, Vector3::zeros(), Vector3::new(0.0, 0.0, 2.0));
         assert_eq!(parts(climb.clone(), 0.5), [(0.0, 1.0, true), (1.0, 4.0, false)]);
         assert_eq!(parts(climb.clone(), 2.0), [(0.0, 4.0, true)]);
@@ -423,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hop_on_a_curve_is_above_between_its_two_crossings() {
+    fn a_curve_is_split_at_both_crossings_of_the_ground() {
         // z = 4 u (1 - u): above 0.75 between 1/4 and 3/4.
         let coefficients = vec![Vector3::zeros(), Vector3::new(0.0, 0.0, 4.0), Vector3::new(0.0, 0.0, -4.0)];
         let hop = Segment::curved(Curve { from_s: 0.0, to_s: 1.0, coefficients, deviation: Deviation::default() });

@@ -1,10 +1,10 @@
-//! A window of time: which pairs can matter in it.
+//! Selection of the pairs to sweep in a window of time.
 //!
-//! Over the window every vehicle is near the chord, the straight way between where it is at both ends; how far it strays
-//! from that is the largest distance at its own corners, each against the place on the chord at the same time. So two
-//! vehicles are at least as far apart as their chords are, less what both stray: one closed form for a whole window, which
-//! is as sharp for a swarm that flies together as for one that rests. Sort and sweep along the longest axis finds the pairs
-//! to compare. A window in which too many pairs remain is halved.
+//! Over the window every vehicle is near its chord: the uniform motion between its positions at both ends. Its stray is
+//! the largest distance of its corners from the chord at the same time. Two vehicles are at least as far apart as their
+//! chords, less both strays. This is one closed form for a whole window, and equally sharp for swarms at rest and in
+//! common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with too many remaining
+//! pairs is halved.
 
 use std::mem;
 use std::ops::Range;
@@ -15,7 +15,7 @@ use super::settings::Limits;
 use super::vehicle::Vehicle;
 use crate::cross_check::KeepOut;
 use crate::enclosure::Target;
-use crate::ledger::{KEPT, Results};
+use crate::ledger::{MAX_KEPT, Results};
 use crate::obstacle::Obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;
@@ -24,21 +24,21 @@ use crate::segment::Segment;
 use crate::sweep::{Interval, RelativeMotion, larger};
 use tautline_core::swarm::Pair;
 
-/// With more pairs left than this for each vehicle a window is halved.
+/// Number of remaining pairs per vehicle above which a window is halved.
 const PAIRS_PER_VEHICLE: usize = 4;
-/// With more pairs left than this in one that is not halved they are swept before others are looked for.
-const MOST_LISTED: usize = 1 << 20;
-/// Fewest segments per vehicle of a window that is halved, unless the window has curves.
-const FEWEST_SEGMENTS: usize = 4;
-/// A window is not halved more often than this.
-const MOST_HALVINGS: u32 = 12;
-/// Neighbours in the order of the sort that are compared first, so that the closest pairs are known roughly.
+/// Number of listed pairs in a window that is not halved above which they are swept before others are collected.
+const MAX_LISTED: usize = 1 << 20;
+/// Smallest number of segments per vehicle in a window that is halved, unless the window has curves.
+const MIN_SEGMENTS: usize = 4;
+/// Largest number of times that a window is halved.
+const MAX_HALVINGS: u32 = 12;
+/// Number of neighbours in sort order that are compared first, for a rough bound of the closest pairs.
 const FIRST_NEIGHBOURS: u32 = 12;
-/// Rounding of a distance from a chord, and of chords from each other, relative to the coordinates that they join: at most
+/// Rounding of a distance from a chord, and of the distance of two chords, relative to their coordinates: at most
 /// sixteen operations.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Where a vehicle is over a window.
+/// Bounds of the positions of a vehicle over a window.
 #[derive(Clone, Debug)]
 struct Extent {
     low: Vector3<f64>,
@@ -50,7 +50,7 @@ struct Extent {
     segments: Range<usize>,
 }
 
-/// The windows of a recording, one after the other; keeps its memory.
+/// Selects and sweeps the pairs of a recording, window after window; reuses its memory.
 #[derive(Clone, Debug)]
 pub(super) struct Windows {
     limits: Limits,
@@ -59,21 +59,21 @@ pub(super) struct Windows {
     /// Obstacles, each with its path.
     obstacles: Vec<(Obstacle, Vec<Segment>)>,
     extents: Vec<Extent>,
-    near: Vec<Near>,
+    near: Vec<ExtentPair>,
 }
 
-/// Two extents, and how close their chords come.
+/// Pair of extents with the smallest distance of their chords.
 #[derive(Clone, Copy, Debug)]
-struct Near {
+struct ExtentPair {
     first: u32,
     second: u32,
-    /// Smallest distance of the chords, squared.
+    /// Smallest squared distance of the chords.
     squared: f64,
-    /// What both stray.
+    /// Sum of both strays.
     stray: f64,
 }
 
-impl Near {
+impl ExtentPair {
     #[inline]
     fn new(extents: &[Extent], first: u32, second: u32) -> Self {
         let (a, b) = (&extents[first as usize].chord, &extents[second as usize].chord);
@@ -81,7 +81,7 @@ impl Near {
         Self { first, second, squared, stray: a.stray + b.stray }
     }
 
-    /// Whether the two could come closer than a distance; what rounding of positions adds lies within what they stray.
+    /// Returns whether the two could come closer than a distance. The strays include the rounding of positions.
     #[inline]
     fn may_come_within(&self, distance: f64) -> bool {
         let reach = (distance + self.stray) * (1.0 + ROUNDING);
@@ -91,7 +91,7 @@ impl Near {
 
 impl Windows {
     pub(super) fn new(limits: Limits, obstacles: &[Obstacle]) -> Self {
-        // The ground is where nothing but the vehicle matters, so an obstacle always counts as on it.
+        // A pair is skipped if both objects are on the ground, so an obstacle always counts as on the ground.
         let grounded = |part| Segment { grounded: Some(true), ..part };
         let with_path =
             |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
@@ -104,32 +104,32 @@ impl Windows {
         Self { judges: false, ..Self::new(limits, &[]) }
     }
 
-    /// Judges everything in a window.
+    /// Judges all pairs in a window.
     pub(super) fn judge(&mut self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
-        self.halve(vehicles, window, 0, results);
+        self.judge_or_halve(vehicles, window, 0, results);
     }
 
-    fn halve(&mut self, vehicles: &[Vehicle], window: Interval, halvings: u32, results: &mut Results) {
-        results.ledger.begin(window);
+    fn judge_or_halve(&mut self, vehicles: &[Vehicle], window: Interval, halvings: u32, results: &mut Results) {
+        results.ledger.begin_window(window);
         self.extents.clear();
         self.extents.extend(vehicles.iter().enumerate().filter_map(|(k, vehicle)| Extent::over(k, vehicle, window)));
         let count = self.extents.len();
         if count > 1 {
             self.sort();
-            let few = count * (count - 1) / 2 <= KEPT;
+            let few = count * (count - 1) / 2 <= MAX_KEPT;
             if halvings == 0 && !few && results.closest.threshold == f64::INFINITY {
                 self.compare_neighbours(vehicles, window, results);
             }
             let segments: usize = self.extents.iter().map(|extent| extent.segments.len()).sum();
             let curved = self.extents.iter().any(|extent| extent.chord.curved);
-            let fine = segments < FEWEST_SEGMENTS * count && !curved;
+            let is_fine = segments < MIN_SEGMENTS * count && !curved;
             let middle_s = 0.5 * (window.from_s + window.to_s);
-            let whole = fine || halvings == MOST_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
-            let most = if whole { MOST_LISTED } else { PAIRS_PER_VEHICLE * count };
-            let mut done = self.collect(results, 0, most);
-            if !whole && done < count {
-                self.halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
-                self.halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
+            let is_whole = is_fine || halvings == MAX_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
+            let max_pairs = if is_whole { MAX_LISTED } else { PAIRS_PER_VEHICLE * count };
+            let mut done = self.collect_pairs(results, 0, max_pairs);
+            if !is_whole && done < count {
+                self.judge_or_halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
+                self.judge_or_halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
                 return;
             }
             loop {
@@ -139,13 +139,13 @@ impl Windows {
                 if done == count || results.interruption.is_set() {
                     break;
                 }
-                done = self.collect(results, done, most);
+                done = self.collect_pairs(results, done, max_pairs);
             }
         }
         self.sweep_obstacles(vehicles, window, results);
     }
 
-    /// Sorts by the lower end along the axis on which the swarm is longest.
+    /// Sorts the extents by lower end along the axis on which the swarm is longest.
     fn sort(&mut self) {
         let Some(first) = self.extents.first() else { return };
         let (mut low, mut high) = (first.low, first.low);
@@ -153,7 +153,7 @@ impl Windows {
             (low, high) = (low.inf(&extent.low), high.sup(&extent.low));
         }
         let axis = (high - low).imax();
-        // The axis of the sort is the first one from here on.
+        // From here on the first axis is the axis of the sort.
         if axis != 0 {
             for extent in &mut self.extents {
                 extent.low.swap_rows(0, axis);
@@ -163,21 +163,22 @@ impl Windows {
         self.extents.sort_unstable_by(|a, b| a.low[0].total_cmp(&b.low[0]).then(a.vehicle.cmp(&b.vehicle)));
     }
 
-    /// Finds out how close the closest pairs come, and no more: every pair that matters is swept after this.
+    /// Sweeps neighbours to bound the closest distances. Its findings are dropped; every pair that matters is swept
+    /// later.
     fn compare_neighbours(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
         let interruption = results.interruption.clone();
         let mut rough = Results { closest: mem::take(&mut results.closest), interruption, ..Results::default() };
         let count = self.extents.len();
         let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
         for (a, b) in (1..=FIRST_NEIGHBOURS).flat_map(pairs) {
-            self.sweep_vehicles(vehicles, &Near::new(&self.extents, a, b), window, &mut rough);
+            self.sweep_vehicles(vehicles, &ExtentPair::new(&self.extents, a, b), window, &mut rough);
         }
         results.closest = rough.closest;
     }
 
-    /// Lists the pairs that could matter of the extents from one on with later ones, until they are more than `most`; returns
-    /// the extent that follows.
-    fn collect(&mut self, results: &Results, from: usize, most: usize) -> usize {
+    /// Lists the pairs that could matter, of the extents from `from` on with later ones, until they exceed `max_pairs`.
+    /// Returns the index of the next extent.
+    fn collect_pairs(&mut self, results: &Results, from: usize, max_pairs: usize) -> usize {
         let Self { extents, near, limits, judges, .. } = self;
         let limit = |first: f64, second: f64| if *judges { limits.of_vehicles(first, second) } else { 0.0 };
         near.clear();
@@ -195,21 +196,21 @@ impl Windows {
                     .max(a.low[2] - b.high[2])
                     .max(b.low[2] - a.high[2]);
                 if aside <= reach && !(a.grounded && b.grounded) {
-                    let of_both = Near::new(extents, k, l);
+                    let of_both = ExtentPair::new(extents, k, l);
                     if of_both.may_come_within(threshold.max(limit(a.radius, b.radius))) {
                         near.push(of_both);
                     }
                 }
             }
-            if near.len() > most {
+            if near.len() > max_pairs {
                 return k as usize + 1;
             }
         }
         extents.len()
     }
 
-    fn sweep_vehicles(&self, vehicles: &[Vehicle], near: &Near, window: Interval, results: &mut Results) {
-        if !results.goes_on() {
+    fn sweep_vehicles(&self, vehicles: &[Vehicle], near: &ExtentPair, window: Interval, results: &mut Results) {
+        if !results.settle_and_continue() {
             return;
         }
         let (a, b) = (&self.extents[near.first as usize], &self.extents[near.second as usize]);
@@ -234,7 +235,7 @@ impl Windows {
             let path = &path[within(path, window)];
             let place = Chord::over(path, window);
             for extent in self.extents.iter().filter(|extent| !extent.grounded) {
-                if !results.goes_on() {
+                if !results.settle_and_continue() {
                     return;
                 }
                 let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
@@ -257,7 +258,7 @@ impl Windows {
     }
 }
 
-/// The straight way over a window, and how far from it segments stray.
+/// Uniform motion over a window, with the largest distance of segments from it.
 #[derive(Clone, Copy, Debug)]
 struct Chord {
     from: Vector3<f64>,
@@ -267,7 +268,8 @@ struct Chord {
 }
 
 impl Chord {
-    /// Of segments that meet the window, at least one. Where there is none the last place is kept; that only widens.
+    /// Creates the chord of segments that meet the window, at least one. At times without a segment the last position
+    /// is kept, which only widens the stray.
     #[inline]
     fn over(parts: &[Segment], window: Interval) -> Self {
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
@@ -279,7 +281,7 @@ impl Chord {
         let per_s = if to_s > from_s { 1.0 / (to_s - from_s) } else { 0.0 };
         let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
         let mut squared = 0.0;
-        // Where the segment before ends, or the motion begins: mostly where the next segment begins.
+        // End of the segment before, or the start of the motion: usually the start of the next segment.
         let (mut end_s, mut end) = (from_s, from);
         for part in parts {
             let follows = part.from_s == end_s && part.from.x == end.x && part.from.y == end.y && part.from.z == end.z;
@@ -293,16 +295,16 @@ impl Chord {
         }
         let curved = parts.iter().any(|part| part.curve().is_some());
         let beyond = if curved { stray_of_curves(parts, window) } else { 0.0 };
-        // The ends of the chord are interpolated on the first segment and the last one.
+        // The ends of the chord are interpolated on the first and the last segment.
         let rounding = ROUNDING * (from.amax() + to.amax()) + first.rounding() + last.rounding();
-        // Over a time too short to divide by nothing is known of the motion.
+        // In a window too short to divide by, the motion is unbounded.
         let stray =
             if per_s.is_finite() { squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding } else { f64::INFINITY };
         Self { from, to, stray, curved }
     }
 }
 
-/// How far curves stray from the chords of their corners, at most.
+/// Returns a bound on the distance of curves from the chords of their corners.
 #[cold]
 fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
     let curves = parts.iter().filter(|part| part.curve().is_some());
@@ -313,7 +315,7 @@ fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
     strays.fold(0.0, larger)
 }
 
-/// The segments that meet a window; mostly all of them.
+/// Returns the range of segments that meet a window, in most cases all.
 pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) -> Range<usize> {
     let all_end_late = segments.first().is_none_or(|part| part.to_s >= from_s);
     let first = if all_end_late { 0 } else { segments.partition_point(|part| part.to_s < from_s) };
@@ -323,7 +325,7 @@ pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) 
 }
 
 impl Extent {
-    /// Of the segments of a vehicle that meet the window; `None` if there are none.
+    /// Returns the extent of the segments of a vehicle that meet the window; `None` without such segments.
     #[inline]
     fn over(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
         let segments = within(&of.segments, window);
@@ -356,7 +358,7 @@ mod tests {
     use crate::segment::{Curve, Deviation};
 
     #[test]
-    fn a_vehicle_strays_from_its_straight_way_as_far_as_its_corners() {
+    fn the_stray_of_a_vehicle_is_that_of_its_corners() {
         let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
         let parts = [
             Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.5)),
@@ -365,30 +367,30 @@ mod tests {
         let way = Chord::over(&parts, Interval { from_s: 0.0, to_s: 2.0 });
         assert_eq!((way.from, way.to), (at(0.0, 0.0), at(2.0, 0.0)));
         assert!((way.stray - 0.5).abs() < 1e-12 && way.stray >= 0.5);
-        // Half of the way at the wrong time strays along it.
+        // A vehicle that covers the chord at the wrong time strays along it.
         let hurried = [
             Segment::straight(0.0, 0.5, at(0.0, 0.0), at(1.5, 0.0)),
             Segment::straight(0.5, 2.0, at(1.5, 0.0), at(2.0, 0.0)),
         ];
         assert!((Chord::over(&hurried, Interval { from_s: 0.0, to_s: 2.0 }).stray - 1.0).abs() < 1e-12);
-        // A late vehicle is where it appears.
+        // A vehicle that appears late counts as at its first position before.
         let late = [Segment::straight(1.0, 2.0, at(5.0, 0.0), at(5.0, 1.0))];
         let way = Chord::over(&late, Interval { from_s: 0.0, to_s: 2.0 });
         assert_eq!(way.from, at(5.0, 0.0));
         assert!((way.stray - 0.5).abs() < 1e-12);
-        // One that was away strays where it appears again.
+        // A vehicle strays where it appears again after a gap.
         let away = [
             Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.0)),
             Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
         ];
         assert!((Chord::over(&away, Interval { from_s: 0.0, to_s: 4.0 }).stray - 2.0).abs() < 1e-12);
-        // Over a time that cannot be divided by, a vehicle may be anywhere.
+        // In a window too short to divide by, a vehicle may be anywhere.
         let instant = [Segment::straight(0.0, 3e-310, at(0.0, 0.0), at(1.0, 0.0))];
         assert_eq!(Chord::over(&instant, Interval { from_s: 0.0, to_s: 3e-310 }).stray, f64::INFINITY);
     }
 
     #[test]
-    fn only_segments_that_meet_a_window_are_looked_at() {
+    fn only_segments_that_meet_a_window_are_used() {
         let parts = [0.0, 1.0, 2.0].map(|t| Segment::straight(t, t + 1.0, Vector3::zeros(), Vector3::zeros()));
         for ((from_s, to_s), expected) in
             [((0.0, 3.0), 0..3), ((0.5, 1.5), 0..2), ((1.0, 2.0), 0..3), ((2.5, 9.0), 2..3), ((4.0, 9.0), 3..3)]
@@ -399,8 +401,8 @@ mod tests {
     }
 
     #[test]
-    fn who_came_closest_is_the_same_where_nothing_is_held_against_a_limit() {
-        // Forty that fly through each other, every third of them on a curve that may be off.
+    fn the_closest_pairs_are_the_same_without_limits() {
+        // Forty vehicles that fly through each other, every third of them on a curve with a deviation.
         let at = |k: u32, by: f64| {
             Vector3::new(f64::from(k * k % 41) + by, f64::from(k * 17 % 37) * (1.0 - by), f64::from(k % 3))
         };

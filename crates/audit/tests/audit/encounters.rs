@@ -1,4 +1,4 @@
-//! What figures show of two that came close, and straight ways beside curves.
+//! Distances of a pair over time, and straight lines beside curves.
 
 use nalgebra::Vector3;
 use tautline_audit::recorded::{Interpolation, ObjectPair, Outcome, PairSample, PairSeries, Settings};
@@ -6,13 +6,13 @@ use tautline_audit::{Shape, Status};
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Piece, Sample};
 
-use crate::recorded::{asked, pass, seen, thing};
+use crate::recorded::{judge, obstacle_at, pass, seen};
 
 /// Rounding of a handful of operations on numbers around ten.
 const ROUNDING: f64 = 1e-12;
 
-/// Follows two through a recording that is pushed in parts of so many items.
-fn followed(items: &[Item], settings: &Settings, outcome: &Outcome, pair: ObjectPair, part: usize) -> Vec<PairSample> {
+/// Returns the series of a pair for a recording that is pushed in parts of `part` items.
+fn series_of(items: &[Item], settings: &Settings, outcome: &Outcome, pair: ObjectPair, part: usize) -> Vec<PairSample> {
     let mut series = PairSeries::new(settings, outcome, pair).expect("known");
     for part in items.chunks(part) {
         series.push(part).expect("items");
@@ -25,34 +25,37 @@ fn first_two() -> ObjectPair {
 }
 
 #[test]
-fn two_are_followed_from_sample_to_sample_and_where_they_are_closest_between() {
+fn a_series_has_samples_and_closest_approaches() {
     let mut items = pass(1.0);
     items.extend([seen(0, 2.0, [5.0, 0.0, 0.0]), seen(1, 2.0, [5.0, 4.0, 3.0])]);
     let settings = Settings::delta(0.5);
-    let outcome = asked(&items, settings.clone());
+    let outcome = judge(&items, settings.clone());
     let far_m = 101_f64.sqrt();
     for part in [1, 2, 3, 6] {
-        let found = followed(&items, &settings, &outcome, first_two(), part);
-        let mut drawn: Vec<_> = found.iter().map(|sample| (sample.time_s, sample.distance_m)).collect();
-        // The end of a stretch and the begin of the next are one instant.
-        drawn.dedup();
-        assert_eq!(drawn[..3], [(0.0, far_m), (0.5, 1.0), (1.0, far_m)], "{part}");
-        assert_eq!(drawn.last(), Some(&(2.0, 5.0)), "{part}");
-        assert!(drawn.is_sorted_by(|a, b| a.0 <= b.0) && found.iter().all(|sample| !sample.unseen_before), "{drawn:?}");
+        let found = series_of(&items, &settings, &outcome, first_two(), part);
+        let mut times_and_distances: Vec<_> = found.iter().map(|sample| (sample.time_s, sample.distance_m)).collect();
+        // The end of a segment and the start of the next are one instant.
+        times_and_distances.dedup();
+        assert_eq!(times_and_distances[..3], [(0.0, far_m), (0.5, 1.0), (1.0, far_m)], "{part}");
+        assert_eq!(times_and_distances.last(), Some(&(2.0, 5.0)), "{part}");
+        assert!(
+            times_and_distances.is_sorted_by(|a, b| a.0 <= b.0) && found.iter().all(|sample| !sample.unseen_before),
+            "{times_and_distances:?}"
+        );
         let half = found.iter().find(|sample| sample.time_s == 0.5).expect("the closest");
         assert_eq!(half.positions_m, [Vector3::zeros(), Vector3::new(0.0, 1.0, 0.0)]);
         assert!(found.iter().all(|sample| sample.deviation_m == 0.0));
     }
-    // Divided by the axes of an ellipsoid, and drawn where they are.
+    // Distances are divided by the axes of the ellipsoid, positions are not.
     let scaled = Settings { ellipsoid_m: Some(Vector3::new(0.5, 0.25, 1.0)), ..Settings::default() };
-    let outcome = asked(&items, scaled.clone());
-    let found = followed(&items, &scaled, &outcome, first_two(), 6);
+    let outcome = judge(&items, scaled.clone());
+    let found = series_of(&items, &scaled, &outcome, first_two(), 6);
     let half = found.iter().find(|sample| sample.time_s == 0.5).expect("the closest");
     assert_eq!((half.distance_m, half.positions_m[1]), (4.0, Vector3::new(0.0, 1.0, 0.0)));
 }
 
 #[test]
-fn a_time_that_nobody_saw_breaks_what_is_drawn() {
+fn a_gap_interrupts_a_series() {
     let mut items: Vec<_> = (0..12)
         .filter(|k| !(5..8).contains(k))
         .flat_map(|k| {
@@ -62,54 +65,54 @@ fn a_time_that_nobody_saw_breaks_what_is_drawn() {
         .collect();
     items.push(seen(1, 12.0, [3.0, 12.0, 0.0]));
     let settings = Settings::delta(0.5);
-    let outcome = asked(&items, settings.clone());
+    let outcome = judge(&items, settings.clone());
     assert_eq!(outcome.gaps.len(), 2);
     for part in [1, 4, 100] {
-        let found = followed(&items, &settings, &outcome, first_two(), part);
+        let found = series_of(&items, &settings, &outcome, first_two(), part);
         let broken: Vec<_> = found.iter().filter(|sample| sample.unseen_before).map(|sample| sample.time_s).collect();
         assert_eq!(broken, [8.0], "{part}");
-        assert_eq!(found.last().map(|sample| sample.time_s), Some(11.0), "alone it is not drawn");
+        assert_eq!(found.last().map(|sample| sample.time_s), Some(11.0), "one vehicle alone has no distance");
     }
 }
 
 #[test]
-fn a_vehicle_is_followed_past_an_obstacle_by_the_distance_from_its_surface() {
-    let obstacles = vec![thing(Shape::Ball { radius_m: 1.0 }, [0.0, -2.0, 0.0])];
+fn a_series_past_an_obstacle_has_distances_from_its_surface() {
+    let obstacles = vec![obstacle_at(Shape::Ball { radius_m: 1.0 }, [0.0, -2.0, 0.0])];
     let settings = Settings { obstacles, ..Settings::delta(0.5) };
     let items = pass(3.0);
-    let outcome = asked(&items, settings.clone());
+    let outcome = judge(&items, settings.clone());
     let pair = outcome.obstacles[0].pair;
     assert_eq!(pair, ObjectPair::Obstacle { vehicle: 0, obstacle: 0 });
-    let found = followed(&items, &settings, &outcome, pair, 1);
+    let found = series_of(&items, &settings, &outcome, pair, 1);
     let nearest = found.iter().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m)).expect("samples");
     assert!((nearest.distance_m - 1.0).abs() < ROUNDING && (nearest.time_s - 0.5).abs() < ROUNDING, "{nearest:?}");
     assert_eq!(nearest.positions_m[0], Vector3::new(0.0, -2.0, 0.0));
 }
 
-/// A piece of a curve.
+/// Returns a piece of a curve.
 fn piece(vehicle: usize, [from_s, to_s]: [f64; 2], coefficients: &[[f64; 3]]) -> Item {
     Item::Piece(Piece { vehicle, from_s, to_s, coefficients: coefficients.iter().map(|&c| c.into()).collect() })
 }
 
 #[test]
-fn a_straight_way_beside_a_curve_over_a_part_of_it_is_judged_and_drawn_where_it_is() {
-    // From 1 s to 5 s at 2 m/s, and from 2 s to 4 s another beside it, nearest at 3 s by 1 m.
+fn a_line_beside_a_curve_is_judged_over_the_common_time() {
+    // Alpha flies from 1 s to 5 s at 2 m/s. Bravo flies beside it from 2 s to 4 s, closest at 3 s with 1 m.
     let items = [
         seen(0, 1.0, [2.0, 0.0, 0.0]),
         piece(1, [2.0, 4.0], &[[4.0, 2.0, 0.0], [2.0, -2.0, 0.0], [0.0, 1.0, 0.0]]),
         seen(0, 5.0, [10.0, 0.0, 0.0]),
     ];
-    let patient = |delta_m| Settings { max_gap_s: Some(9.0), ..Settings::delta(delta_m) };
-    let outcome = asked(&items, patient(0.999));
+    let with_long_gaps = |delta_m| Settings { max_gap_s: Some(9.0), ..Settings::delta(delta_m) };
+    let outcome = judge(&items, with_long_gaps(0.999));
     let closest = outcome.closest[0];
     assert_eq!(outcome.status, Status::Clear, "{closest:?}");
     assert!(closest.lower_m <= 1.0 && 1.0 <= closest.upper_m + ROUNDING, "{closest:?}");
     assert!(closest.is_known() && (closest.time_s - 3.0).abs() < 1e-3, "{closest:?}");
-    let below = asked(&items, patient(1.25)).violations[0];
+    let below = judge(&items, with_long_gaps(1.25)).violations[0];
     assert!((below.from_s - 2.5).abs() < 1e-6 && (below.to_s - 3.5).abs() < 1e-6, "{below:?}");
-    let settings = patient(0.999);
-    let found = followed(&items, &settings, &outcome, first_two(), 3);
-    assert_eq!(found.len(), 9, "places on a curve");
+    let settings = with_long_gaps(0.999);
+    let found = series_of(&items, &settings, &outcome, first_two(), 3);
+    assert_eq!(found.len(), 9, "points on a curve");
     for sample in found {
         let expected_m = 1.0 + (sample.time_s - 3.0).powi(2);
         assert!((sample.distance_m - expected_m).abs() < ROUNDING, "{sample:?}");
@@ -117,8 +120,8 @@ fn a_straight_way_beside_a_curve_over_a_part_of_it_is_judged_and_drawn_where_it_
 }
 
 #[test]
-fn what_is_drawn_through_positions_and_velocities_is_their_cubic() {
-    // x = 5 - 9 u + 12 u^2 - 5 u^3 of the fraction u of 2 s, past one that stands.
+fn a_series_through_velocities_follows_the_cubic() {
+    // x = 5 - 9 u + 12 u^2 - 5 u^3 of the fraction u of 2 s, past a vehicle at rest.
     let cubic = |u: f64| 5.0 - 9.0 * u + 12.0 * u * u - 5.0 * u * u * u;
     let sample = |vehicle, time_s, x: f64, speed: f64| {
         let (position_m, velocity_m_s) = (Vector3::new(x, 0.0, 0.0), Some(Vector3::new(speed, 0.0, 0.0)));
@@ -134,27 +137,27 @@ fn what_is_drawn_through_positions_and_velocities_is_their_cubic() {
     ];
     let settings = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(6.0), ..Settings::delta(0.1) };
     let settings = Settings { max_gap_s: Some(9.0), ..settings };
-    let outcome = asked(&items, settings.clone());
+    let outcome = judge(&items, settings.clone());
     assert_eq!(outcome.contradiction, None);
-    let found = followed(&items, &settings, &outcome, first_two(), 6);
-    assert!(found.len() >= 18, "places on two stretches");
+    let found = series_of(&items, &settings, &outcome, first_two(), 6);
+    assert!(found.len() >= 18, "points on two intervals");
     for sample in &found {
         let u = 0.5 * (sample.time_s - 2.0).min(2.0);
         assert!((sample.distance_m - cubic(u)).abs() < ROUNDING, "{sample:?}");
     }
-    // By A h^2 / 16 for each of the two, in the middle.
+    // A h^2 / 16 for each of the two, in the middle.
     for (middle_s, expected_m) in [(3.0, 3.0), (6.0, 12.0)] {
-        let middle = found.iter().find(|sample| sample.time_s == middle_s).expect("a place");
+        let middle = found.iter().find(|sample| sample.time_s == middle_s).expect("a point");
         assert!((middle.deviation_m - expected_m).abs() < ROUNDING, "{middle:?}");
     }
 }
 
 #[test]
-fn two_curves_that_are_one_are_no_distance_apart() {
+fn identical_curves_have_no_distance() {
     let both = |coefficients: &[[f64; 3]]| [piece(0, [0.0, 1.0], coefficients), piece(1, [0.0, 1.0], coefficients)];
     for coefficients in [&[[3.0, 2.0, 1.0]][..], &[[3.0, 2.0, 1.0], [1.0, 0.0, 0.0]]] {
-        let outcome = asked(&both(coefficients), Settings::delta(1.0));
-        // Bounds on curves round outwards.
+        let outcome = judge(&both(coefficients), Settings::delta(1.0));
+        // Bounds on curves are rounded outwards.
         let found = outcome.closest[0];
         assert!(found.lower_m == 0.0 && (0.0..1e-13).contains(&found.upper_m), "{found:?}");
         assert_eq!(outcome.status, Status::Violation);
@@ -164,7 +167,7 @@ fn two_curves_that_are_one_are_no_distance_apart() {
 }
 
 #[test]
-fn a_curve_that_is_back_at_the_limit_for_an_instant_is_too_close_twice() {
+fn a_curve_that_touches_the_limit_for_an_instant_is_two_violations() {
     let items = |apart_m: f64| {
         [
             piece(0, [0.0, 2.0], &[[0.0; 3]]),
@@ -173,13 +176,13 @@ fn a_curve_that_is_back_at_the_limit_for_an_instant_is_too_close_twice() {
         ]
     };
     for (apart_m, expected) in [(2.0, 2), (1.75, 1), (2.5, 2)] {
-        let outcome = asked(&items(apart_m), Settings::delta(2.0));
+        let outcome = judge(&items(apart_m), Settings::delta(2.0));
         assert_eq!(outcome.violations.len(), expected, "{apart_m}: {:?}", outcome.violations);
     }
 }
 
 #[test]
-fn a_curve_that_jumps_past_a_curve_meets_it() {
+fn a_jump_of_a_curve_past_a_curve_is_swept() {
     // Bravo jumps at 1 s from one side of alpha to the other.
     let items = |aside_m: f64| {
         [
@@ -188,8 +191,8 @@ fn a_curve_that_jumps_past_a_curve_meets_it() {
             piece(1, [1.0, 2.0], &[[5.0, aside_m, 1.5], [0.0, 0.0, 2.0], [0.0, 0.0, 0.5]]),
         ]
     };
-    let met = asked(&items(0.5), Settings::delta(1.0));
+    let met = judge(&items(0.5), Settings::delta(1.0));
     assert_eq!(met.status, Status::Violation);
     assert!((met.closest[0].upper_m - 0.5).abs() < 1e-8 && met.closest[0].time_s == 1.0, "{:?}", met.closest);
-    assert_eq!(asked(&items(1.5), Settings::delta(1.0)).status, Status::Clear);
+    assert_eq!(judge(&items(1.5), Settings::delta(1.0)).status, Status::Clear);
 }

@@ -1,5 +1,4 @@
-//! Limits on each vehicle by itself: what is told of them is true of motions that are known in closed form, between samples
-//! too, and what samples do not tell is not said.
+//! Limits on single vehicles: compared with motions that are known in closed form, between samples too.
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
@@ -9,7 +8,7 @@ use tautline_core::track::{Item, Piece, Sample};
 
 const RADIUS_M: f64 = 5.0;
 const RATE_PER_S: f64 = 2.0;
-/// Of a circle: its speed \[m/s\] and acceleration \[m/s^2\].
+/// Speed \[m/s\] and acceleration \[m/s^2\] on the circle.
 const SPEED: f64 = RADIUS_M * RATE_PER_S;
 const ACCEL: f64 = SPEED * RATE_PER_S;
 
@@ -18,7 +17,7 @@ fn limits(limits: &[(Quantity, f64)]) -> Envelope {
     Envelope { limits, fence: None }
 }
 
-fn asked(envelope: Envelope) -> Settings {
+fn with_envelope(envelope: Envelope) -> Settings {
     Settings { envelope, ..Settings::default() }
 }
 
@@ -26,7 +25,7 @@ fn sample(time_s: f64, position_m: Vector3<f64>, velocity_m_s: Option<Vector3<f6
     Item::Sample(Sample { vehicle: 0, time_s, position_m, velocity_m_s, radius_m: None })
 }
 
-/// A circle at 10 m height, sampled `hz` times a second for 10 s.
+/// Returns a circle at a height of 10 m, sampled at `hz` for 10 s.
 fn circle(hz: u32, with_velocity: bool) -> Vec<Item> {
     let at = |k: u32| {
         let (sin, cos) = (RATE_PER_S * f64::from(k) / f64::from(hz)).sin_cos();
@@ -38,17 +37,17 @@ fn circle(hz: u32, with_velocity: bool) -> Vec<Item> {
 
 fn judged(items: &[Item], settings: Settings) -> (Status, Vec<LimitOutcome>) {
     let outcome = audit(&["one".to_owned()], items, settings).expect("a verdict");
-    assert_eq!(outcome.separation, None, "one vehicle is asked about by itself");
+    assert_eq!(outcome.separation, None, "one vehicle has no separation");
     (outcome.status, outcome.envelope.limits)
 }
 
 #[test]
-fn chords_tell_no_more_speed_than_was_flown_and_bounds_no_less() {
+fn the_enclosure_of_the_speed_contains_the_true_speed() {
     for (hz, with_velocity) in [(10, false), (10, true), (50, false), (50, true)] {
         let bounded = Settings {
             motion: Some(Interpolation::Bounded),
             max_accel_m_s2: Some(ACCEL * 1.01),
-            ..asked(limits(&[(Quantity::Speed, SPEED), (Quantity::HorizontalSpeed, 2.0 * SPEED)]))
+            ..with_envelope(limits(&[(Quantity::Speed, SPEED), (Quantity::HorizontalSpeed, 2.0 * SPEED)]))
         };
         let (_, found) = judged(&circle(hz, with_velocity), bounded);
         let extreme = found[0].extreme.expect("a speed");
@@ -60,43 +59,45 @@ fn chords_tell_no_more_speed_than_was_flown_and_bounds_no_less() {
 }
 
 #[test]
-fn a_limit_between_what_samples_show_and_what_a_bound_allows_is_undecided() {
+fn a_limit_inside_the_enclosure_is_undecided() {
     let settings = |limit| Settings {
         motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(ACCEL * 1.01),
-        ..asked(limits(&[(Quantity::Speed, limit)]))
+        ..with_envelope(limits(&[(Quantity::Speed, limit)]))
     };
     let items = circle(20, false);
     let status = |limit| judged(&items, settings(limit)).0;
     assert_eq!(
-        [0.9, 1.0, 1.2].map(|share| status(share * SPEED)),
+        [0.9, 1.0, 1.2].map(|factor| status(factor * SPEED)),
         [Status::Violation, Status::Undecided, Status::Clear]
     );
 }
 
 #[test]
-fn accelerations_of_samples_are_those_of_three_and_say_so() {
+fn accelerations_of_samples_come_from_parabolas() {
     let items = circle(100, false);
-    let (status, found) = judged(&items, asked(limits(&[(Quantity::Acceleration, 1.001 * ACCEL)])));
+    let (status, found) = judged(&items, with_envelope(limits(&[(Quantity::Acceleration, 1.001 * ACCEL)])));
     let extreme = found[0].extreme.expect("an acceleration");
     assert!(status == Status::Clear && found[0].assumes.is_some());
     assert!((extreme.upper / ACCEL - 1.0).abs() < 1e-3, "{extreme:?}");
-    let (status, found) = judged(&items, asked(limits(&[(Quantity::Acceleration, 0.99 * ACCEL)])));
+    let (status, found) = judged(&items, with_envelope(limits(&[(Quantity::Acceleration, 0.99 * ACCEL)])));
     assert_eq!(status, Status::Violation);
-    let [violation] = found[0].violations[..] else { panic!("one long violation, not {}", found[0].violations.len()) };
+    let [violation] = found[0].violations[..] else {
+        panic!("expected one violation, got {}", found[0].violations.len())
+    };
     assert!(violation.from_s == 0.0 && violation.to_s == 10.0);
 }
 
 #[test]
-fn recorded_velocities_ask_for_the_accelerations_that_the_way_between_them_needs() {
+fn recorded_velocities_determine_the_needed_acceleration() {
     let along = |x: f64| Vector3::new(x, 0.0, 10.0);
     let speed = |x: f64| Some(Vector3::new(x, 0.0, 0.0));
-    // From 0 to 4 m in 2 s: whoever has another velocity at an end is accelerated by twice the difference over 2 s, on average.
+    // From 0 to 4 m in 2 s. Another velocity at an end needs a mean acceleration of twice the difference over 2 s.
     for ([start_m_s, end_m_s], needed_m_s2) in
         [([2.0, 2.0], 0.0), ([-3.0, 2.0], 5.0), ([2.0, -5.0], 7.0), ([0.0, 4.0], 2.0)]
     {
         let items = [sample(0.0, along(0.0), speed(start_m_s)), sample(2.0, along(4.0), speed(end_m_s))];
-        let (_, found) = judged(&items, asked(limits(&[(Quantity::Acceleration, 1.0)])));
+        let (_, found) = judged(&items, with_envelope(limits(&[(Quantity::Acceleration, 1.0)])));
         let extreme = found[0].extreme.expect("an acceleration");
         assert!((extreme.upper - needed_m_s2).abs() < 1e-9, "{start_m_s} {end_m_s}: {extreme:?}");
     }
@@ -113,7 +114,7 @@ fn curves_are_judged_between_their_ends() {
     };
     let items = [Item::Piece(arc(0))];
     let root = 2.0_f64.sqrt();
-    let at = |quantity, allowed| judged(&items, asked(limits(&[(quantity, allowed)])));
+    let at = |quantity, allowed| judged(&items, with_envelope(limits(&[(quantity, allowed)])));
     for (quantity, reached) in [
         (Quantity::Speed, 2.0 * root),
         (Quantity::HorizontalSpeed, 2.0),
@@ -133,7 +134,7 @@ fn curves_are_judged_between_their_ends() {
 }
 
 #[test]
-fn corners_of_curves_are_reported_apart_and_curves_that_jump_have_no_speed() {
+fn corners_of_curves_are_counted_and_jumps_are_undecided() {
     let piece = |from_s: f64, at: [f64; 3], by: [f64; 3]| {
         Item::Piece(Piece {
             vehicle: 0,
@@ -143,73 +144,75 @@ fn corners_of_curves_are_reported_apart_and_curves_that_jump_have_no_speed() {
         })
     };
     let fast = [(Quantity::Speed, 9.0), (Quantity::Acceleration, 9.0)];
-    let of =
-        |items: &[Item]| judged(items, asked(limits(&fast))).1.iter().map(|found| found.status).collect::<Vec<_>>();
+    let of = |items: &[Item]| {
+        judged(items, with_envelope(limits(&fast))).1.iter().map(|found| found.status).collect::<Vec<_>>()
+    };
     let corner = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])];
     assert_eq!(of(&corner), [Status::Clear, Status::Clear]);
-    let found = judged(&corner, asked(limits(&fast))).1[1].corners.expect("a corner");
+    let found = judged(&corner, with_envelope(limits(&fast))).1[1].corners.expect("a corner");
     assert_eq!((found.count, found.largest.vehicle, found.largest.at_s), (1, 0, 1.0));
     assert!((found.largest.by_m_s - 2.0_f64.sqrt()).abs() < 1e-12);
     let jump = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.5, 0.0, 0.0], [1.0, 0.0, 0.0])];
     assert_eq!(of(&jump), [Status::Undecided, Status::Undecided]);
     let smooth = [piece(0.0, [0.0; 3], [1.0, 0.0, 0.0]), piece(1.0, [1.000_01, 0.0, 0.0], [1.0, 0.0, 0.0])];
     assert_eq!(of(&smooth), [Status::Clear, Status::Clear]);
-    assert_eq!(judged(&smooth, asked(limits(&fast))).1[1].corners, None);
+    assert_eq!(judged(&smooth, with_envelope(limits(&fast))).1[1].corners, None);
 }
 
 #[test]
-fn a_fence_holds_between_samples_that_are_both_within() {
+fn a_fence_is_checked_between_samples() {
     let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [5.0, 5.0], [5.0, 10.0], [0.0, 10.0]];
     let fence = |margin_m| Envelope {
         limits: Vec::new(),
         fence: Some(Fence::new(&corners, Some([0.0, 20.0]), margin_m).expect("a fence")),
     };
     let flight = |to: [f64; 3]| [sample(0.0, Vector3::new(9.0, 4.0, 10.0), None), sample(1.0, Vector3::from(to), None)];
-    let (status, found) = judged(&flight([4.0, 9.0, 10.0]), asked(fence(0.0)));
+    let (status, found) = judged(&flight([4.0, 9.0, 10.0]), with_envelope(fence(0.0)));
     assert_eq!(status, Status::Violation, "the corner is cut");
-    assert!((found[0].extreme.expect("room").lower + 1.5).abs() < 1e-12);
-    assert_eq!(judged(&flight([1.0, 4.0, 10.0]), asked(fence(1.0))).0, Status::Clear);
-    assert_eq!(judged(&flight([1.0, 4.0, 10.0]), asked(fence(1.1))).0, Status::Violation);
-    // A parabola through the wall between two ends within.
+    assert!((found[0].extreme.expect("a margin").lower + 1.5).abs() < 1e-12);
+    assert_eq!(judged(&flight([1.0, 4.0, 10.0]), with_envelope(fence(1.0))).0, Status::Clear);
+    assert_eq!(judged(&flight([1.0, 4.0, 10.0]), with_envelope(fence(1.1))).0, Status::Violation);
+    // A parabola through the wall between two ends inside.
     let bow = Piece {
         vehicle: 0,
         from_s: 0.0,
         to_s: 1.0,
         coefficients: vec![Vector3::new(9.0, 2.0, 5.0), Vector3::new(6.0, 0.0, 0.0), Vector3::new(-6.0, 0.0, 0.0)],
     };
-    let (status, found) = judged(&[Item::Piece(bow)], asked(fence(0.0)));
-    let room = found[0].extreme.expect("room");
-    assert!(status == Status::Violation && (room.lower + 0.5).abs() < 1e-8, "{room:?}");
-    assert!((room.at_s - 0.5).abs() < 1e-3);
+    let (status, found) = judged(&[Item::Piece(bow)], with_envelope(fence(0.0)));
+    let margin = found[0].extreme.expect("a margin");
+    assert!(status == Status::Violation && (margin.lower + 0.5).abs() < 1e-8, "{margin:?}");
+    assert!((margin.at_s - 0.5).abs() < 1e-3);
 }
 
 #[test]
-fn what_is_not_seen_is_not_said_to_be_kept() {
+fn unknown_motion_is_undecided() {
     let slow = || limits(&[(Quantity::Speed, 100.0), (Quantity::Height, 100.0)]);
     let place = Vector3::new(0.0, 0.0, 1.0);
     let gap: Vec<_> = [0.0, 1.0, 2.0, 3.0, 9.0, 10.0].map(|t| sample(t, place, None)).into();
-    assert_eq!(judged(&gap, asked(slow())).0, Status::Undecided, "a lone vehicle was not seen for 6 s");
+    assert_eq!(judged(&gap, with_envelope(slow())).0, Status::Undecided, "a lone vehicle was not seen for 6 s");
     let once = [sample(0.0, place, None)];
-    let (status, found) = judged(&once, asked(slow()));
+    let (status, found) = judged(&once, with_envelope(slow()));
     assert_eq!((status, found[0].status, found[1].status), (Status::Undecided, Status::Undecided, Status::Clear));
     assert_eq!(found[0].unknown, [0]);
-    let hold = Settings { motion: Some(Interpolation::Hold), ..asked(slow()) };
+    let hold = Settings { motion: Some(Interpolation::Hold), ..with_envelope(slow()) };
     let refused = audit(&["one".to_owned()], &gap, hold).expect_err("jumps have no speed");
     assert_eq!(refused, RecordedError::LimitOfJumps { limit: "speed" });
-    // A recording that contradicts the bound proves nothing.
-    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.5 * ACCEL), ..asked(slow()) };
+    // A contradicted bound is undecided.
+    let bounded =
+        Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.5 * ACCEL), ..with_envelope(slow()) };
     assert_eq!(judged(&circle(20, false), bounded).0, Status::Undecided);
 }
 
 #[test]
-fn the_window_counts_and_nothing_outside_of_it() {
+fn only_the_window_is_judged() {
     // At rest for 1 s, then 5 m/s.
     let place = |t: f64| Vector3::new(5.0 * (t - 1.0).max(0.0), 0.0, 0.0);
     let items: Vec<_> = (0..=30).map(|k| f64::from(k) * 0.1).map(|t| sample(t, place(t), None)).collect();
     let window = |from_s, to_s| Settings {
         from_s: Some(from_s),
         to_s: Some(to_s),
-        ..asked(limits(&[(Quantity::Speed, 4.0), (Quantity::Acceleration, 4.0)]))
+        ..with_envelope(limits(&[(Quantity::Speed, 4.0), (Quantity::Acceleration, 4.0)]))
     };
     let of = |from_s, to_s| judged(&items, window(from_s, to_s)).1.iter().map(|found| found.status).collect::<Vec<_>>();
     assert_eq!(of(0.0, 0.85), [Status::Clear, Status::Clear]);
@@ -220,15 +223,16 @@ fn the_window_counts_and_nothing_outside_of_it() {
 }
 
 #[test]
-fn a_window_within_an_interval_has_its_part_of_the_way() {
+fn a_window_inside_an_interval_is_interpolated() {
     let items = [(0.0, 10.0), (4.0, 18.0)].map(|(t, z)| sample(t, Vector3::new(0.0, 0.0, z), None));
-    let settings = Settings { from_s: Some(1.0), to_s: Some(3.0), ..asked(limits(&[(Quantity::Height, 20.0)])) };
+    let settings =
+        Settings { from_s: Some(1.0), to_s: Some(3.0), ..with_envelope(limits(&[(Quantity::Height, 20.0)])) };
     let extreme = judged(&items, settings).1[0].extreme.expect("a height");
     assert_eq!((extreme.lower, extreme.upper, extreme.at_s), (16.0, 16.0, 3.0));
 }
 
 #[test]
-fn nothing_was_flown_across_a_gap_and_one_outside_of_the_window_is_nobodys() {
+fn a_gap_has_no_speed_and_counts_only_in_the_window() {
     // 1 m/s for 2 s, and again from 7 s on, 1 km away.
     let from = |start_s: f64, x: f64| {
         let times = (0..=20).map(move |k| 0.1 * f64::from(k));
@@ -236,8 +240,11 @@ fn nothing_was_flown_across_a_gap_and_one_outside_of_the_window_is_nobodys() {
     };
     let items: Vec<_> = from(0.0, 0.0).chain(from(7.0, 1000.0)).collect();
     let found = |from_s, to_s| {
-        let settings =
-            Settings { from_s, to_s, ..asked(limits(&[(Quantity::Speed, 2.0), (Quantity::Acceleration, 2.0)])) };
+        let settings = Settings {
+            from_s,
+            to_s,
+            ..with_envelope(limits(&[(Quantity::Speed, 2.0), (Quantity::Acceleration, 2.0)]))
+        };
         let outcome = audit(&["one".to_owned()], &items, settings).expect("a verdict");
         let fastest = outcome.envelope.limits[0].extreme.expect("a speed");
         assert!((fastest.upper - 1.0).abs() < 1e-6, "{fastest:?}");
@@ -249,7 +256,7 @@ fn nothing_was_flown_across_a_gap_and_one_outside_of_the_window_is_nobodys() {
 }
 
 #[test]
-fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
+fn an_acceleration_needed_somewhere_is_undecided_in_a_part() {
     let items: Vec<_> = [(0.0, 0.0), (2.0, 0.0), (4.0, 8.0), (6.0, 16.0)]
         .map(|(t, x)| sample(t, Vector3::new(x, 0.0, 1.0), None))
         .into();
@@ -258,15 +265,15 @@ fn what_a_bounded_motion_needed_somewhere_is_not_said_of_a_part() {
         max_accel_m_s2: Some(10.0),
         from_s,
         to_s,
-        ..asked(limits(&[(Quantity::Acceleration, 1.0)]))
+        ..with_envelope(limits(&[(Quantity::Acceleration, 1.0)]))
     };
     assert_eq!(judged(&items, settings(None, None)).0, Status::Violation);
     assert_eq!(judged(&items, settings(Some(1.9), Some(2.1))).0, Status::Undecided);
 }
 
 #[test]
-fn an_eased_flight_along_a_wall_has_all_of_its_room() {
-    // Up at (4, 4), from rest to rest.
+fn an_eased_flight_along_a_wall_keeps_its_margin() {
+    // A rise at (4, 4), from rest to rest.
     let rise = |from_s: f64| Piece {
         vehicle: 0,
         from_s,
@@ -281,20 +288,23 @@ fn an_eased_flight_along_a_wall_has_all_of_its_room() {
     let corners = [[-10.0, -10.0], [10.0, -10.0], [10.0, 10.0], [-10.0, 10.0]];
     let fence = Fence::new(&corners, None, 1.0).expect("a fence");
     let envelope = Envelope { limits: Vec::new(), fence: Some(fence) };
-    let (status, found) = judged(&[Item::Piece(rise(0.0))], asked(envelope));
-    let room = found[0].extreme.expect("room");
-    assert!(status == Status::Clear && (room.lower - 6.0).abs() < 0.01 && (room.upper - 6.0).abs() < 1e-9, "{room:?}");
+    let (status, found) = judged(&[Item::Piece(rise(0.0))], with_envelope(envelope));
+    let margin = found[0].extreme.expect("a margin");
+    assert!(
+        status == Status::Clear && (margin.lower - 6.0).abs() < 0.01 && (margin.upper - 6.0).abs() < 1e-9,
+        "{margin:?}"
+    );
 }
 
 #[test]
-fn digits_of_places_are_no_speed_and_their_corners_are_none() {
-    // 3 m/s at 5400 km from the origin, 100 times a second.
+fn rounding_of_positions_is_no_speed_and_no_corner() {
+    // 3 m/s at 5400 km from the origin, sampled at 100 Hz.
     let items: Vec<_> = (0..100)
         .map(|k| f64::from(k) / 100.0)
         .map(|t| sample(t, Vector3::new(5e5, 5.4e6 + 3.0 * t, 0.0), None))
         .collect();
-    assert_eq!(judged(&items, asked(limits(&[(Quantity::Speed, 3.0)]))).0, Status::Clear);
-    assert_eq!(judged(&items, asked(limits(&[(Quantity::Speed, 2.999_999)]))).0, Status::Violation);
+    assert_eq!(judged(&items, with_envelope(limits(&[(Quantity::Speed, 3.0)]))).0, Status::Clear);
+    assert_eq!(judged(&items, with_envelope(limits(&[(Quantity::Speed, 2.999_999)]))).0, Status::Violation);
     let piece = |from_s: f64, x: f64, speed: f64| {
         Item::Piece(Piece {
             vehicle: 0,
@@ -304,14 +314,16 @@ fn digits_of_places_are_no_speed_and_their_corners_are_none() {
         })
     };
     let corner = |by: f64| {
-        let (status, found) =
-            judged(&[piece(0.0, 0.0, 1.0), piece(1.0, 1.0, 1.0 + by)], asked(limits(&[(Quantity::Acceleration, 9.0)])));
+        let (status, found) = judged(
+            &[piece(0.0, 0.0, 1.0), piece(1.0, 1.0, 1.0 + by)],
+            with_envelope(limits(&[(Quantity::Acceleration, 9.0)])),
+        );
         (status, found[0].corners.map_or(0, |corners| corners.count))
     };
     assert_eq!([5e-4, 1e-2].map(corner), [(Status::Clear, 0), (Status::Clear, 1)]);
 }
 
-/// A way along straight lines between corners a second apart, as curves and as samples.
+/// Returns straight lines between corners one second apart, as curves or as samples.
 fn zigzag(corners: &[[f64; 2]], hz: Option<u32>) -> Vec<Item> {
     let at = |k: usize| Vector3::new(corners[k][0], corners[k][1], 0.0);
     let legs = 0..corners.len() - 1;
@@ -334,17 +346,19 @@ fn zigzag(corners: &[[f64; 2]], hz: Option<u32>) -> Vec<Item> {
 }
 
 #[test]
-fn mean_accelerations_over_a_window_spread_corners_over_its_length() {
-    // At 3 m/s, then to the side, then to rest.
+fn mean_accelerations_average_corners_over_the_window() {
+    // 3 m/s, then a turn, then a stop.
     let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 3.0], [3.0, 3.0], [3.0, 3.0]];
     let turn = 3.0 * 2.0_f64.sqrt();
     for items in [zigzag(&corners, None), zigzag(&corners, Some(20))] {
         let of = |window_s, allowed| {
-            let settings =
-                Settings { accel_window_s: Some(window_s), ..asked(limits(&[(Quantity::Acceleration, allowed)])) };
+            let settings = Settings {
+                accel_window_s: Some(window_s),
+                ..with_envelope(limits(&[(Quantity::Acceleration, allowed)]))
+            };
             let (status, found) = judged(&items, settings);
             assert!(found[0].assumes.as_ref().is_some_and(|of| of.contains("means over")), "{:?}", found[0].assumes);
-            assert_eq!(found[0].corners, None, "corners are held against the limit");
+            assert_eq!(found[0].corners, None, "corners are compared with the limit");
             (status, found[0].extreme.expect("an acceleration").upper, found[0].violations_tally.count)
         };
         for window_s in [0.2, 0.4] {
@@ -355,17 +369,18 @@ fn mean_accelerations_over_a_window_spread_corners_over_its_length() {
             assert_eq!(of(window_s, 2.9 / window_s).2, 2, "the turn and the stop");
         }
     }
-    let short = Settings { accel_window_s: Some(60.0), ..asked(limits(&[(Quantity::Acceleration, 9.0)])) };
+    let short = Settings { accel_window_s: Some(60.0), ..with_envelope(limits(&[(Quantity::Acceleration, 9.0)])) };
     let (status, found) = judged(&zigzag(&corners, None), short);
     assert_eq!((status, &found[0].unknown[..]), (Status::Undecided, &[0][..]), "no window fits");
 }
 
 #[test]
-fn a_window_of_accelerations_needs_accelerations_that_are_limited_and_not_bounded() {
+fn an_averaging_window_needs_a_limit_and_no_bound() {
     let items = zigzag(&[[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]], Some(10));
     let window = |envelope, motion, accel_window_s| {
         let max_accel_m_s2 = Some(9.0);
-        let settings = Settings { accel_window_s: Some(accel_window_s), motion, max_accel_m_s2, ..asked(envelope) };
+        let settings =
+            Settings { accel_window_s: Some(accel_window_s), motion, max_accel_m_s2, ..with_envelope(envelope) };
         audit(&["one".to_owned()], &items, settings).map(|outcome| outcome.status)
     };
     let accel = || limits(&[(Quantity::Acceleration, 100.0)]);
@@ -378,13 +393,13 @@ fn a_window_of_accelerations_needs_accelerations_that_are_limited_and_not_bounde
 }
 
 #[test]
-fn a_vehicle_alone_is_asked_about_itself_whatever_radius_it_has() {
+fn a_radius_alone_does_not_limit_a_single_vehicle() {
     let with_radius = |vehicle: usize, radius_m| {
         let place = move |t: f64| Vector3::new(t, 9.0 * if vehicle == 0 { 0.0 } else { 1.0 }, 0.0);
         [0.0, 1.0, 2.0]
             .map(|t| Item::Sample(Sample { vehicle, time_s: t, position_m: place(t), velocity_m_s: None, radius_m }))
     };
-    let slow = || asked(limits(&[(Quantity::Speed, 5.0)]));
+    let slow = || with_envelope(limits(&[(Quantity::Speed, 5.0)]));
     assert_eq!(judged(&with_radius(0, Some(0.3)), slow()).0, Status::Clear);
     let both = |radius_m| {
         let mut items = [with_radius(0, Some(0.3)), with_radius(1, radius_m)].concat();
@@ -396,7 +411,7 @@ fn a_vehicle_alone_is_asked_about_itself_whatever_radius_it_has() {
 }
 
 #[test]
-fn limits_beside_a_safety_distance_decide_together_and_each_for_itself() {
+fn limits_and_separation_have_separate_verdicts() {
     let items: Vec<_> = (0..=20)
         .flat_map(|k| {
             let t = f64::from(k) * 0.1;
@@ -409,9 +424,9 @@ fn limits_beside_a_safety_distance_decide_together_and_each_for_itself() {
         .collect();
     let names = ["a", "b"].map(str::to_owned);
     let of = |delta_m, speed| {
-        let settings = Settings { delta_m: Some(delta_m), ..asked(limits(&[(Quantity::Speed, speed)])) };
+        let settings = Settings { delta_m: Some(delta_m), ..with_envelope(limits(&[(Quantity::Speed, speed)])) };
         let outcome = audit(&names, &items, settings).expect("a verdict");
-        (outcome.status, outcome.separation.expect("asked"), outcome.envelope.limits[0].status)
+        (outcome.status, outcome.separation.expect("a separation verdict"), outcome.envelope.limits[0].status)
     };
     assert_eq!(of(1.0, 4.0), (Status::Clear, Status::Clear, Status::Clear));
     assert_eq!(of(1.0, 2.0), (Status::Violation, Status::Clear, Status::Violation));

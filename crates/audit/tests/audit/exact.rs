@@ -1,14 +1,14 @@
-//! Verdicts on straight lines are exact about the doubles of the recording: held against fractions, to the last bit.
+//! Exactness of verdicts on straight lines: compared with exact fractions, to the last bit.
 
 use nalgebra::Vector3;
 use num_rational::BigRational;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings, audit};
 
-use crate::recorded::{asked, seen};
+use crate::recorded::{judge, seen};
 use crate::scenes::{Random, Tracks, exact, exact_place, exact_squared, instants, items, scene};
 
-/// Scenes by default, and with `TAUTLINE_LONG=1`.
+/// Number of scenes by default, and with `TAUTLINE_LONG=1`.
 const SCENES: u64 = 60;
 const LONG_SCENES: u64 = 5000;
 
@@ -16,13 +16,13 @@ fn scenes() -> u64 {
     if std::env::var_os("TAUTLINE_LONG").is_some() { LONG_SCENES } else { SCENES }
 }
 
-fn judged(tracks: &Tracks, settings: Settings) -> Outcome {
+fn judge_scene(tracks: &Tracks, settings: Settings) -> Outcome {
     let names: Vec<String> = (1..=tracks.len()).map(|k| k.to_string()).collect();
     let settings = Settings { max_gap_s: Some(f64::INFINITY), ..settings };
     audit(&names, &items(tracks), settings).expect("a scene can be judged")
 }
 
-/// The exact square of the smallest distance of two vehicles in a window.
+/// Returns the exact square of the smallest distance of two vehicles in a window.
 fn least_of(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)], window_s: [f64; 2]) -> Option<BigRational> {
     let times_s = instants(a, b);
     let (first_s, last_s) = (times_s.first()?.max(window_s[0]), times_s.last()?.min(window_s[1]));
@@ -44,9 +44,9 @@ fn least(tracks: &Tracks, window_s: [f64; 2]) -> Option<BigRational> {
     pairs.filter_map(|(i, j)| least_of(&tracks[i], &tracks[j], window_s)).min()
 }
 
-/// Whether the smallest separation is the largest double that is not above the exact one, and the verdict turns there.
+/// Checks that the smallest separation is the exact one rounded down, and that the verdict changes there.
 fn check(number: u64, tracks: &Tracks, settings: &Settings, window_s: [f64; 2]) -> bool {
-    let outcome = judged(tracks, Settings { delta_m: Some(1e-3), ..settings.clone() });
+    let outcome = judge_scene(tracks, Settings { delta_m: Some(1e-3), ..settings.clone() });
     let (Some(squared), Some(found)) = (least(tracks, window_s), outcome.closest.first()) else {
         assert!(outcome.closest.is_empty(), "scene {number}");
         return false;
@@ -56,7 +56,7 @@ fn check(number: u64, tracks: &Tracks, settings: &Settings, window_s: [f64; 2]) 
     assert!(square(least_m) <= squared && squared < square(above_m), "scene {number}: {least_m:?}");
     if least_m > 0.0 {
         for (limit_m, status) in [(least_m, Status::Clear), (above_m, Status::Violation)] {
-            let outcome = judged(tracks, Settings { delta_m: Some(limit_m), ..settings.clone() });
+            let outcome = judge_scene(tracks, Settings { delta_m: Some(limit_m), ..settings.clone() });
             assert_eq!((outcome.status, outcome.parry.disagreements), (status, 0), "scene {number}: {limit_m:?}");
             assert!(outcome.violations.iter().all(|violation| violation.min_m < limit_m), "scene {number}");
         }
@@ -65,14 +65,14 @@ fn check(number: u64, tracks: &Tracks, settings: &Settings, window_s: [f64; 2]) 
 }
 
 #[test]
-fn the_verdict_turns_at_the_smallest_separation_to_the_last_bit() {
+fn the_verdict_changes_at_the_exact_smallest_separation() {
     let judged = (0..scenes())
         .filter(|&number| check(number, &scene(number), &Settings::default(), [f64::NEG_INFINITY, f64::INFINITY]));
     assert!(judged.count() as u64 > scenes() / 2);
 }
 
 #[test]
-fn a_window_that_cuts_lines_is_judged_exactly_too() {
+fn a_window_that_cuts_lines_is_judged_exactly() {
     let judged = (0..scenes()).filter(|&number| {
         let mut random = Random(number);
         let from_s = random.between(0.0, 0.7);
@@ -84,8 +84,8 @@ fn a_window_that_cuts_lines_is_judged_exactly_too() {
 }
 
 #[test]
-fn vehicles_side_by_side_are_as_near_as_at_their_nearest_sample_of_thousands() {
-    // A grid that flies together: neighbours are as far apart all the time but for the rounding of their positions.
+fn nearly_constant_separations_are_compared_exactly() {
+    // A grid in common motion: the separations of neighbours differ only by the rounding of positions.
     for shift_s in [0.0, 0.017] {
         let mut random = Random(7);
         let track = |k: u32, random: &mut Random| {
@@ -104,18 +104,18 @@ fn vehicles_side_by_side_are_as_near_as_at_their_nearest_sample_of_thousands() {
 }
 
 #[test]
-fn equality_is_no_violation_wherever_the_digits_lie() {
+fn a_separation_equal_to_the_limit_is_no_violation() {
     let clear = |items: &[_], limit_m: f64| {
-        assert_eq!(asked(items, Settings::delta(limit_m)).status, Status::Clear, "{limit_m:?}");
-        let above = asked(items, Settings::delta(limit_m.next_up()));
+        assert_eq!(judge(items, Settings::delta(limit_m)).status, Status::Clear, "{limit_m:?}");
+        let above = judge(items, Settings::delta(limit_m.next_up()));
         assert_eq!(above.status, Status::Violation, "{limit_m:?}");
     };
-    // Along the diagonal of a box with whole sides, from a million times as far.
+    // Along the diagonal of a box with integer sides, from a million times as far.
     let scale = 2.0_f64.powi(20);
     let (aside, along) = ([2.0, 3.0, 6.0], [3.0, -2.0, 0.0].map(|x| x * scale));
     let past = |sign: f64| [0, 1, 2].map(|axis| aside[axis] + sign * along[axis]);
     clear(&[seen(0, 0.0, [0.0; 3]), seen(1, 0.0, past(-1.0)), seen(0, 1.0, [0.0; 3]), seen(1, 1.0, past(1.0))], 7.0);
-    // Seen at other times: at a third of the way of one and a half of the other they are 3, 4 and 0 m apart.
+    // Different sample times: at 1 s the vehicles differ by 0 m along x and 100 m along y.
     let items = [
         seen(0, 0.0, [0.0; 3]),
         seen(1, 0.5, [3.0, 100.0, 0.0]),
@@ -123,7 +123,7 @@ fn equality_is_no_violation_wherever_the_digits_lie() {
         seen(1, 3.5, [3.0, 100.0, 0.0]),
     ];
     clear(&items, 100.0);
-    // A jump past one that rests.
+    // A jump past a vehicle at rest.
     let held = |limit_m: f64| Settings { motion: Some(Interpolation::Hold), ..Settings::delta(limit_m) };
     let jump = [
         seen(0, 0.0, [-5.0, 0.0, 0.0]),
@@ -131,17 +131,18 @@ fn equality_is_no_violation_wherever_the_digits_lie() {
         seen(0, 1.0, [5.0, 0.0, 0.0]),
         seen(1, 1.0, [0.0, 0.3, 0.4]),
     ];
-    // The doubles next to 0.3 and 0.4: less than 0.5 apart by 1e-17, which no double of that size shows.
+    // The doubles next to 0.3 and 0.4 give a separation that differs from 0.5 by 1e-17, less than the spacing of
+    // doubles.
     let below = exact(0.3) * exact(0.3) + exact(0.4) * exact(0.4) < exact(0.25);
     let status = if below { Status::Violation } else { Status::Clear };
-    assert_eq!(asked(&jump, held(0.5)).status, status);
-    assert_eq!(asked(&jump, held(0.5_f64.next_up())).status, Status::Violation);
-    assert_eq!(asked(&jump, held(0.5_f64.next_down())).status, Status::Clear);
+    assert_eq!(judge(&jump, held(0.5)).status, status);
+    assert_eq!(judge(&jump, held(0.5_f64.next_up())).status, Status::Violation);
+    assert_eq!(judge(&jump, held(0.5_f64.next_down())).status, Status::Clear);
 }
 
 #[test]
-fn two_far_apart_in_size_are_told_apart() {
-    // 1e7 m of way within a step, and a limit of a millimetre that is missed by a unit in its last place.
+fn numbers_of_very_different_size_are_compared_exactly() {
+    // 1e7 m in one step, and a limit of one millimetre that is missed by one unit in the last place.
     for (miss_m, status) in [(1e-3, Status::Clear), (1e-3_f64.next_down(), Status::Violation)] {
         let items = [
             seen(0, 0.0, [-1e7, 0.0, 0.0]),
@@ -149,7 +150,7 @@ fn two_far_apart_in_size_are_told_apart() {
             seen(0, 1.0, [1e7, 0.0, 0.0]),
             seen(1, 1.0, [-1e7, miss_m, 0.0]),
         ];
-        assert_eq!(asked(&items, Settings::delta(1e-3)).status, status, "{miss_m:?}");
+        assert_eq!(judge(&items, Settings::delta(1e-3)).status, status, "{miss_m:?}");
     }
     // Positions and times of very different exponents.
     let tiny = 3e-160;
@@ -159,7 +160,7 @@ fn two_far_apart_in_size_are_told_apart() {
         seen(0, 1.0, [0.0; 3]),
         seen(1, 1.0, [tiny, 1.0, 0.0]),
     ];
-    let outcome = asked(&items, Settings::delta(1.0));
+    let outcome = judge(&items, Settings::delta(1.0));
     assert_eq!((outcome.status, outcome.closest[0].lower_m), (Status::Clear, 1.0));
-    assert_eq!(asked(&items, Settings::delta(1.0_f64.next_up())).status, Status::Violation);
+    assert_eq!(judge(&items, Settings::delta(1.0_f64.next_up())).status, Status::Violation);
 }

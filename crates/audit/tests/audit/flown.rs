@@ -1,4 +1,4 @@
-//! What the audit claims, from outside: each test is headed by the claim it proves.
+//! Audit of a flight: one test per claim.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -22,7 +22,8 @@ fn judge(delta_m: f64, flight: &[(f64, Rows)]) -> AuditOutcome {
     auditor.finish()
 }
 
-/// Vehicle 2 flies along x past vehicle 1, which stands at `origin`, within one step; `miss_m` apart at the closest.
+/// Returns a step in which vehicle 2 flies along x past vehicle 1, which stands at `origin`; `miss_m` is the smallest
+/// separation.
 fn pass(origin: [f64; 3], miss_m: f64, half_way_m: f64) -> [(f64, Rows); 2] {
     let [x, y, z] = origin;
     let at = |along: f64| rows(&[origin, [x + along, y + miss_m, z]]);
@@ -30,7 +31,7 @@ fn pass(origin: [f64; 3], miss_m: f64, half_way_m: f64) -> [(f64, Rows); 2] {
 }
 
 #[test]
-fn a_vehicle_thrown_through_another_within_one_step_is_caught_by_both_detectors() {
+fn a_pass_within_one_step_is_found_by_both_detectors() {
     const SPEED_M_S: f64 = 1000.0;
     const DT_S: f64 = 1.0 / 60.0;
     let outcome = judge(DELTA_M, &pass([0.0; 3], 0.3, SPEED_M_S * DT_S / 2.0));
@@ -46,16 +47,16 @@ fn a_vehicle_thrown_through_another_within_one_step_is_caught_by_both_detectors(
     assert_eq!(outcome.parry.disagreements, 0);
 }
 
-/// The negative twin of the test above.
+/// The samples of the same flight alone are clear.
 #[test]
-fn an_audit_that_looks_at_samples_alone_misses_that_vehicle() {
+fn samples_alone_miss_a_pass_within_one_step() {
     let flight = pass([0.0; 3], 0.3, 1000.0 / 60.0 / 2.0);
     let sampled = flight.iter().map(|(_, positions)| separation(positions, 0, 1)).fold(f64::INFINITY, f64::min);
     assert!(sampled > DELTA_M, "samples alone call this clear");
 }
 
 #[test]
-fn a_graze_is_caught_at_delta_less_a_nanometre_and_cleared_at_delta_and_a_nanometre() {
+fn a_graze_is_resolved_to_a_nanometre() {
     for half_way_m in [1e-3, 1.0, 10.0, 100.0] {
         for (miss_m, status) in [(DELTA_M - 1e-9, Status::Violation), (DELTA_M + 1e-9, Status::Clear)] {
             let outcome = judge(DELTA_M, &pass([0.0; 3], miss_m, half_way_m));
@@ -66,7 +67,7 @@ fn a_graze_is_caught_at_delta_less_a_nanometre_and_cleared_at_delta_and_a_nanome
 }
 
 #[test]
-fn five_thousand_kilometres_from_the_origin_a_micrometre_still_decides() {
+fn a_graze_far_from_the_origin_is_resolved_to_a_micrometre() {
     let far = [3.0e6, -3.0e6, 2.645_751e6];
     for (miss_m, status) in [(DELTA_M - 1e-6, Status::Violation), (DELTA_M + 1e-6, Status::Clear)] {
         let outcome = judge(DELTA_M, &pass(far, miss_m, 8.3));
@@ -83,7 +84,7 @@ fn touching_at_exactly_delta_is_no_violation() {
 }
 
 #[test]
-fn a_start_below_delta_is_a_violation_even_without_a_step() {
+fn a_start_below_delta_is_a_violation() {
     let outcome = judge(DELTA_M, &[(3.0, rows(&[[0.0; 3], [1.5, 0.0, 0.0]]))]);
     assert_eq!(outcome.status, Status::Violation);
     let pair = Pair::new(0, 1);
@@ -93,8 +94,8 @@ fn a_start_below_delta_is_a_violation_even_without_a_step() {
 }
 
 #[test]
-fn a_violation_that_lasts_over_steps_is_one_interval_with_its_deepest_point() {
-    // 4 m, 0.5 m from the left, 0.5 m further to the right, 4 m: below 2 m from x = -2 to 2, at 1 m/s.
+fn a_violation_over_several_steps_is_one_interval_with_its_minimum() {
+    // 4 m, 0.5 m to the left, 0.5 m to the right, 4 m: below 2 m from x = -2 to 2, at 1 m/s.
     let line = [-4.0, -0.5, 0.5, 4.0];
     let flight: Vec<_> = line.iter().map(|&x| (x + 4.0, rows(&[[0.0; 3], [x, 0.0, 0.0]]))).collect();
     let mut auditor = Auditor::new(2, DELTA_M).unwrap();
@@ -116,7 +117,7 @@ fn a_violation_that_lasts_over_steps_is_one_interval_with_its_deepest_point() {
 }
 
 #[test]
-fn two_visits_with_a_gap_between_are_two_violations() {
+fn two_separate_approaches_are_two_violations() {
     let flight: Vec<_> =
         (0..=4).map(|k| (f64::from(k), rows(&[[0.0; 3], [if k % 2 == 0 { 5.0 } else { 1.0 }, 0.0, 0.0]]))).collect();
     let outcome = judge(DELTA_M, &flight);
@@ -125,7 +126,7 @@ fn two_visits_with_a_gap_between_are_two_violations() {
 }
 
 #[test]
-fn of_equal_separations_the_lowest_pair_and_the_earliest_time_are_named() {
+fn equal_separations_report_the_lowest_pair_and_the_earliest_time() {
     let square = rows(&[[0.0; 3], [3.0, 0.0, 0.0], [3.0, 3.0, 0.0], [0.0, 3.0, 0.0]]);
     let flight: Vec<_> = (0..4).map(|k| (f64::from(k), square.clone())).collect();
     let closest = judge(DELTA_M, &flight).closest;
@@ -141,7 +142,7 @@ fn fewer_than_two_vehicles_are_clear_and_have_no_closest_pair() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_refused_by_name_and_never_called_clear() {
+fn invalid_input_is_refused_and_the_outcome_is_undecided() {
     let apart = rows(&[[0.0; 3], [5.0, 0.0, 0.0]]);
     let with = |x: f64| rows(&[[0.0; 3], [5.0, x, 0.0]]);
     let refusals: [(f64, Rows, &str); 7] = [
@@ -173,11 +174,11 @@ fn what_cannot_be_judged_is_refused_by_name_and_never_called_clear() {
 }
 
 #[test]
-fn a_pass_from_far_away_is_judged_by_its_doubles() {
+fn a_pass_from_far_away_is_judged_exactly() {
     let mut stream = Stream(1);
     let mut counts = [0; 2];
     for case in 0..1000 {
-        // Past the origin on a slanted line, by the rounding of its ends: some metres, or kilometres.
+        // Past the origin on a slanted line. The miss comes from rounding: some metres, or kilometres.
         let there = stream.vector(if case % 10 == 0 { 1e20 } else { 2e16 });
         let ends = [there, there * -0.37];
         let flight = ends.map(|at| rows(&[[0.0; 3], [at.x, at.y, at.z]]));
@@ -191,7 +192,7 @@ fn a_pass_from_far_away_is_judged_by_its_doubles() {
     assert!(counts.iter().all(|&count| count > 50), "{counts:?}");
 }
 
-/// A deterministic stream of numbers (`SplitMix64`), so that a failing case is named by its seed.
+/// Deterministic random numbers (`SplitMix64`), so that a failing case is reproduced by its seed.
 struct Stream(u64);
 
 impl Stream {
@@ -210,7 +211,7 @@ impl Stream {
 
 #[derive(Clone, Copy, Debug)]
 enum Motion {
-    Still,
+    Rest,
     RandomWalk {
         step_m: f64,
     },
@@ -221,11 +222,12 @@ enum Motion {
     OneFast {
         step_m: f64,
     },
-    AllInOnePlace,
+    SamePosition,
     Lattice {
         step_m: f64,
     },
-    /// Couples on a line part while neighbouring couples close up, until strangers are the closest.
+    /// Couples on a line part, while neighbouring couples approach each other until vehicles of two couples are
+    /// closest.
     Couples {
         gap_m: f64,
         step_m: f64,
@@ -234,28 +236,28 @@ enum Motion {
 
 fn motions() -> impl Strategy<Value = Motion> {
     prop_oneof![
-        Just(Motion::Still),
+        Just(Motion::Rest),
         (-3.0..1.5_f64).prop_map(|exponent| Motion::RandomWalk { step_m: 10_f64.powf(exponent) }),
         (0.8..1.3_f64).prop_map(|factor| Motion::Scaling { factor }),
         Just(Motion::Teleports),
         (0.0..40.0_f64).prop_map(|step_m| Motion::OneFast { step_m }),
-        Just(Motion::AllInOnePlace),
+        Just(Motion::SamePosition),
         (-3.0..0.0_f64).prop_map(|exponent| Motion::Lattice { step_m: 10_f64.powf(exponent) }),
         (3.3..3.6_f64, 0.02..0.06_f64).prop_map(|(gap_m, step_m)| Motion::Couples { gap_m, step_m }),
     ]
 }
 
-/// How far apart couples are at the start.
+/// Separation of a couple at the start \[m\].
 const COUPLE_M: f64 = 2.2;
 
-fn fly(n: usize, steps: usize, motion: Motion, seed: u64) -> Vec<(f64, Rows)> {
+fn random_flight(n: usize, steps: usize, motion: Motion, seed: u64) -> Vec<(f64, Rows)> {
     let mut stream = Stream(seed);
-    // About one vehicle per ball of 4 m, so that some pairs come below 2 m and most do not.
+    // About one vehicle per ball of 4 m, so that few pairs come below 2 m.
     let half_width = 3.0 * (n as f64).cbrt();
     let mut positions = Rows::zeros(n);
     for i in 0..n {
         let place = match motion {
-            Motion::AllInOnePlace => Vector3::new(1.0, 2.0, 3.0),
+            Motion::SamePosition => Vector3::new(1.0, 2.0, 3.0),
             Motion::Lattice { .. } => Vector3::new((i % 10) as f64, (i / 10) as f64, 0.0) * 3.0,
             Motion::Couples { gap_m, .. } => {
                 Vector3::x() * ((i / 2) as f64 * (COUPLE_M + gap_m) + (i % 2) as f64 * COUPLE_M)
@@ -276,7 +278,7 @@ fn fly(n: usize, steps: usize, motion: Motion, seed: u64) -> Vec<(f64, Rows)> {
                 Motion::Teleports if stream.unit() < 0.1 => stream.vector(4.0 * half_width),
                 Motion::OneFast { step_m } if i == n / 2 => here + heading * step_m,
                 Motion::OneFast { .. } => here + stream.vector(0.01),
-                Motion::Still | Motion::AllInOnePlace | Motion::Teleports => here,
+                Motion::Rest | Motion::SamePosition | Motion::Teleports => here,
             };
             set_row(&mut positions, i, next);
         }
@@ -285,7 +287,7 @@ fn fly(n: usize, steps: usize, motion: Motion, seed: u64) -> Vec<(f64, Rows)> {
     flight
 }
 
-/// The full sweep: each pair judged by an auditor of its own, which has no other pair to leave out.
+/// Full sweep: each pair is judged by its own auditor, which cannot leave pairs out.
 struct FullSweep {
     closest_by_step: Vec<Option<ClosestApproach>>,
     violations: Vec<Violation>,
@@ -317,7 +319,7 @@ fn full_sweep(flight: &[(f64, Rows)]) -> FullSweep {
     full
 }
 
-/// The smallest separation of a step by golden-section search on the distance itself, which is convex.
+/// Returns the smallest separation of a step by golden-section search on the distance, which is convex.
 fn searched_separation(from: &Rows, to: &Rows, i: usize, j: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let distance = |s: f64| {
@@ -333,31 +335,31 @@ fn searched_separation(from: &Rows, to: &Rows, i: usize, j: usize) -> f64 {
 }
 
 #[test]
-fn when_couples_part_and_strangers_close_up_the_strangers_are_found() {
-    // After 17 steps couples are 2.88 m apart, and strangers, 3.46 m at the start, 2.78 m. With motion this small, only
-    // the parting of the closest pair says that others must be looked at.
-    let flight = fly(64, 17, Motion::Couples { gap_m: 3.46, step_m: 0.02 }, 0);
+fn an_approach_of_pairs_outside_the_list_is_found() {
+    // After 17 steps couples are 2.88 m apart, and vehicles of two couples 2.78 m, from 3.46 m at the start. The motion
+    // is so small that only the growing separation of the closest pair forces a new list.
+    let flight = random_flight(64, 17, Motion::Couples { gap_m: 3.46, step_m: 0.02 }, 0);
     let mut auditor = Auditor::new(64, DELTA_M).unwrap();
     auditor.start(flight[0].0, &flight[0].1).unwrap();
     let by_step: Vec<_> =
         flight[1..].iter().map(|(time_s, positions)| auditor.step(*time_s, positions).unwrap().closest).collect();
     assert_eq!(by_step, full_sweep(&flight).closest_by_step[1..]);
-    // The first of a couple has an even index.
-    let strangers = by_step.iter().map(|closest| closest.is_some_and(|closest| closest.pair.first() % 2 == 1));
-    assert_eq!(strangers.collect::<Vec<_>>()[14..], [false, false, true]);
+    // The first vehicle of a couple has an even index.
+    let mixed_pairs = by_step.iter().map(|closest| closest.is_some_and(|closest| closest.pair.first() % 2 == 1));
+    assert_eq!(mixed_pairs.collect::<Vec<_>>()[14..], [false, false, true]);
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn leaving_pairs_out_changes_no_bit_of_the_answer(
+    fn excluding_pairs_does_not_change_the_result(
         n in prop_oneof![2..60_usize, 60..200_usize],
         steps in 1..20_usize,
         motion in motions(),
         seed: u64,
     ) {
-        let flight = fly(n, steps, motion, seed);
+        let flight = random_flight(n, steps, motion, seed);
         let full = full_sweep(&flight);
         let mut auditor = Auditor::new(n, DELTA_M).unwrap();
         for (k, (time_s, positions)) in flight.iter().enumerate() {
@@ -374,15 +376,15 @@ proptest! {
     }
 
     #[test]
-    fn the_closest_approach_is_the_one_that_a_search_along_the_step_finds(
+    fn the_closest_approach_matches_a_numerical_search(
         n in 2..40_usize,
         motion in motions(),
         seed: u64,
     ) {
-        // A search on a distance cannot place its minimum better than to the root of rounding, nor its value better
-        // than rounding of the coordinates, 1e-13 m here; near zero the place matters to first order.
+        // A search on the distance places the minimum only to the square root of rounding. The rounding of coordinates
+        // is 1e-13 m here, and near zero the position matters to first order.
         const SEARCH_TOLERANCE_M: f64 = 1e-9;
-        let flight = fly(n, 3, motion, seed);
+        let flight = random_flight(n, 3, motion, seed);
         let mut auditor = Auditor::new(n, DELTA_M).unwrap();
         auditor.start(flight[0].0, &flight[0].1).unwrap();
         for two in flight.windows(2) {
@@ -397,7 +399,7 @@ proptest! {
     }
 
     #[test]
-    fn no_number_makes_the_auditor_panic_or_call_an_overlap_clear(
+    fn no_input_makes_the_auditor_panic_or_hide_an_overlap(
         n in 0..40_usize,
         delta_m in prop_oneof![Just(DELTA_M), any::<f64>()],
         numbers in proptest::collection::vec(
@@ -434,14 +436,18 @@ proptest! {
 }
 
 #[test]
-fn a_large_quiet_swarm_is_judged_by_a_small_part_of_its_pairs() {
+fn a_slow_large_swarm_sweeps_few_pairs() {
     let n = 1000;
     let flight: Vec<_> = (0..20)
         .map(|k| {
-            let way = 0.01 * f64::from(k);
+            let displacement = 0.01 * f64::from(k);
             let place = |i: usize| {
                 let heading = i as f64 * 2.4;
-                [(i % 32) as f64 * 5.0 + way * heading.cos(), (i / 32) as f64 * 5.0 + way * heading.sin(), 0.0]
+                [
+                    (i % 32) as f64 * 5.0 + displacement * heading.cos(),
+                    (i / 32) as f64 * 5.0 + displacement * heading.sin(),
+                    0.0,
+                ]
             };
             (f64::from(k), Rows::from_fn(n, |i, axis| place(i)[axis]))
         })

@@ -1,4 +1,4 @@
-//! The independent judge: of a flight step by step, and of recordings of any origin.
+//! Tests of the audit of flights and of recordings.
 
 mod curves_at_limits;
 mod encounters;

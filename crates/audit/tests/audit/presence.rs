@@ -1,4 +1,4 @@
-//! Who was seen from when to when: what a verdict is about, and what is not known.
+//! Presence of vehicles: absences, and the requirement of presence over the whole window.
 
 use tautline_audit::Status;
 use tautline_audit::recorded::{Absence, Outcome, Presence, Settings, audit};
@@ -6,7 +6,7 @@ use tautline_core::track::Item;
 
 use crate::recorded::{names, seen};
 
-/// Samples of a vehicle far from the others, every `every_s` from one time to another.
+/// Returns samples of a vehicle far from the others, at an interval of `every_s`.
 fn track(vehicle: usize, from_s: f64, to_s: f64, every_s: f64) -> Vec<Item> {
     let times = std::iter::successors(Some(from_s), |time_s| Some(time_s + every_s));
     times
@@ -15,7 +15,7 @@ fn track(vehicle: usize, from_s: f64, to_s: f64, every_s: f64) -> Vec<Item> {
         .collect()
 }
 
-fn judged(tracks: &[Vec<Item>], settings: Settings) -> Outcome {
+fn judge(tracks: &[Vec<Item>], settings: Settings) -> Outcome {
     let mut items = tracks.concat();
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
     audit(&names(tracks.len()), &items, settings).expect("an outcome")
@@ -26,7 +26,7 @@ fn required() -> Settings {
 }
 
 #[test]
-fn one_that_leaves_early_or_comes_late_is_named_and_undecided_where_presence_is_required() {
+fn an_early_end_or_late_start_is_undecided_if_presence_is_required() {
     let whole = || track(0, 0.0, 10.0, 1.0);
     for (part, from_s, to_s) in [
         (track(1, 0.0, 9.0, 1.0), 0.0, 9.0),
@@ -35,9 +35,9 @@ fn one_that_leaves_early_or_comes_late_is_named_and_undecided_where_presence_is_
         (track(1, 5.0, 5.0, 1.0), 5.0, 5.0),
     ] {
         let expected = [Absence { vehicle: 1, seen: Some(Presence { from_s, to_s }) }];
-        let plain = judged(&[whole(), part.clone()], Settings::delta(1.0));
+        let plain = judge(&[whole(), part.clone()], Settings::delta(1.0));
         assert_eq!((plain.status, &plain.absences[..]), (Status::Clear, &expected[..]));
-        let strict = judged(&[whole(), part], required());
+        let strict = judge(&[whole(), part], required());
         assert_eq!(
             (strict.status, strict.separation, &strict.absences[..]),
             (Status::Undecided, Some(Status::Clear), &expected[..])
@@ -46,30 +46,30 @@ fn one_that_leaves_early_or_comes_late_is_named_and_undecided_where_presence_is_
 }
 
 #[test]
-fn vehicles_that_are_seen_throughout_are_not_named_whenever_they_are_sampled() {
-    let aligned = judged(&[track(0, 0.0, 10.0, 1.0), track(1, 0.0, 10.0, 1.0)], required());
+fn vehicles_present_throughout_are_not_absent_at_any_sampling() {
+    let aligned = judge(&[track(0, 0.0, 10.0, 1.0), track(1, 0.0, 10.0, 1.0)], required());
     assert_eq!((aligned.status, aligned.absences.len()), (Status::Clear, 0));
-    let between = judged(&[track(0, 0.0, 10.0, 1.0), track(1, 0.4, 9.5, 1.0)], required());
+    let between = judge(&[track(0, 0.0, 10.0, 1.0), track(1, 0.4, 9.5, 1.0)], required());
     assert_eq!((between.status, between.absences.len()), (Status::Clear, 0));
-    let twice_as_often = judged(&[track(0, 0.0, 10.0, 1.0), track(1, 0.0, 9.5, 0.5)], required());
-    assert_eq!(twice_as_often.status, Status::Undecided, "half a second is a sample of the second");
+    let twice_as_often = judge(&[track(0, 0.0, 10.0, 1.0), track(1, 0.0, 9.5, 0.5)], required());
+    assert_eq!(twice_as_often.status, Status::Undecided, "half a second is one interval of the second vehicle");
 }
 
 #[test]
-fn the_window_that_was_asked_for_counts_and_those_who_are_not_judged_do_not() {
+fn absences_refer_to_the_window_and_the_selected_vehicles() {
     let tracks = || [track(0, 0.0, 10.0, 1.0), track(1, 0.0, 10.0, 1.0), track(2, 0.0, 4.0, 1.0)];
-    let early = judged(&tracks(), Settings { to_s: Some(4.0), ..required() });
+    let early = judge(&tracks(), Settings { to_s: Some(4.0), ..required() });
     assert_eq!((early.status, early.absences.len()), (Status::Clear, 0));
-    let late = judged(&tracks(), Settings { from_s: Some(6.0), ..required() });
+    let late = judge(&tracks(), Settings { from_s: Some(6.0), ..required() });
     assert_eq!((late.status, late.absences[0]), (Status::Undecided, Absence { vehicle: 2, seen: None }));
-    let longer = judged(&tracks(), Settings { to_s: Some(60.0), ..required() });
+    let longer = judge(&tracks(), Settings { to_s: Some(60.0), ..required() });
     assert_eq!((longer.status, longer.absences.len()), (Status::Undecided, 3));
     let only = Some(["alpha", "bravo"].map(str::to_owned).into());
-    assert_eq!(judged(&tracks(), Settings { only, ..required() }).status, Status::Clear);
+    assert_eq!(judge(&tracks(), Settings { only, ..required() }).status, Status::Clear);
 }
 
 #[test]
-fn a_violation_is_one_whoever_is_missing() {
+fn a_violation_outranks_an_absence() {
     let near: Vec<_> = (0..=4).map(|k| seen(1, f64::from(k), [0.5, 0.0, 0.0])).collect();
-    assert_eq!(judged(&[track(0, 0.0, 10.0, 1.0), near], required()).status, Status::Violation);
+    assert_eq!(judge(&[track(0, 0.0, 10.0, 1.0), near], required()).status, Status::Violation);
 }

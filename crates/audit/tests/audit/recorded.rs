@@ -1,4 +1,4 @@
-//! What the judge of recordings claims, each with the case in which it must say the opposite.
+//! Audit of recordings: each claim with a case of the opposite verdict.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,16 +23,17 @@ pub(crate) fn names(count: usize) -> Vec<String> {
     ["alpha", "bravo", "charlie", "delta"].iter().take(count).map(ToString::to_string).collect()
 }
 
-pub(crate) fn asked(items: &[Item], settings: Settings) -> Outcome {
+pub(crate) fn judge(items: &[Item], settings: Settings) -> Outcome {
     let count = items.iter().map(|item| item.vehicle() + 1).max().unwrap_or(0);
-    audit(&names(count), items, settings).expect("it can be judged")
+    audit(&names(count), items, settings).expect("a verdict")
 }
 
 pub(crate) fn status(items: &[Item], settings: Settings) -> Status {
-    asked(items, settings).status
+    judge(items, settings).status
 }
 
-/// Two vehicles pass each other within a second, `miss_m` apart in the middle and far apart in every sample.
+/// Returns two vehicles that pass each other within a second, `miss_m` apart in the middle and at least 10 m apart in
+/// every sample.
 pub(crate) fn pass(miss_m: f64) -> Vec<Item> {
     vec![
         seen(0, 0.0, [-5.0, 0.0, 0.0]),
@@ -47,12 +48,12 @@ pub(crate) fn of(settings: &[(&str, VehicleSettings)]) -> BTreeMap<String, Vehic
 }
 
 #[test]
-fn what_happens_between_samples_is_judged_and_equality_is_no_violation() {
+fn motion_between_samples_is_judged_and_equality_is_no_violation() {
     assert_eq!(status(&pass(1.0), Settings::delta(2.0)), Status::Violation);
     assert_eq!(status(&pass(3.0), Settings::delta(2.0)), Status::Clear);
     assert_eq!(status(&pass(2.0), Settings::delta(2.0)), Status::Clear);
     assert_eq!(status(&pass(2.0_f64.next_down()), Settings::delta(2.0)), Status::Violation);
-    let found = asked(&pass(1.0), Settings::delta(2.0)).violations[0];
+    let found = judge(&pass(1.0), Settings::delta(2.0)).violations[0];
     let half_s = 3_f64.sqrt() / 20.0;
     assert!((found.from_s - (0.5 - half_s)).abs() < ROUNDING && (found.to_s - (0.5 + half_s)).abs() < ROUNDING);
     assert_eq!((found.min_m, found.min_at_s), (1.0, 0.5));
@@ -63,26 +64,26 @@ fn the_first_instant_and_a_single_sample_are_judged() {
     let once = |apart_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [apart_m, 0.0, 0.0])];
     assert_eq!(status(&once(1.0), Settings::delta(2.0)), Status::Violation);
     assert_eq!(status(&once(3.0), Settings::delta(2.0)), Status::Clear);
-    // Seen once, in the way of one that flies.
-    let in_the_way = |time_s| {
+    // A single sample in the path of another vehicle.
+    let with_vehicle_at_origin = |time_s| {
         let mut items = pass(9.0);
         items.push(seen(2, time_s, [0.0; 3]));
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         items
     };
-    assert_eq!(status(&in_the_way(0.5), Settings::delta(2.0)), Status::Violation);
-    assert_eq!(status(&in_the_way(0.1), Settings::delta(2.0)), Status::Clear);
-    // Apart from then on, too close at the start alone.
+    assert_eq!(status(&with_vehicle_at_origin(0.5), Settings::delta(2.0)), Status::Violation);
+    assert_eq!(status(&with_vehicle_at_origin(0.1), Settings::delta(2.0)), Status::Clear);
+    // Too close at the first instant only.
     let mut parting = once(1.0);
     parting.extend([seen(0, 1.0, [-5.0, 0.0, 0.0]), seen(1, 1.0, [5.0, 0.0, 0.0])]);
-    assert_eq!(asked(&parting, Settings::delta(2.0)).violations[0].from_s, 0.0);
+    assert_eq!(judge(&parting, Settings::delta(2.0)).violations[0].from_s, 0.0);
 }
 
 #[test]
-fn nothing_to_judge_is_undecided() {
+fn a_recording_without_a_pair_is_undecided() {
     assert_eq!(audit(&[], &[], Settings::delta(1.0)).unwrap().status, Status::Undecided);
     assert_eq!(status(&[seen(0, 0.0, [0.0; 3])], Settings::delta(1.0)), Status::Undecided, "a vehicle alone");
-    // Two that were never there together; an instant together is enough.
+    // Two vehicles that are never present together; an instant together is enough.
     let after = |second_s| [seen(0, 0.0, [0.0; 3]), seen(1, second_s, [9.0, 0.0, 0.0])];
     assert_eq!(status(&after(1.0), Settings::delta(1.0)), Status::Undecided);
     assert_eq!(status(&after(0.0), Settings::delta(1.0)), Status::Clear);
@@ -91,8 +92,8 @@ fn nothing_to_judge_is_undecided() {
 }
 
 #[test]
-fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
-    // Bravo stands beside the way of alpha's jump, and alpha is far from it in every sample.
+fn a_held_vehicle_stays_and_its_jump_is_swept() {
+    // Bravo stands beside the path of alpha's jump. Alpha is far from bravo in every sample.
     let items = |aside_m: f64| {
         let mut items = vec![seen(0, 0.0, [-5.0, 0.0, 0.0]), seen(0, 1.0, [5.0, 0.0, 0.0])];
         items.extend([seen(1, 0.0, [0.0, aside_m, 0.0]), seen(1, 1.0, [0.0, aside_m, 0.0])]);
@@ -100,19 +101,19 @@ fn a_held_vehicle_is_where_it_was_and_its_jump_is_swept() {
         items
     };
     let held = Settings { motion: Some(Interpolation::Hold), ..Settings::delta(2.0) };
-    let found = asked(&items(1.0), held.clone());
+    let found = judge(&items(1.0), held.clone());
     assert_eq!((found.status, found.violations[0].from_s, found.violations[0].to_s), (Status::Violation, 1.0, 1.0));
     assert_eq!(status(&items(3.0), held.clone()), Status::Clear);
-    // Charlie crosses where alpha still stands, though not where a straight flight would be.
+    // Bravo passes the position that alpha holds; a straight flight of alpha would already be away.
     let mut crossing = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [6.0, 6.0, 0.0])];
     crossing.extend([seen(1, 0.5, [6.0, 0.0, 0.0]), seen(1, 0.9, [1.0, 0.0, 0.0]), seen(0, 1.0, [0.0, 60.0, 0.0])]);
-    let patient = |motion| Settings { motion: Some(motion), max_gap_s: Some(9.0), ..Settings::delta(2.0) };
-    assert_eq!(status(&crossing, patient(Interpolation::Hold)), Status::Violation);
-    assert_eq!(status(&crossing, patient(Interpolation::Linear)), Status::Clear);
+    let with_long_gaps = |motion| Settings { motion: Some(motion), max_gap_s: Some(9.0), ..Settings::delta(2.0) };
+    assert_eq!(status(&crossing, with_long_gaps(Interpolation::Hold)), Status::Violation);
+    assert_eq!(status(&crossing, with_long_gaps(Interpolation::Linear)), Status::Clear);
 }
 
 #[test]
-fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
+fn pairs_on_the_ground_are_not_judged() {
     let items = |climbs_m: f64| {
         let mut items = vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [1.0, 0.0, 0.0])];
         items.extend([seen(0, 2.0, [0.0, 0.0, climbs_m]), seen(1, 2.0, [1.0, 0.0, 0.0])]);
@@ -124,16 +125,16 @@ fn pairs_on_the_ground_are_left_out_until_one_of_them_leaves_it() {
     let mut seen_from_above = items(0.2);
     seen_from_above.extend([2.0, 3.0].map(|time_s| seen(2, time_s, [0.0, 0.0, 9.0])));
     assert_eq!(status(&seen_from_above, above.clone()), Status::Clear);
-    let outcome = asked(&items(1.0), above.clone());
+    let outcome = judge(&items(1.0), above.clone());
     assert_eq!(outcome.violations[0].from_s, 0.5, "{outcome:?}");
     assert!((outcome.closest[0].lower_m - 1.0_f64.hypot(0.25)).abs() < ROUNDING);
-    // On curves, and under a bound, which may leave the ground sooner.
+    // Under a bound the vehicle may leave the ground earlier.
     let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.01), ..above };
-    assert!(asked(&items(1.0), bounded).violations[0].from_s < 0.5);
+    assert!(judge(&items(1.0), bounded).violations[0].from_s < 0.5);
 }
 
 #[test]
-fn one_who_begins_to_climb_at_the_instant_another_ends_was_on_the_ground_with_it() {
+fn a_climb_that_begins_when_another_vehicle_ends_is_no_violation() {
     let items = |height_m: f64| {
         [
             seen(0, 0.0, [0.0, 0.0, height_m]),
@@ -145,14 +146,14 @@ fn one_who_begins_to_climb_at_the_instant_another_ends_was_on_the_ground_with_it
     };
     for (above_m, motion) in [(0.0, Interpolation::Linear), (0.0, Interpolation::Hold), (0.1, Interpolation::Linear)] {
         let settings = Settings { above_m: Some(above_m), motion: Some(motion), ..Settings::delta(1.0) };
-        let outcome = asked(&items(above_m), settings.clone());
+        let outcome = judge(&items(above_m), settings.clone());
         assert_eq!(outcome.violations, [], "{above_m} {motion:?}");
         assert_eq!(status(&items(above_m + 0.01), settings), Status::Violation, "{above_m} {motion:?}");
     }
 }
 
 #[test]
-fn no_interval_is_too_short_to_be_judged() {
+fn very_short_intervals_are_judged_or_refused() {
     let items = |step_s: f64| {
         let b = |k: i32, x| seen(1, f64::from(k) * step_s, [x, 0.0, 0.0]);
         let a = |k: i32| seen(0, f64::from(k) * step_s, [0.0; 3]);
@@ -171,7 +172,7 @@ fn a_window_clips_exactly() {
     // Below delta from 0.5 - sqrt(3) / 20 = 0.4134 s on.
     assert_eq!(status(&pass(1.0), inside(None, Some(0.41))), Status::Clear);
     assert_eq!(status(&pass(1.0), inside(Some(0.59), None)), Status::Clear);
-    let outcome = asked(&pass(1.0), inside(Some(0.25), Some(0.45)));
+    let outcome = judge(&pass(1.0), inside(Some(0.25), Some(0.45)));
     let found = outcome.violations[0];
     assert_eq!((outcome.span_s, found.to_s), (Some((0.25, 0.45)), 0.45));
     assert!((found.min_m - 1.0_f64.hypot(1.0)).abs() < ROUNDING, "10 m/s of each, 0.05 s before they meet");
@@ -179,7 +180,7 @@ fn a_window_clips_exactly() {
 
 #[test]
 fn a_gap_is_undecided_unless_it_is_bridged() {
-    let flown = |missing: u32| {
+    let with_missing_sample = |missing: u32| {
         let mut items = Vec::new();
         for k in 0..20 {
             let time_s = 0.1 * f64::from(k);
@@ -190,72 +191,75 @@ fn a_gap_is_undecided_unless_it_is_bridged() {
         }
         items
     };
-    assert_eq!(status(&flown(99), Settings::delta(2.0)), Status::Clear);
-    let outcome = asked(&flown(7), Settings::delta(2.0));
+    assert_eq!(status(&with_missing_sample(99), Settings::delta(2.0)), Status::Clear);
+    let outcome = judge(&with_missing_sample(7), Settings::delta(2.0));
     assert_eq!((outcome.status, outcome.gaps.len(), outcome.gaps[0].vehicle), (Status::Undecided, 1, 1));
     assert!((outcome.gaps[0].from_s - 0.6).abs() < ROUNDING && (outcome.gaps[0].to_s - 0.8).abs() < ROUNDING);
-    assert_eq!(status(&flown(7), Settings { max_gap_s: Some(0.25), ..Settings::delta(2.0) }), Status::Clear);
-    // Late and early are no gaps.
-    assert!(asked(&flown(0), Settings::delta(2.0)).gaps.is_empty());
-    assert!(asked(&flown(19), Settings::delta(2.0)).gaps.is_empty());
-    // Nor is one that ends before the window.
-    assert_eq!(status(&flown(7), Settings { from_s: Some(1.0), ..Settings::delta(2.0) }), Status::Clear);
-    // Nor is one in which nobody else is there, unless something stands in the way.
-    let mut left = flown(7);
+    assert_eq!(
+        status(&with_missing_sample(7), Settings { max_gap_s: Some(0.25), ..Settings::delta(2.0) }),
+        Status::Clear
+    );
+    // A late start and an early end are no gaps.
+    assert!(judge(&with_missing_sample(0), Settings::delta(2.0)).gaps.is_empty());
+    assert!(judge(&with_missing_sample(19), Settings::delta(2.0)).gaps.is_empty());
+    // Nor is a gap that ends before the window.
+    assert_eq!(status(&with_missing_sample(7), Settings { from_s: Some(1.0), ..Settings::delta(2.0) }), Status::Clear);
+    // Nor is a gap in which no other vehicle is present, unless there is an obstacle.
+    let mut left = with_missing_sample(7);
     left.retain(|item| item.vehicle() == 1 || item.time_s() < 0.55);
-    let outcome = asked(&left, Settings::delta(2.0));
+    let outcome = judge(&left, Settings::delta(2.0));
     assert_eq!((outcome.status, outcome.gaps.len()), (Status::Clear, 0));
-    let tower = thing(Shape::Ball { radius_m: 1.0 }, [90.0, 0.0, 0.0]);
-    let outcome = asked(&left, Settings { obstacles: vec![tower], ..Settings::delta(2.0) });
+    let tower = obstacle_at(Shape::Ball { radius_m: 1.0 }, [90.0, 0.0, 0.0]);
+    let outcome = judge(&left, Settings { obstacles: vec![tower], ..Settings::delta(2.0) });
     assert_eq!((outcome.status, outcome.gaps.len()), (Status::Undecided, 1));
-    // What would join it is told, of one that the window cuts too.
-    let cut = asked(&flown(7), Settings { from_s: Some(0.75), ..Settings::delta(2.0) });
+    // `joined_by_s` is the length of the whole gap, also if the window cuts it.
+    let cut = judge(&with_missing_sample(7), Settings { from_s: Some(0.75), ..Settings::delta(2.0) });
     assert!((cut.gaps[0].joined_by_s - 0.2).abs() < ROUNDING && cut.gaps[0].from_s == 0.75, "{:?}", cut.gaps);
     // A gap between curves.
     let mut curves = curves(5.0);
     curves.retain(|item| !(item.vehicle() == 0 && item.time_s() == 1.0));
-    assert_eq!(asked(&curves, Settings::delta(0.1)).gaps.len(), 1);
+    assert_eq!(judge(&curves, Settings::delta(0.1)).gaps.len(), 1);
 }
 
 #[test]
-fn a_clock_that_was_off_is_set_right() {
-    // Through the same place one second apart, by clocks that differ by one second.
+fn a_clock_offset_is_corrected() {
+    // Both pass the same place one second apart. Their clocks differ by one second.
     let through = |vehicle: usize, late_s: f64, turned: bool| {
         (0..=20).map(move |k| {
             let t = 0.2 * f64::from(k);
-            let way = 5.0 * t - 10.0;
-            seen(vehicle, t + late_s, if turned { [0.0, way, 0.0] } else { [way, 0.0, 0.0] })
+            let along = 5.0 * t - 10.0;
+            seen(vehicle, t + late_s, if turned { [0.0, along, 0.0] } else { [along, 0.0, 0.0] })
         })
     };
     let mut items: Vec<_> = through(0, 0.0, false).chain(through(1, 1.0, true)).collect();
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-    let set = |offset_s| Settings {
+    let with_offset = |offset_s| Settings {
         vehicles: of(&[("bravo", VehicleSettings { offset_s, ..VehicleSettings::default() })]),
         ..Settings::delta(2.0)
     };
     assert_eq!(status(&items, Settings::delta(2.0)), Status::Clear);
-    let outcome = asked(&items, set(-1.0));
+    let outcome = judge(&items, with_offset(-1.0));
     assert_eq!(outcome.status, Status::Violation);
     assert!(outcome.closest[0].lower_m < 1e-12 && (outcome.closest[0].time_s - 2.0).abs() < 1e-12);
-    assert_eq!(status(&items, set(1.0)), Status::Clear);
+    assert_eq!(status(&items, with_offset(1.0)), Status::Clear);
 }
 
 #[test]
-fn ellipsoids_are_judged_by_scaled_distance() {
+fn an_ellipsoid_scales_distances() {
     let stacked = |dz: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [0.0, 0.0, dz])];
     let beside = |dx: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [dx, 0.0, 0.0])];
     let downwash = Settings { ellipsoid_m: Some(Vector3::new(0.125, 0.125, 0.375)), ..Settings::default() };
     assert_eq!(status(&stacked(0.7), downwash.clone()), Status::Violation);
     assert_eq!(status(&stacked(0.75), downwash.clone()), Status::Clear);
     assert_eq!(status(&beside(0.3), downwash.clone()), Status::Clear);
-    let outcome = asked(&beside(0.2), downwash.clone());
+    let outcome = judge(&beside(0.2), downwash.clone());
     assert_eq!(outcome.status, Status::Violation);
     assert!((outcome.closest[0].lower_m - 1.6).abs() < ROUNDING);
     assert_eq!(status(&beside(0.2), Settings { delta_m: Some(1.5), ..downwash }), Status::Clear);
 }
 
 #[test]
-fn radii_and_delta_are_both_kept() {
+fn the_limit_is_the_larger_of_delta_and_the_radii() {
     let apart = |distance_m: f64| vec![seen(0, 0.0, [0.0; 3]), seen(1, 0.0, [distance_m, 0.0, 0.0])];
     let radius = |radius_m| VehicleSettings { radius_m: Some(radius_m), ..VehicleSettings::default() };
     let radii = Settings { vehicles: of(&[("alpha", radius(0.5)), ("bravo", radius(1.0))]), ..Settings::default() };
@@ -263,7 +267,7 @@ fn radii_and_delta_are_both_kept() {
     assert_eq!(status(&apart(1.5), radii.clone()), Status::Clear);
     let both = Settings { delta_m: Some(2.0), ..radii };
     assert_eq!(status(&apart(1.6), both), Status::Violation);
-    // The recording's own radii, and none at all.
+    // First the recording's own radii, then no limit.
     let mut own = apart(1.4);
     for item in &mut own {
         if let Item::Sample(sample) = item {
@@ -275,12 +279,12 @@ fn radii_and_delta_are_both_kept() {
     assert_eq!(none, RecordedError::NoLimit { vehicle: "alpha".to_owned() });
 }
 
-pub(crate) fn thing(shape: Shape, at: [f64; 3]) -> Obstacle {
-    Obstacle { name: "thing".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
+pub(crate) fn obstacle_at(shape: Shape, at: [f64; 3]) -> Obstacle {
+    Obstacle { name: "obstacle".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
 }
 
 #[test]
-fn obstacles_are_kept_clear_of() {
+fn distances_from_obstacles_are_judged() {
     let flight = [seen(0, 0.0, [-5.0, 0.0, 2.0]), seen(0, 1.0, [5.0, 0.0, 2.0])];
     // A keep-out ball of delta / 2 = 0.5 m must not enter.
     let with = |obstacle: Obstacle| Settings { obstacles: vec![obstacle], ..Settings::delta(1.0) };
@@ -289,7 +293,7 @@ fn obstacles_are_kept_clear_of() {
     let capsule =
         Shape::Capsule { from_m: Vector3::new(0.0, -3.0, 0.0), to_m: Vector3::new(0.0, 3.0, 0.0), radius_m: 1.0 };
     for shape in [ball, cuboid, capsule] {
-        // At no clearance it may be touched and not be entered.
+        // At a clearance of 0 m the vehicle may touch the obstacle but not enter it.
         for (clearance_m, z, expected) in [
             (None, 0.4, Status::Clear),
             (None, 0.5, Status::Clear),
@@ -297,39 +301,39 @@ fn obstacles_are_kept_clear_of() {
             (Some(0.0), 1.0, Status::Clear),
             (Some(0.0), 1.1, Status::Violation),
         ] {
-            let outcome = asked(&flight, with(Obstacle { clearance_m, ..thing(shape, [0.0, 0.0, z]) }));
+            let outcome = judge(&flight, with(Obstacle { clearance_m, ..obstacle_at(shape, [0.0, 0.0, z]) }));
             assert_eq!((outcome.status, outcome.parry.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
             assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
         }
     }
-    let ground = |z| thing(Shape::HalfSpace { normal: Vector3::z() }, [0.0, 0.0, z]);
+    let ground = |z| obstacle_at(Shape::HalfSpace { normal: Vector3::z() }, [0.0, 0.0, z]);
     assert_eq!(status(&flight, with(ground(1.5))), Status::Clear);
     assert_eq!(status(&flight, with(ground(1.6))), Status::Violation);
     let wider = Obstacle { clearance_m: Some(0.7), ..ground(1.4) };
     assert_eq!(status(&flight, with(wider)), Status::Violation);
-    // One that moves: there when the vehicle passes, or long gone.
+    // A moving obstacle: present when the vehicle passes, or gone.
     let moving = |late_s: f64| Obstacle {
         path: vec![(late_s, Vector3::new(0.0, -10.0, 2.0)), (late_s + 1.0, Vector3::new(0.0, 10.0, 2.0))],
-        ..thing(ball, [0.0; 3])
+        ..obstacle_at(ball, [0.0; 3])
     };
-    let hit = asked(&flight, with(moving(0.0)));
+    let hit = judge(&flight, with(moving(0.0)));
     assert_eq!(hit.status, Status::Violation);
     assert!(matches!(hit.violations[0].pair, ObjectPair::Obstacle { vehicle: 0, obstacle: 0 }));
     assert_eq!(status(&flight, with(moving(3.0))), Status::Clear);
-    // On a curve.
-    let outcome = asked(&curves(5.0), Settings { obstacles: vec![ground(-20.0)], ..Settings::delta(0.1) });
+    // A curve above the ground.
+    let outcome = judge(&curves(5.0), Settings { obstacles: vec![ground(-20.0)], ..Settings::delta(0.1) });
     assert_eq!((outcome.parry.disagreements, outcome.status), (0, Status::Clear));
-    // Alpha begins within one box, 0.1 m deep, and never comes near the other.
+    // Alpha begins inside one box, 0.1 m deep, and never comes near the other.
     for (at, expected) in [([0.3, 1.0, 1.5], Status::Violation), ([0.3, 1.0, 9.5], Status::Clear)] {
         let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_rad: 0.3 };
-        let entered = with(Obstacle { clearance_m: Some(0.0), ..thing(cuboid, at) });
-        let outcome = asked(&curves(5.0), entered);
+        let entered = with(Obstacle { clearance_m: Some(0.0), ..obstacle_at(cuboid, at) });
+        let outcome = judge(&curves(5.0), entered);
         assert_eq!((outcome.parry.disagreements, outcome.status), (0, expected), "{outcome:?}");
     }
 }
 
 #[test]
-fn only_those_who_are_asked_for_are_judged() {
+fn only_selected_vehicles_are_judged() {
     let mut items = pass(1.0);
     items.extend([seen(2, 0.0, [0.0, 50.0, 0.0]), seen(2, 1.0, [0.0, 50.0, 0.0])]);
     items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
@@ -344,7 +348,7 @@ fn only_those_who_are_asked_for_are_judged() {
 }
 
 #[test]
-fn wrong_recordings_and_questions_are_refused_by_name() {
+fn invalid_recordings_and_settings_are_refused() {
     let refused = |items: &[Item], settings: Settings| audit(&names(2), items, settings).unwrap_err().to_string();
     let twice = [seen(0, 1.0, [0.0; 3]), seen(0, 1.0, [1.0, 0.0, 0.0])];
     assert!(refused(&twice, Settings::delta(1.0)).contains("alpha: the time 1.0 s is not later than 1.0 s"));
@@ -353,7 +357,7 @@ fn wrong_recordings_and_questions_are_refused_by_name() {
     );
     let back = [seen(0, 1.0, [0.0; 3]), seen(1, 0.5, [0.0; 3])];
     assert!(refused(&back, Settings::delta(1.0)).contains("comes after one at 1.0 s"));
-    assert!(refused(&[seen(7, 1.0, [0.0; 3])], Settings::delta(1.0)).contains("no name for vehicle 8"));
+    assert!(refused(&[seen(7, 1.0, [0.0; 3])], Settings::delta(1.0)).contains("vehicle 8 (from 1) has no name"));
     let with = |motion| Settings { motion: Some(motion), ..Settings::delta(1.0) };
     assert!(refused(&pass(1.0), with(Interpolation::Polynomial)).contains("has samples and no curve"));
     assert!(refused(&curves(1.0), with(Interpolation::Linear)).contains("has a curve"));
@@ -370,7 +374,7 @@ fn wrong_recordings_and_questions_are_refused_by_name() {
 }
 
 #[test]
-fn a_recording_in_parts_is_judged_like_the_whole() {
+fn a_recording_in_parts_has_the_same_outcome() {
     let mut items = Vec::new();
     for k in 0..3000_u32 {
         let t = 0.1 * f64::from(k);
@@ -395,7 +399,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_input_makes_the_judge_panic(
+    fn no_input_makes_the_audit_panic(
         raw in prop::collection::vec((0_usize..4, any::<bool>(), prop::array::uniform5(prop_oneof![
             any::<f64>(), -10.0..10.0_f64, Just(0.0), Just(1e300), Just(f64::NAN)
         ])), 0..40),
@@ -406,7 +410,8 @@ proptest! {
         let mut items: Vec<_> = raw.into_iter().map(|(vehicle, piece, [t, x, y, z, w])| {
             let position_m = Vector3::new(x, y, z);
             if piece {
-                Item::Piece(Piece { vehicle, from_s: t, to_s: t + w.abs(), coefficients: vec![position_m, position_m * w] })
+                let coefficients = vec![position_m, position_m * w];
+                Item::Piece(Piece { vehicle, from_s: t, to_s: t + w.abs(), coefficients })
             } else {
                 Item::Sample(Sample { vehicle, time_s: t, position_m, velocity_m_s: None, radius_m: None })
             }
@@ -414,9 +419,9 @@ proptest! {
         if sorted {
             items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         }
-        let motion = [None, Some(Interpolation::Linear), Some(Interpolation::Hold), Some(Interpolation::Polynomial), Some(Interpolation::Bounded)]
-            [usize::from(motion)];
-        let obstacles = vec![thing(Shape::Ball { radius_m: 1.0 }, [0.0; 3])];
+        let all = Interpolation::ALL.map(Some);
+        let motion = [None, all[0], all[1], all[2], all[3]][usize::from(motion)];
+        let obstacles = vec![obstacle_at(Shape::Ball { radius_m: 1.0 }, [0.0; 3])];
         let settings =
             Settings { motion, above_m: above, max_accel_m_s2: Some(1.0), obstacles, ..Settings::delta(1.0) };
         let _ = audit(&names(4), &items, settings);

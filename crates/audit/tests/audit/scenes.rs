@@ -1,7 +1,8 @@
-//! Random recordings, judged and computed again by brute force with exact fractions where it is close.
+//! Random recordings compared with a brute-force computation.
 //!
-//! The oracle shares nothing with the judge: every pair, every instant at which either of two was seen, straight lines in
-//! between; plain numbers first, and exact fractions of the very same numbers wherever delta is near.
+//! The reference shares no code with the audit. It checks every pair at every sample time of either vehicle, with
+//! straight lines in between. It uses doubles, and exact fractions of the same doubles where a separation is close to
+//! delta.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,21 +13,21 @@ use tautline_audit::recorded::{ObjectPair, Outcome, Settings, audit};
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Sample};
 
-/// Number of scenes, and of those with `TAUTLINE_LONG=1`; `TAUTLINE_SCENES` sets another.
+/// Number of scenes by default and with `TAUTLINE_LONG=1`; `TAUTLINE_SCENES` overrides both.
 const SCENES: u64 = 3000;
 const LONG_SCENES: u64 = 20_000;
-/// One of so many scenes is long enough for several windows.
+/// One scene in this many spans several windows.
 const LONG_EVERY: u64 = 100;
 const DELTA_M: f64 = 2.0;
-/// Rounding of the closed form, in units of the largest distance involved: 4 eps proved for one step, and as much again
-/// for the displacements of vehicles that are seen at different times.
+/// Rounding of the closed form relative to the largest distance: 4 eps for one step, and 4 eps for displacements at
+/// different sample times.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
-/// Pairs are looked at again where they come closer by more than this, relative to their distance.
+/// Relative difference of distances above which a pair is swept again.
 const TIE: f64 = 1e-12;
-/// Distances within this of delta are computed in fractions: far above rounding, and above every graze that is asked for.
+/// Distance from delta below which exact fractions are used; larger than rounding and than every generated graze.
 const NEAR_M: f64 = 1e-4;
 
-/// `SplitMix64` (Steele, Lea, Flood 2014): the same scenes everywhere.
+/// `SplitMix64` (Steele, Lea, Flood 2014): the same scenes on every machine.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -55,10 +56,10 @@ impl Random {
     }
 }
 
-/// What each vehicle was seen at.
+/// Samples of each vehicle.
 pub(crate) type Tracks = Vec<Vec<(f64, Vector3<f64>)>>;
 
-/// A scene of one of the kinds that have gone wrong somewhere.
+/// Returns a random scene. The kinds cover cases that once failed.
 pub(crate) fn scene(number: u64) -> Tracks {
     let mut random = Random(number);
     let long = number.is_multiple_of(LONG_EVERY);
@@ -76,14 +77,14 @@ pub(crate) fn scene(number: u64) -> Tracks {
             let velocity = random.vector(size_m);
             let mut own = times.clone();
             if !together {
-                // Clocks of its own, sometimes the same as another's.
+                // Individual clock shifts, some of them equal.
                 let shift = [0.0, 0.25, random.between(0.0, 0.5)][random.index(3)];
                 for time_s in &mut own {
                     *time_s += shift;
                 }
             }
             if kind == 0 {
-                // Late, or gone early, or seen once.
+                // Late, early, or a single sample.
                 own.drain(..random.index(own.len()));
                 own.truncate(1 + random.index(own.len()));
             }
@@ -134,19 +135,19 @@ pub(crate) fn items(tracks: &Tracks) -> Vec<Item> {
     items
 }
 
-/// What brute force says of a pair.
+/// Result of brute force for a pair.
 #[derive(Clone, Copy, Debug)]
-struct Answer {
+struct Expected {
     min_m: f64,
-    /// Exactly below delta.
+    /// Whether the separation is exactly below delta.
     violates: bool,
-    /// The largest distance that rounding scales with.
+    /// Largest distance, which scales the rounding.
     scale_m: f64,
-    /// Smallest distance at an instant at which both were seen.
+    /// Smallest distance at a common sample time.
     sampled_m: f64,
 }
 
-/// The instants at which either is seen while both are there.
+/// Returns the sample times of either vehicle while both are present.
 pub(crate) fn instants(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Vec<f64> {
     let (from_s, to_s) = (a[0].0.max(b[0].0), a[a.len() - 1].0.min(b[b.len() - 1].0));
     let mut times: Vec<f64> =
@@ -180,7 +181,7 @@ pub(crate) fn exact_place(track: &[(f64, Vector3<f64>)], time_s: f64) -> [BigRat
     [0, 1, 2].map(|axis| exact(p0[axis]) + (exact(p1[axis]) - exact(p0[axis])) * &share)
 }
 
-/// The exact square of the smallest distance between two instants.
+/// Returns the exact square of the smallest distance between two instants.
 pub(crate) fn exact_squared(from: &[BigRational; 3], to: &[BigRational; 3]) -> BigRational {
     let dot = |a: &[BigRational; 3], b: &[BigRational; 3]| &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2];
     let by = [0, 1, 2].map(|axis| &to[axis] - &from[axis]);
@@ -192,25 +193,25 @@ pub(crate) fn exact_squared(from: &[BigRational; 3], to: &[BigRational; 3]) -> B
     dot(from, from) - &towards * &towards / length
 }
 
-/// Smallest distance of two straight motions by the plain formula.
-fn plain(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
+/// Returns the smallest distance of two straight motions in doubles.
+fn distance_in_doubles(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
     let by = to - from;
     let length = by.norm_squared();
     let at = if length > 0.0 { (-from.dot(&by) / length).clamp(0.0, 1.0) } else { 0.0 };
     (from + by * at).norm()
 }
 
-fn brute_force(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Option<Answer> {
+fn brute_force(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Option<Expected> {
     let times = instants(a, b);
     let first = *times.first()?;
     let ends: Vec<(f64, f64)> =
         if times.len() == 1 { vec![(first, first)] } else { times.windows(2).map(|t| (t[0], t[1])).collect() };
-    let mut answer = Answer { min_m: f64::INFINITY, violates: false, scale_m: 0.0, sampled_m: f64::INFINITY };
+    let mut answer = Expected { min_m: f64::INFINITY, violates: false, scale_m: 0.0, sampled_m: f64::INFINITY };
     let apart = |time_s: f64| place(b, time_s) - place(a, time_s);
     for (from_s, to_s) in ends {
         let (from, to) = (apart(from_s), apart(to_s));
-        let mut min_m = plain(from, to);
-        // Interpolated places of a swarm far away are as coarse as its coordinates.
+        let mut min_m = distance_in_doubles(from, to);
+        // Interpolated positions far from the origin are as coarse as the coordinates.
         let coarse_m = 8.0 * f64::EPSILON * place(a, from_s).amax();
         if (min_m - DELTA_M).abs() < NEAR_M.max(coarse_m) || coarse_m > 1e-12 {
             let difference = |time_s: f64| {
@@ -219,8 +220,8 @@ fn brute_force(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Option<A
             };
             let squared = exact_squared(&difference(from_s), &difference(to_s));
             let limit = exact(DELTA_M) * exact(DELTA_M);
-            // The root of the quotient, so that what differs from delta in the last digits still does.
-            let over = nearest(&((&squared - &limit) / &limit));
+            // The square root of the quotient keeps a difference from delta in the last digits.
+            let over = nearest_double(&((&squared - &limit) / &limit));
             min_m = DELTA_M * (1.0 + over).max(0.0).sqrt();
             answer.violates |= squared < limit;
         } else {
@@ -236,11 +237,11 @@ fn brute_force(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> Option<A
     Some(answer)
 }
 
-/// The double nearest to a fraction, or close to it.
-fn nearest(fraction: &BigRational) -> f64 {
+/// Returns a double close to a fraction.
+fn nearest_double(fraction: &BigRational) -> f64 {
     let (above, below) = (fraction.numer(), fraction.denom());
     let shift = i64::try_from(above.bits()).expect("small") - i64::try_from(below.bits()).expect("small");
-    // Scaled so that the quotient of whole numbers has some 64 bits.
+    // Scaled so that the integer quotient has about 64 bits.
     let scaled = if shift < 64 { above << u64::try_from(64 - shift).expect("positive") } else { above.clone() };
     let exponent = if shift < 64 { 64 - shift } else { 0 };
     let quotient: f64 = (scaled / below).to_string().parse().expect("a whole number");
@@ -249,37 +250,37 @@ fn nearest(fraction: &BigRational) -> f64 {
 
 fn judged(tracks: &Tracks) -> Outcome {
     let names: Vec<String> = (1..=tracks.len()).map(|k| k.to_string()).collect();
-    // Late and rare sightings are no gaps here.
+    // Scenes have no gaps.
     let settings = Settings { max_gap_s: Some(f64::INFINITY), ..Settings::delta(DELTA_M) };
     audit(&names, &items(tracks), settings).expect("a scene can be judged")
 }
 
-/// Whether the judge's answer is that of brute force; says whether samples alone would have misled.
+/// Compares the audit with brute force; returns whether the samples alone give a wrong verdict.
 fn compare(number: u64, tracks: &Tracks) -> bool {
     let outcome = judged(tracks);
-    let mut answers: BTreeMap<Pair, Answer> = BTreeMap::new();
+    let mut answers: BTreeMap<Pair, Expected> = BTreeMap::new();
     for i in 0..tracks.len() {
         for j in i + 1..tracks.len() {
             answers.extend(brute_force(&tracks[i], &tracks[j]).map(|answer| (Pair::new(i, j), answer)));
         }
     }
-    let told: BTreeSet<Pair> = outcome
+    let reported: BTreeSet<Pair> = outcome
         .violations
         .iter()
         .map(|violation| match violation.pair {
             ObjectPair::Vehicles(pair) => pair,
-            ObjectPair::Obstacle { .. } => panic!("there is none"),
+            ObjectPair::Obstacle { .. } => panic!("the scene has no obstacle"),
         })
         .collect();
-    let true_ones: BTreeSet<Pair> =
+    let expected_pairs: BTreeSet<Pair> =
         answers.iter().filter(|(_, answer)| answer.violates).map(|(pair, _)| *pair).collect();
     assert_eq!(
-        told,
-        true_ones,
+        reported,
+        expected_pairs,
         "scene {number}: {:?}",
-        told.symmetric_difference(&true_ones).map(|p| answers[p]).collect::<Vec<_>>()
+        reported.symmetric_difference(&expected_pairs).map(|p| answers[p]).collect::<Vec<_>>()
     );
-    let status = match (answers.is_empty(), true_ones.is_empty()) {
+    let status = match (answers.is_empty(), expected_pairs.is_empty()) {
         (true, _) => Status::Undecided,
         (false, true) => Status::Clear,
         (false, false) => Status::Violation,
@@ -292,9 +293,9 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
     smallest.truncate(10);
     assert_eq!(outcome.closest.len(), smallest.len(), "scene {number}");
     for (approach, min_m) in outcome.closest.iter().zip(smallest) {
-        let ObjectPair::Vehicles(pair) = approach.pair else { panic!("there is none") };
+        let ObjectPair::Vehicles(pair) = approach.pair else { panic!("the scene has no obstacle") };
         let answer = answers[&pair];
-        // The judge's distance is that of the pair, and the list is the list of the smallest.
+        // The distance is that of the pair, and the list holds the smallest distances.
         let rounding_m = ROUNDING * answer.scale_m + TIE * min_m;
         assert!((approach.lower_m - answer.min_m).abs() <= rounding_m, "scene {number}: {approach:?} {answer:?}");
         assert!((approach.lower_m - min_m).abs() <= rounding_m, "scene {number}: {approach:?}, expected {min_m}");
@@ -303,11 +304,11 @@ fn compare(number: u64, tracks: &Tracks) -> bool {
         assert!((there.norm() - approach.lower_m).abs() < coarse_m, "scene {number}: {approach:?}");
     }
     let sampled_violation = answers.values().any(|answer| answer.sampled_m < DELTA_M);
-    sampled_violation == true_ones.is_empty()
+    sampled_violation == expected_pairs.is_empty()
 }
 
 #[test]
-fn scenes_are_judged_as_brute_force_judges_them() {
+fn random_scenes_match_brute_force() {
     let scenes = if std::env::var_os("TAUTLINE_LONG").is_some() { LONG_SCENES } else { SCENES };
     let scenes = std::env::var("TAUTLINE_SCENES").map_or(scenes, |count| count.parse().expect("a number"));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -326,14 +327,14 @@ fn scenes_are_judged_as_brute_force_judges_them() {
 }
 
 #[test]
-fn the_oracle_sees_a_wrong_answer() {
+fn the_reference_detects_a_wrong_result() {
     let tracks: Tracks = vec![
         vec![(0.0, Vector3::new(-5.0, 0.0, 0.0)), (1.0, Vector3::new(5.0, 0.0, 0.0))],
         vec![(0.0, Vector3::new(5.0, 1.0, 0.0)), (1.0, Vector3::new(-5.0, 1.0, 0.0))],
     ];
-    let answer = brute_force(&tracks[0], &tracks[1]).expect("both are there");
+    let answer = brute_force(&tracks[0], &tracks[1]).expect("both are present");
     assert!(answer.violates && (answer.min_m - 1.0).abs() < 1e-15 && answer.sampled_m > 10.0);
-    assert!(compare(0, &tracks), "the samples miss it");
+    assert!(compare(0, &tracks), "the samples miss the violation");
     let mut moved = tracks.clone();
     moved[1][1].1.y = 4.0;
     let (right, wrong) = (judged(&tracks), judged(&moved));

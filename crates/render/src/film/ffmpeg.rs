@@ -1,4 +1,4 @@
-//! H.264 in MP4 by `ffmpeg` on PATH.
+//! H.264 in MP4 by an external `ffmpeg`.
 
 use std::env;
 use std::fs::{self, File};
@@ -12,21 +12,21 @@ use super::FilmEncoder;
 use crate::error::RenderError;
 use crate::picture::Picture;
 
-/// Pictures go to the standard input of `ffmpeg`. It writes a temporary file, since an MP4 file begins with a table of what
-/// follows; the film is copied from there.
+/// Encoder that pipes pictures to `ffmpeg`. An MP4 file begins with a table of its content, so `ffmpeg` writes a
+/// temporary file, which is copied at the end.
 pub(super) struct Ffmpeg<W> {
     out: W,
     child: Child,
-    /// Holds the film and what ffmpeg prints.
+    /// Temporary folder with the film and the error output of `ffmpeg`.
     folder: TempDir,
 }
 
-/// Looks for `ffmpeg` on PATH.
+/// Checks that `ffmpeg` is on PATH.
 pub(super) fn check() -> Result<(), RenderError> {
     let name = format!("ffmpeg{}", env::consts::EXE_SUFFIX);
     let path = env::var_os("PATH").unwrap_or_default();
-    let is_there = env::split_paths(&path).any(|folder| folder.join(&name).is_file());
-    if is_there { Ok(()) } else { Err(RenderError::NoFfmpeg) }
+    let is_found = env::split_paths(&path).any(|folder| folder.join(&name).is_file());
+    if is_found { Ok(()) } else { Err(RenderError::NoFfmpeg) }
 }
 
 fn failed(error: impl std::fmt::Display) -> RenderError {
@@ -61,9 +61,9 @@ impl<W: Write> Ffmpeg<W> {
         self.folder.path().join("film.mp4")
     }
 
-    /// The last line that ffmpeg printed, or else another error.
-    fn complaint(&mut self, other: &dyn std::fmt::Display) -> RenderError {
-        self.end();
+    /// Returns the last line of ffmpeg's error output as an error, or `other` if there is no output.
+    fn ffmpeg_error(&mut self, other: &dyn std::fmt::Display) -> RenderError {
+        self.stop();
         let printed = fs::read(self.folder.path().join("printed")).unwrap_or_default();
         let printed = String::from_utf8_lossy(&printed);
         match printed.lines().rfind(|line| !line.trim().is_empty()) {
@@ -72,8 +72,8 @@ impl<W: Write> Ffmpeg<W> {
         }
     }
 
-    /// Ends ffmpeg where it still runs.
-    fn end(&mut self) {
+    /// Stops ffmpeg if it still runs.
+    fn stop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -83,18 +83,18 @@ impl<W: Write + Send> FilmEncoder for Ffmpeg<W> {
     fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
         let Some(input) = &mut self.child.stdin else { return Err(failed("ffmpeg has ended")) };
         let written = pictures.iter().try_for_each(|picture| input.write_all(&picture.rgba));
-        written.map_err(|error| self.complaint(&format!("ffmpeg takes no more pictures: {error}")))
+        written.map_err(|error| self.ffmpeg_error(&format!("ffmpeg takes no more pictures: {error}")))
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), RenderError> {
         drop(self.child.stdin.take());
         let status = self.child.wait().map_err(failed)?;
         if !status.success() {
-            return Err(self.complaint(&status));
+            return Err(self.ffmpeg_error(&status));
         }
         match File::open(self.film()) {
             Ok(mut film) if film.metadata()?.len() > 0 => io::copy(&mut film, &mut self.out)?,
-            _ => return Err(self.complaint(&"ffmpeg wrote no film")),
+            _ => return Err(self.ffmpeg_error(&"ffmpeg wrote no film")),
         };
         Ok(())
     }
@@ -113,7 +113,7 @@ mod tests {
 
     use super::*;
 
-    /// A program in the place of ffmpeg.
+    /// Writes a script that replaces ffmpeg.
     fn script(folder: &Path, text: &str) -> PathBuf {
         let path = folder.join("ffmpeg");
         fs::write(&path, format!("#!/bin/sh\n{text}\n")).expect("written");
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn ffmpeg_gets_every_picture_and_its_file_is_copied_and_removed() {
+    fn ffmpeg_gets_every_picture_and_its_file_is_copied() {
         let folder = tempfile::tempdir().expect("a folder");
         let list = folder.path().join("arguments");
         let program =
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ffmpeg_that_fails_is_an_error_in_its_words_and_none_is_one_with_a_remedy() {
+    fn a_failing_or_missing_ffmpeg_is_reported() {
         let folder = tempfile::tempdir().expect("a folder");
         let program = script(folder.path(), "cat > /dev/null; echo no such encoder >&2; exit 1");
         let failed = film(&program, &mut Vec::new()).expect_err("it failed");
@@ -157,7 +157,7 @@ mod tests {
             ("cat > /dev/null", "ffmpeg wrote no film"),
         ] {
             let mut film = Ffmpeg::start(&script(folder.path(), text), Vec::new(), [2, 4], 25).expect("it starts");
-            // More than a pipe holds: a program that has closed its input is noticed.
+            // More than a pipe holds, so that a closed input is noticed.
             let added = film.add(&[Picture { size_px: [2, 4], rgba: vec![3; 1 << 20] }]);
             let failed = added.and_then(|()| Box::new(film).finish()).expect_err(text).to_string();
             assert!(failed.contains(expected), "{text}: {failed}");

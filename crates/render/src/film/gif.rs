@@ -1,4 +1,4 @@
-//! GIF.
+//! GIF encoder.
 
 use std::io::Write;
 
@@ -8,10 +8,10 @@ use super::FilmEncoder;
 use crate::error::RenderError;
 use crate::picture::Picture;
 
-/// Shortest that browsers show a picture: two hundredths of a second.
-pub(super) const MOST_FPS: u32 = 50;
-/// How coarsely the colours of a picture are looked at: 1 every pixel, 30 the fastest. At 3 less than half as many pixels
-/// are off by 16 units or more as at 10, in twice the time.
+/// Highest frame rate: browsers show a picture for at least two hundredths of a second.
+pub(super) const MAX_FPS: u32 = 50;
+/// Sampling factor of colours: 1 samples every pixel, 30 is the fastest. At 3 less than half as many pixels are off by
+/// 16 units or more as at 10, in twice the time.
 const SPEED: i32 = 3;
 
 pub(super) struct Gif<W: Write> {
@@ -46,7 +46,7 @@ impl<W: Write + Send> FilmEncoder for Gif<W> {
             frame
         });
         for mut frame in chosen.collect::<Vec<_>>() {
-            // Hundredths of a second, rounded so that they add up to the right time.
+            // Delays in hundredths of a second, rounded so that their sum is exact.
             let until = |pictures: u32| u64::from(pictures) * 100 / u64::from(self.fps);
             frame.delay = u16::try_from(until(self.pictures + 1) - until(self.pictures)).unwrap_or(u16::MAX);
             self.pictures += 1;

@@ -1,4 +1,4 @@
-//! Films: pictures one after another, as MP4 or GIF.
+//! Films: sequences of pictures as MP4 or GIF.
 
 #[cfg(not(feature = "mp4"))]
 mod ffmpeg;
@@ -12,23 +12,23 @@ use std::path::Path;
 use super::error::RenderError;
 use super::picture::Picture;
 
-/// Most pictures a second that a film is made for.
-const MOST_FPS: u32 = 240;
+/// Highest frame rate \[Hz\].
+const MAX_FPS: u32 = 240;
 
-/// What a film is written as.
+/// Film format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilmFormat {
     /// H.264 in MP4, by the encoder of the feature `mp4`, or else by `ffmpeg` on PATH.
     Mp4,
-    /// GIF: 256 colours a picture, at most 50 pictures a second.
+    /// GIF: 256 colours per picture, at most 50 pictures per second.
     Gif,
 }
 
 impl FilmFormat {
-    /// The format that a file's name asks for.
+    /// Returns the format of a file name.
     ///
     /// # Errors
-    /// [`RenderError::UnknownFilm`] when it is none of those that can be made.
+    /// [`RenderError::UnknownFilm`] for any other extension.
     pub fn of(path: &Path) -> Result<Self, RenderError> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
@@ -38,7 +38,7 @@ impl FilmFormat {
         }
     }
 
-    /// Whether something here encodes the format.
+    /// Checks that an encoder for the format is available.
     ///
     /// # Errors
     /// [`RenderError::NoFfmpeg`] for MP4 without the feature `mp4` and without `ffmpeg` on PATH.
@@ -50,25 +50,27 @@ impl FilmFormat {
         Ok(())
     }
 
-    /// Whether a film can have pictures of this size, so many a second.
+    /// Checks that a film can have pictures of this size at this frame rate.
     ///
     /// # Errors
-    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] when it cannot.
+    /// [`RenderError::FilmSize`] or [`RenderError::FilmRate`] if it cannot.
     pub fn check(self, size_px: [u32; 2], fps: u32) -> Result<(), RenderError> {
-        let (name, most) = match self {
-            Self::Mp4 => ("MP4", MOST_FPS),
-            Self::Gif => ("GIF", gif::MOST_FPS),
+        let (name, max_fps) = match self {
+            Self::Mp4 => ("MP4", MAX_FPS),
+            Self::Gif => ("GIF", gif::MAX_FPS),
         };
-        if !(1..=most).contains(&fps) {
-            let what = format!("{name} films have from 1 to {most} pictures a second, not {fps}");
+        if !(1..=max_fps).contains(&fps) {
+            let what = format!("{name} films must have 1 to {max_fps} pictures per second, got {fps}");
             return Err(RenderError::FilmRate(what));
         }
         let [width, height] = size_px;
         let (shorter, longer) = (width.min(height), width.max(height));
         let why = match self {
             Self::Mp4 if width % 2 == 1 || height % 2 == 1 => "H.264 needs even sides",
-            Self::Mp4 if shorter < 16 || longer > 3840 || shorter > 2160 => "from 16 x 16 to 3840 x 2160",
-            Self::Gif if shorter == 0 || longer > u32::from(u16::MAX) => "a side has from 1 to 65535",
+            Self::Mp4 if shorter < 16 || longer > 3840 || shorter > 2160 => {
+                "the size must be from 16 x 16 to 3840 x 2160"
+            }
+            Self::Gif if shorter == 0 || longer > u32::from(u16::MAX) => "sides must be from 1 to 65535",
             _ => return Ok(()),
         };
         let what = format!("a {name} film cannot have pictures of {width} x {height} pixels: {why}");
@@ -76,8 +78,8 @@ impl FilmFormat {
     }
 }
 
-/// A film in the making. What is encoded is written at once, but for MP4: its pictures, which are small, wait in memory
-/// for the table that comes before them.
+/// Film that is being encoded. Encoded data are written at once, except for MP4: its encoded pictures, which are small,
+/// stay in memory until the table before them is written.
 pub struct Film<'a> {
     size_px: [u32; 2],
     wanted: u32,
@@ -86,12 +88,11 @@ pub struct Film<'a> {
 }
 
 impl<'a> Film<'a> {
-    /// The beginning of a film of so many pictures of one size, so many a second. It is written in small pieces: `out`
-    /// should be buffered, and flushed at the end.
+    /// Begins a film of `pictures` pictures of one size at `fps`. It is written in small parts, so `out` should be
+    /// buffered and flushed at the end.
     ///
     /// # Errors
-    /// [`RenderError`] when the format does not allow the size or the rate, when it has no pictures, or when it cannot be
-    /// written.
+    /// [`RenderError`] if the format does not allow the size or the rate, without pictures, or if writing fails.
     pub fn new<W: Write + Send + 'a>(
         out: W,
         format: FilmFormat,
@@ -113,13 +114,13 @@ impl<'a> Film<'a> {
         Ok(Self { size_px, wanted: pictures, given: 0, encoder })
     }
 
-    /// Adds pictures in order. What can be done to each by itself is done side by side.
+    /// Adds pictures in order. Work on single pictures runs in parallel.
     ///
     /// # Errors
-    /// [`RenderError`] when one has another size, when the encoder fails, or when it cannot be written.
+    /// [`RenderError`] if a picture has another size, the encoder fails, or writing fails.
     pub fn add(&mut self, pictures: &[Picture]) -> Result<(), RenderError> {
         if pictures.iter().any(|picture| picture.size_px != self.size_px) {
-            return Err(RenderError::Film("a picture of the film has another size than the film".to_owned()));
+            return Err(RenderError::Film("all pictures of a film must have the size of the film".to_owned()));
         }
         self.given = u32::try_from(pictures.len()).map_or(u32::MAX, |more| self.given.saturating_add(more));
         self.encoder.add(pictures)
@@ -128,12 +129,11 @@ impl<'a> Film<'a> {
     /// Writes the end of the film.
     ///
     /// # Errors
-    /// [`RenderError`] when it has not as many pictures as it was made for, when the encoder fails, or when it cannot be
-    /// written.
+    /// [`RenderError`] if the number of pictures is not the announced one, the encoder fails, or writing fails.
     pub fn finish(self) -> Result<(), RenderError> {
         let Self { wanted, given, .. } = self;
         if wanted != given {
-            return Err(RenderError::Film(format!("the film was to have {wanted} pictures, not {given}")));
+            return Err(RenderError::Film(format!("the film must have {wanted} pictures, got {given}")));
         }
         self.encoder.finish()
     }

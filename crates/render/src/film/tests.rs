@@ -19,7 +19,7 @@ fn film(format: FilmFormat, fps: u32, pictures: &[Picture]) -> Vec<u8> {
 }
 
 #[test]
-fn a_gif_holds_every_picture_and_lasts_as_long_as_it_should() {
+fn a_gif_holds_every_picture_and_has_the_right_duration() {
     let bytes = film(FilmFormat::Gif, 30, &pictures([20, 10], 6));
     let mut decoder = gif_decoder(&bytes);
     let mut delays = Vec::new();
@@ -35,7 +35,7 @@ fn gif_decoder(bytes: &[u8]) -> ::gif::Decoder<&[u8]> {
 
 #[cfg(feature = "mp4")]
 #[test]
-fn an_mp4_holds_every_picture_in_its_colours() {
+fn an_mp4_holds_every_picture_with_its_colours() {
     let pictures = pictures([64, 32], 10);
     let bytes = film(FilmFormat::Mp4, 20, &pictures);
     assert_eq!(bytes[4..8], *b"ftyp");
@@ -53,7 +53,7 @@ fn an_mp4_holds_every_picture_in_its_colours() {
             yuv.write_rgb8(&mut rgb);
             let middle = &rgb[(16 * 64 + 32) * 3..][..3];
             for (found, wanted) in middle.iter().zip(&picture.rgba[..3]) {
-                // 8 bits of brightness and colour in less than the full range lose some units.
+                // 8 bits of brightness and colour with less than the full range lose some units.
                 assert!(found.abs_diff(*wanted) <= 8, "{middle:?} of {:?}", &picture.rgba[..3]);
             }
             decoded += 1;
@@ -63,34 +63,34 @@ fn an_mp4_holds_every_picture_in_its_colours() {
 }
 
 #[test]
-fn what_a_format_does_not_allow_is_refused() {
+fn unsupported_sizes_and_rates_are_refused() {
     assert!(matches!(FilmFormat::Mp4.check([63, 32], 20), Err(RenderError::FilmSize(_))));
     assert!(matches!(FilmFormat::Mp4.check([8000, 4000], 20), Err(RenderError::FilmSize(_))));
     assert!(matches!(FilmFormat::Gif.check([70_000, 10], 20), Err(RenderError::FilmSize(_))));
     let too_fast = FilmFormat::Gif.check([10, 10], 60).expect_err("too fast").to_string();
-    assert_eq!(too_fast, "GIF films have from 1 to 50 pictures a second, not 60");
+    assert_eq!(too_fast, "GIF films must have 1 to 50 pictures per second, got 60");
     assert!(matches!(Film::new(Vec::new(), FilmFormat::Gif, [10, 10], 0, 1), Err(RenderError::FilmRate(_))));
-    assert!(Film::new(Vec::new(), FilmFormat::Gif, [10, 10], 10, 0).is_err(), "a film without pictures is none");
+    assert!(Film::new(Vec::new(), FilmFormat::Gif, [10, 10], 10, 0).is_err(), "a film needs pictures");
     let mut film = Film::new(Vec::new(), FilmFormat::Gif, [10, 10], 10, 2).expect("a film");
     let mixed = film.add(&pictures([20, 10], 1)).expect_err("another size").to_string();
-    assert_eq!(mixed, "a picture of the film has another size than the film");
+    assert_eq!(mixed, "all pictures of a film must have the size of the film");
     film.add(&pictures([10, 10], 1)).expect("a picture");
-    assert_eq!(film.finish().expect_err("too few").to_string(), "the film was to have 2 pictures, not 1");
+    assert_eq!(film.finish().expect_err("too few").to_string(), "the film must have 2 pictures, got 1");
     assert_eq!(FilmFormat::of(Path::new("a/film.MP4")).ok(), Some(FilmFormat::Mp4));
     let refused = FilmFormat::of(Path::new("film.avi"));
     assert!(matches!(&refused, Err(RenderError::UnknownFilm(name)) if name == "film.avi"), "{refused:?}");
     assert!(FilmFormat::of(Path::new("film")).is_err());
 }
 
-/// Takes so many bytes and then no more.
+/// Writer that fails after `room` bytes.
 struct Full<'a> {
     room: usize,
-    most_at_once: &'a mut usize,
+    largest_write: &'a mut usize,
 }
 
 impl Write for Full<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        *self.most_at_once = bytes.len().max(*self.most_at_once);
+        *self.largest_write = bytes.len().max(*self.largest_write);
         self.room = self.room.checked_sub(bytes.len()).ok_or_else(|| io::Error::other("no room"))?;
         Ok(bytes.len())
     }
@@ -101,7 +101,7 @@ impl Write for Full<'_> {
 }
 
 #[test]
-fn what_cannot_be_written_is_an_error_wherever_it_happens() {
+fn a_write_error_is_reported_at_any_position() {
     #[cfg(feature = "mp4")]
     let formats = [FilmFormat::Mp4, FilmFormat::Gif];
     #[cfg(not(feature = "mp4"))]
@@ -110,40 +110,40 @@ fn what_cannot_be_written_is_an_error_wherever_it_happens() {
         let pictures = pictures([64, 32], 3);
         let whole = film(format, 20, &pictures).len();
         for room in [0, whole / 2, whole - 1] {
-            let mut most_at_once = 0;
-            let out = Full { room, most_at_once: &mut most_at_once };
+            let mut largest_write = 0;
+            let out = Full { room, largest_write: &mut largest_write };
             let written = Film::new(out, format, [64, 32], 20, 3).and_then(|mut film| {
                 film.add(&pictures)?;
                 film.finish()
             });
-            let said = matches!(&written, Err(RenderError::Write(error)) if error.to_string() == "no room");
-            assert!(said, "{format:?}, {room} bytes: {written:?}");
+            let is_reported = matches!(&written, Err(RenderError::Write(error)) if error.to_string() == "no room");
+            assert!(is_reported, "{format:?}, {room} bytes: {written:?}");
         }
     }
 }
 
 #[test]
-fn pictures_are_written_as_they_come() {
+fn pictures_are_written_at_once() {
     let pictures = pictures([64, 32], 3);
     let whole = film(FilmFormat::Gif, 20, &pictures).len();
     let mut out = Vec::new();
     let mut film = Film::new(&mut out, FilmFormat::Gif, [64, 32], 20, 3).expect("a film");
     film.add(&pictures).expect("pictures");
-    // Not finished, so that nothing but the end is left to write.
+    // Without `finish` only the end of the file is missing.
     std::mem::forget(film);
     assert!(out.len() + 16 > whole, "{} of {whole} bytes", out.len());
 }
 
 #[cfg(feature = "mp4")]
 #[test]
-fn every_film_lasts_as_long_as_its_pictures() {
+fn an_mp4_has_the_right_duration() {
     for count in [1, 2, 5] {
         let bytes = film(FilmFormat::Mp4, 20, &pictures([64, 32], count));
-        // The header of the media: version and flags, two dates, ticks a second, ticks.
+        // The media header: version and flags, two dates, ticks per second, ticks.
         let at = bytes.windows(4).position(|name| name == b"mdhd").expect("a header") + 4;
-        let [ticks_a_second, ticks] =
+        let [ticks_per_second, ticks] =
             [12, 16].map(|after| u32::from_be_bytes(bytes[at + after..][..4].try_into().expect("four bytes")));
-        let lasts_s = f64::from(ticks) / f64::from(ticks_a_second);
+        let lasts_s = f64::from(ticks) / f64::from(ticks_per_second);
         assert!((lasts_s - f64::from(count) / 20.0).abs() < 1e-4, "{count} pictures last {lasts_s} s");
     }
 }

@@ -1,4 +1,4 @@
-//! Finding a graphics adapter.
+//! Selection and start of a graphics adapter.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -6,17 +6,17 @@ use wgpu::DeviceType;
 
 use crate::error::RenderError;
 
-/// Which adapter draws.
+/// Choice of the adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The best there is: hardware first, then software.
+    /// Best adapter: hardware first, then software.
     #[default]
     Best,
-    /// Hardware alone.
+    /// Hardware only.
     Hardware,
-    /// A driver in software alone.
+    /// Software drivers only.
     Software,
-    /// The first whose name contains these words, whatever their case.
+    /// First adapter whose name contains this text, case-insensitive.
     Named(String),
 }
 
@@ -31,29 +31,29 @@ impl From<&str> for AdapterChoice {
     }
 }
 
-/// Ways to speak to adapters. OpenGL is none of them: it cannot say which samples of a pixel a ball covers.
+/// Graphics APIs. OpenGL is excluded: its shaders cannot set the sample mask that balls need.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
-/// Kinds of adapters, the best first.
+/// Device types, best first.
 const BEST_FIRST: [DeviceType; 5] =
     [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu, DeviceType::VirtualGpu, DeviceType::Other, DeviceType::Cpu];
 
-/// What finds adapters, for pictures alone or for windows on a display.
+/// Creates an instance that finds adapters, for off-screen pictures or for windows on a display.
 pub(crate) fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
     let headless = wgpu::InstanceDescriptor::new_without_display_handle();
     wgpu::Instance::new(wgpu::InstanceDescriptor { backends: BACKENDS, display, ..headless })
 }
 
-/// That an adapter is gone.
+/// Returns the error of a lost adapter.
 pub(crate) fn lost() -> RenderError {
     RenderError::Driver("the graphics adapter was lost".to_owned())
 }
 
-/// That a driver failed, and said this.
-pub(super) fn failed(said: impl std::fmt::Display) -> RenderError {
-    RenderError::Driver(format!("the graphics driver failed: {said}"))
+/// Returns the error of a failed driver.
+pub(super) fn failed(message: impl std::fmt::Display) -> RenderError {
+    RenderError::Driver(format!("the graphics driver failed: {message}"))
 }
 
-/// An adapter at work.
+/// Started adapter.
 #[derive(Clone)]
 pub(crate) struct Gpu {
     pub(crate) name: String,
@@ -62,12 +62,12 @@ pub(crate) struct Gpu {
     pub(crate) adapter: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// The first error that nobody asked for.
-    trouble: Arc<Mutex<Option<String>>>,
+    /// First uncaptured error of the driver.
+    uncaptured_error: Arc<Mutex<Option<String>>>,
 }
 
 impl Gpu {
-    /// Starts the best adapter of a choice, for a surface one that can show what it draws on it.
+    /// Starts the best adapter of a choice. With a surface, the adapter must be able to draw on it.
     pub(crate) fn open(
         instance: &wgpu::Instance,
         choice: &AdapterChoice,
@@ -76,7 +76,7 @@ impl Gpu {
         let adapter = pick(instance, choice, surface)?;
         let name = name(&adapter);
         let limits = adapter.limits();
-        // The limits of the adapter itself would forbid another one to do the same; a picture needs few of them.
+        // Full limits would depend on the adapter; pictures need only these.
         let required_limits = wgpu::Limits {
             max_texture_dimension_2d: limits.max_texture_dimension_2d,
             max_buffer_size: limits.max_buffer_size,
@@ -87,8 +87,8 @@ impl Gpu {
         let descriptor = wgpu::DeviceDescriptor { required_limits, memory_hints, ..wgpu::DeviceDescriptor::default() };
         let started = pollster::block_on(adapter.request_device(&descriptor));
         let (device, queue) = started.map_err(|error| unusable(&name, error))?;
-        let trouble = Arc::new(Mutex::new(None));
-        let kept = Arc::clone(&trouble);
+        let uncaptured_error = Arc::new(Mutex::new(None));
+        let kept = Arc::clone(&uncaptured_error);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             kept.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
@@ -99,7 +99,7 @@ impl Gpu {
             adapter,
             device,
             queue,
-            trouble,
+            uncaptured_error,
         })
     }
 
@@ -112,14 +112,14 @@ impl Gpu {
         Err(RenderError::PictureSize(format!("{cannot}: {adapter} draws from 1 to {largest} pixels a side")))
     }
 
-    /// Whether the driver has failed since the last call.
+    /// Checks that the driver has not failed since the last call.
     pub(crate) fn check(&self) -> Result<(), RenderError> {
-        let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).take();
-        trouble.map_or(Ok(()), |said| Err(failed(said)))
+        let uncaptured_error = self.uncaptured_error.lock().unwrap_or_else(PoisonError::into_inner).take();
+        uncaptured_error.map_or(Ok(()), |message| Err(failed(message)))
     }
 }
 
-/// That the adapter of this name cannot be started.
+/// Returns the error of an adapter that cannot be started.
 pub(crate) fn unusable(adapter: &str, reason: impl std::fmt::Display) -> RenderError {
     RenderError::Driver(format!("the adapter {adapter} cannot be used: {reason}"))
 }
@@ -129,7 +129,7 @@ fn name(adapter: &wgpu::Adapter) -> String {
     format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend)
 }
 
-/// The first adapter of a choice, the best first.
+/// Returns the best adapter of a choice.
 fn pick(
     instance: &wgpu::Instance,
     choice: &AdapterChoice,

@@ -1,8 +1,8 @@
-//! Draws scenes with wgpu, with or without a screen.
+//! Rendering of scenes with wgpu, off-screen or in a window.
 //!
-//! Balls are flat pieces on which every pixel finds its own point of the sphere and every sample of a pixel its own
-//! edge, so that they are round at any size and cost what they cover. Everything is multisampled four times and blended
-//! as light; words and legends are laid over it by egui. A frame is uploaded once and drawn in two passes.
+//! A ball is a flat quad. Every pixel computes its point of the sphere, and every sample of a pixel its own edge. Balls
+//! are round at any size and cost only the pixels that they cover. Pictures use four samples per pixel and blending in
+//! linear light; egui draws text and legends on top. A frame is uploaded once and drawn in two passes.
 //!
 //! The same scene gives the same bytes on the same adapter and driver.
 
@@ -27,7 +27,7 @@ use super::timeline::Timeline;
 use overlay::Overlay;
 use pipelines::Pipelines;
 
-/// Draws scenes into pictures.
+/// Renderer of scenes to pictures.
 pub struct Renderer {
     pub(crate) gpu: Gpu,
     pipelines: Pipelines,
@@ -39,7 +39,7 @@ impl Renderer {
     /// Starts an adapter.
     ///
     /// # Errors
-    /// [`RenderError`] when there is none of this choice.
+    /// [`RenderError`] if no adapter matches the choice.
     pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
         Ok(Self::on(Gpu::open(&instance(None), choice, None)?))
     }
@@ -49,24 +49,24 @@ impl Renderer {
         Self { gpu, pipelines, overlay, target: None }
     }
 
-    /// Name of the adapter, what kind it is and how it is driven.
+    /// Returns name, device type and graphics API of the adapter.
     #[must_use]
     pub fn adapter(&self) -> &str {
         &self.gpu.name
     }
 
-    /// Whether pictures of this width and height \[pixels\] can be drawn.
+    /// Checks that pictures of this width and height \[pixels\] can be drawn.
     ///
     /// # Errors
-    /// [`RenderError::PictureSize`] when a side is not between 1 and the most that the adapter draws.
+    /// [`RenderError::PictureSize`] if a side is not between 1 and the adapter's maximum.
     pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), RenderError> {
         self.gpu.check_size(size_px)
     }
 
-    /// The picture of a scene.
+    /// Draws a scene into a picture.
     ///
     /// # Errors
-    /// [`RenderError`] when the adapter cannot draw a picture of this size, or fails.
+    /// [`RenderError`] if the adapter cannot draw a picture of this size, or fails.
     pub fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
         let gpu = self.gpu.clone();
         let picture = self.draw(scene, true)?.read(&gpu)?;
@@ -74,10 +74,10 @@ impl Renderer {
         Ok(picture)
     }
 
-    /// The picture of a flight at a time \[s\], which is brought into its range.
+    /// Draws a flight at a time \[s\], which is clamped to its range.
     ///
     /// # Errors
-    /// [`RenderError`] when there is nothing to draw, the camera cannot be used or the adapter fails.
+    /// [`RenderError`] without samples, with an invalid camera, or if the adapter fails.
     pub fn shoot(&mut self, timeline: &Timeline, time_s: f64, view: &View) -> Result<Picture, RenderError> {
         let frame = timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
         let extent = Extent::of(timeline);
@@ -89,7 +89,7 @@ impl Renderer {
     pub(crate) fn draw(&mut self, scene: &Scene, with_annotations: bool) -> Result<&Target, RenderError> {
         let size_px = scene.camera.size_px;
         self.gpu.check_size(size_px)?;
-        // One of another size makes room first.
+        // A target of another size is freed first.
         self.target.take_if(|target| target.size_px != size_px);
         let target = match &mut self.target {
             Some(target) => target,
@@ -106,11 +106,11 @@ impl Renderer {
     }
 }
 
-/// Samples of a pixel.
+/// Number of samples per pixel.
 const SAMPLES: u32 = 4;
-/// Format of a picture while light is added up.
+/// Texture format for blending in linear light.
 const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
-/// Format of the same picture while words are laid over it.
+/// Texture format of the same picture for text.
 const WORDS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
@@ -118,9 +118,9 @@ const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub(crate) struct Target {
     pub(super) size_px: [u32; 2],
     texture: wgpu::Texture,
-    /// The picture as light.
+    /// View for blending in linear light.
     pub(super) light_view: wgpu::TextureView,
-    /// The picture as bytes.
+    /// View of the bytes as they are.
     pub(crate) words_view: wgpu::TextureView,
     pub(super) samples_view: wgpu::TextureView,
     pub(super) depth_view: wgpu::TextureView,
@@ -163,7 +163,7 @@ impl Target {
         }
     }
 
-    /// The picture, once everything submitted is drawn.
+    /// Reads the picture back after all submitted work.
     fn read(&self, gpu: &Gpu) -> Result<Picture, RenderError> {
         let [width, height] = self.size_px;
         let row_bytes = width * 4;
@@ -190,7 +190,7 @@ impl Target {
         gpu.queue.submit([encoder.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // Whoever asked may have given up.
+            // The receiver may be gone.
             let _ = sender.send(mapped);
         });
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(failed)?;

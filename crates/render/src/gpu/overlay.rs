@@ -1,4 +1,4 @@
-//! Words and legends, by egui.
+//! Text and legends, drawn with egui.
 
 use egui::epaint::{ClippedPrimitive, Mesh, Vertex};
 use egui::{Color32, FontId, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2, pos2};
@@ -8,7 +8,7 @@ use super::adapter::Gpu;
 use super::{Target, WORDS_FORMAT};
 use crate::scene::{Annotation, Colour};
 
-/// Lays annotations over pictures.
+/// Draws annotations over pictures.
 pub(super) struct Overlay {
     context: egui::Context,
     renderer: egui_wgpu::Renderer,
@@ -33,7 +33,7 @@ impl Overlay {
         let input = egui::RawInput {
             screen_rect: Some(screen),
             max_texture_side: Some(gpu.largest_px as usize),
-            // A clock would be an input that differs from run to run.
+            // A fixed time keeps pictures deterministic.
             time: Some(0.0),
             ..egui::RawInput::default()
         };
@@ -70,7 +70,7 @@ impl Overlay {
     }
 }
 
-/// Paints annotations with the top left corner of their picture at `origin` \[points\], so many pixels a point.
+/// Draws annotations with the top left corner of their picture at `origin` \[points\].
 pub(crate) fn paint(painter: &egui::Painter, annotations: &[Annotation], origin: Vec2, pixels_per_point: f32) {
     let scale = 1.0 / pixels_per_point;
     let at = |[x, y]: [f32; 2]| pos2(x * scale, y * scale) + origin;
@@ -133,13 +133,13 @@ mod tests {
     use super::*;
     use crate::scene::width;
 
-    /// Letters are put on quarters of a pixel, or on whole ones.
+    /// Letters are placed at quarters of a pixel, or at whole ones.
     const ROUNDING_PX: f32 = 0.5;
 
     #[test]
-    fn words_are_as_wide_as_the_scene_takes_them_to_be() {
+    fn text_widths_match_the_layout() {
         let context = egui::Context::default();
-        let mut most = 0.0_f32;
+        let mut largest = 0.0_f32;
         let mut output = context.run_pass(egui::RawInput::default(), |context| {
             let painter = context.layer_painter(egui::LayerId::background());
             for text in
@@ -147,11 +147,11 @@ mod tests {
             {
                 for size_px in [9.0, 17.0, 40.0] {
                     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(size_px), Color32::WHITE);
-                    most = most.max((galley.size().x - width(size_px, text)).abs() / text.len() as f32);
+                    largest = largest.max((galley.size().x - width(size_px, text)).abs() / text.len() as f32);
                 }
             }
         });
         output.textures_delta.clear();
-        assert!(most <= ROUNDING_PX, "{most} pixels a letter");
+        assert!(largest <= ROUNDING_PX, "{largest} pixels a letter");
     }
 }

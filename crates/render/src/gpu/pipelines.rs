@@ -1,4 +1,4 @@
-//! Balls, discs, shells and lines as instances.
+//! Render pipelines of balls, discs, shells and lines as instances.
 
 use bytemuck::Pod;
 use nalgebra::Vector3;
@@ -8,7 +8,7 @@ use super::adapter::Gpu;
 use super::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
 use crate::scene::{Ball, Disc, Lens, Line, Scene};
 
-/// `Camera` in shaders/scene.wgsl: right, up, back, eye, lens and range.
+/// Uniform `Camera` of shaders/scene.wgsl: right, up, back, eye, lens and range.
 type CameraUniform = [[f32; 4]; 6];
 
 fn camera_uniform(scene: &Scene) -> CameraUniform {
@@ -26,14 +26,14 @@ fn camera_uniform(scene: &Scene) -> CameraUniform {
     [wide(camera.right), wide(camera.up), wide(camera.back), wide(camera.eye_m), lens, range]
 }
 
-/// A pipeline, and the camera as it knows it.
+/// Pipeline with its camera binding.
 struct DrawCall {
     pipeline: wgpu::RenderPipeline,
     camera: wgpu::BindGroup,
 }
 
 impl DrawCall {
-    /// Draws a copy of a strip of four corners for each instance.
+    /// Draws a strip of four corners for each instance.
     fn draw<T: Pod>(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>, instances: &[T]) {
         if instances.is_empty() {
             return;
@@ -47,7 +47,7 @@ impl DrawCall {
     }
 }
 
-/// Everything that draws what has a place in space.
+/// Pipelines of all elements with a position in space.
 pub(super) struct Pipelines {
     camera: wgpu::Buffer,
     balls: DrawCall,
@@ -123,8 +123,7 @@ impl Pipelines {
         }
     }
 
-    /// Draws solid things first, then what lets light through. Lines hide nothing: of two on one another, the later one
-    /// is seen.
+    /// Draws solid elements first, then transparent ones. Lines do not hide each other: the later line is on top.
     pub(super) fn draw(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, target: &Target, scene: &Scene) {
         gpu.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&camera_uniform(scene)));
         let [r, g, b, _] = scene.background.linear().map(f64::from);

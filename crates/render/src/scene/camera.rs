@@ -1,4 +1,4 @@
-//! Where the picture is taken from.
+//! Cameras: specification, framing, and projection.
 
 use std::str::FromStr;
 
@@ -6,36 +6,36 @@ use nalgebra::Vector3;
 
 use crate::error::RenderError;
 
-/// Half of the vertical angle of view, as a tangent: 35 degrees in all.
+/// Tangent of half the vertical angle of view, which is 35 degrees.
 pub(crate) const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
-/// Parts of the picture's half width and height that framing leaves to captions: left, right, bottom, top.
+/// Margins that framing leaves for captions, relative to half the width or height: left, right, bottom, top.
 const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
-/// Nearest that a camera is put to what it looks at \[m\].
+/// Smallest distance of a camera from its target \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
-/// Where `iso` looks from: azimuth and elevation \[degrees\].
+/// Azimuth and elevation of `iso` \[degrees\].
 pub(crate) const ISO_DEG: [f64; 2] = [-62.0, 32.0];
 
-/// Which camera to use.
+/// Choice of the camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum CameraSpec {
-    /// From above at an angle, framing the whole flight.
+    /// View from above at an angle that frames the whole flight.
     #[default]
     Iso,
-    /// Straight down, x to the right and y up, in parallel projection, framing the whole flight.
+    /// View straight down, x to the right and y up, in parallel projection, framing the whole flight.
     Top,
-    /// Along +y, x to the right and z up, in parallel projection, framing the whole flight.
+    /// View along +y, x to the right and z up, in parallel projection, framing the whole flight.
     Front,
-    /// Along -x, y to the right and z up, in parallel projection, framing the whole flight.
+    /// View along -x, y to the right and z up, in parallel projection, framing the whole flight.
     Side,
-    /// At the angle of `iso`, moving with the vehicle of this name.
+    /// View at the angle of `iso` that follows the vehicle of this name.
     Follow(String),
-    /// At the angle of `iso`, near the closest pair.
+    /// View at the angle of `iso`, near the closest pair.
     Closest,
-    /// Around the middle of the flight.
+    /// View from a given direction and distance of the centre of the flight.
     Orbit(Orbit),
 }
 
-/// A camera on a sphere around what it looks at.
+/// Camera on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
     /// Direction from the target to the camera, from the x axis towards the y axis \[degrees\].
@@ -79,45 +79,45 @@ impl FromStr for CameraSpec {
     }
 }
 
-/// How depth becomes size.
+/// Projection of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
-    /// Half of the picture's width and height, as tangents.
+    /// Perspective: tangents of half the angle of view, horizontal and vertical.
     Perspective([f64; 2]),
-    /// Half of the picture's width and height \[m\].
+    /// Parallel: half the width and height of the view \[m\].
     Parallel([f64; 2]),
 }
 
-/// A camera in place. Lengths are in the scene's frame.
+/// Camera with position and projection. Lengths are in scene coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it is \[m\].
+    /// Position \[m\].
     pub eye_m: Vector3<f64>,
     /// Unit vector to the right of the picture.
     pub right: Vector3<f64>,
     /// Unit vector to the top of the picture.
     pub up: Vector3<f64>,
-    /// Unit vector from what is looked at to the camera.
+    /// Unit vector from the target to the camera.
     pub back: Vector3<f64>,
-    /// Perspective or parallel.
+    /// Projection.
     pub lens: Lens,
     /// Width and height of the picture \[pixels\].
     pub size_px: [u32; 2],
 }
 
-/// A point in the picture.
+/// Projection of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
-    /// To the right and down from the top left corner \[pixels\].
+    /// Position, to the right and down from the top left corner \[pixels\].
     pub at_px: [f64; 2],
     /// Distance ahead of the camera \[m\].
     pub depth_m: f64,
-    /// Pixels in a metre across the line of sight.
+    /// Pixels per metre across the line of sight.
     pub px_per_m: f64,
 }
 
 impl Camera {
-    /// A camera that sees all balls (centre and radius \[m\]) and is as near as that allows.
+    /// Returns the nearest camera that sees all balls (centre and radius \[m\]).
     pub(super) fn framing(spec: &CameraSpec, balls: &[(Vector3<f64>, f64)], size_px: [u32; 2]) -> Self {
         let ([azimuth_deg, elevation_deg], parallel) = match spec {
             CameraSpec::Top => ([-90.0, 90.0], true),
@@ -131,7 +131,7 @@ impl Camera {
         let across = half * aspect(size_px);
         let room = [across, across, half, half];
         let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - MARGINS[side]));
-        // How far each side of the view must reach.
+        // Required reach of each side of the view.
         let mut reaches = [f64::NEG_INFINITY; 4];
         for (centre, radius) in balls {
             let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
@@ -160,7 +160,7 @@ impl Camera {
         Self { eye_m, right, up, back, lens, size_px }
     }
 
-    /// A camera in perspective that looks at a target \[m\].
+    /// Returns a perspective camera that looks at a target \[m\].
     #[must_use]
     pub fn orbiting(orbit: Orbit, target_m: Vector3<f64>, size_px: [u32; 2]) -> Self {
         let [right, up, back] = axes(orbit.azimuth_deg, orbit.elevation_deg);
@@ -174,7 +174,7 @@ impl Camera {
         }
     }
 
-    /// A camera at the angle of `iso` from which a ball of this radius \[m\] fills the height of the picture.
+    /// Returns a camera at the angle of `iso` from which a ball of this radius \[m\] fills the height of the picture.
     pub(super) fn close_up(target_m: Vector3<f64>, radius_m: f64, size_px: [u32; 2]) -> Self {
         let narrow = TAN_HALF_VIEW * aspect(size_px).min(1.0);
         let distance_m = (radius_m * narrow.hypot(1.0) / narrow).max(MIN_DISTANCE_M);
@@ -182,29 +182,30 @@ impl Camera {
         Self::orbiting(orbit, target_m, size_px)
     }
 
-    /// The point in coordinates of the camera: right, up, towards it \[m\].
-    pub(super) fn seen(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+    /// Transforms a point to camera coordinates: right, up, back \[m\].
+    pub(super) fn to_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         let from_eye = point_m - self.eye_m;
         Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
     }
 
-    /// Where a point is in the picture; none where it is not ahead of a camera in perspective.
+    /// Projects a point to the picture; `None` if it is behind a perspective camera.
     #[must_use]
     pub fn project(&self, point_m: Vector3<f64>) -> Option<Projected> {
-        let seen = self.seen(point_m);
-        let depth_m = -seen.z;
+        let local = self.to_camera_frame(point_m);
+        let depth_m = -local.z;
         let [width, height] = self.size_px.map(f64::from);
         let half = match self.lens {
             Lens::Perspective(tangents) if depth_m > 0.0 => tangents.map(|tangent| tangent * depth_m),
             Lens::Perspective(_) => return None,
             Lens::Parallel(half) => half,
         };
-        let at_px = [(1.0 + seen.x / half[0]) * width / 2.0, (1.0 - seen.y / half[1]) * height / 2.0];
+        let at_px = [(1.0 + local.x / half[0]) * width / 2.0, (1.0 - local.y / half[1]) * height / 2.0];
         let px_per_m = height / 2.0 / half[1];
         at_px.iter().all(|x| x.is_finite()).then_some(Projected { at_px, depth_m, px_per_m })
     }
 
-    /// The ray through a point of the picture \[pixels from the top left corner\]: origin \[m\] and unit direction.
+    /// Returns the ray through a point of the picture \[pixels from the top left corner\]: origin \[m\] and unit
+    /// direction.
     #[cfg(test)]
     pub(super) fn ray(&self, at_px: [f64; 2]) -> [Vector3<f64>; 2] {
         let [width, height] = self.size_px.map(f64::from);
@@ -220,7 +221,7 @@ impl Camera {
     }
 }
 
-/// Right, up and back of a camera in this direction from its target.
+/// Returns right, up and back of a camera in this direction from its target.
 fn axes(azimuth_deg: f64, elevation_deg: f64) -> [Vector3<f64>; 3] {
     let ((sin_a, cos_a), (sin_e, cos_e)) = (azimuth_deg.to_radians().sin_cos(), elevation_deg.to_radians().sin_cos());
     let back = Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e);
@@ -232,7 +233,7 @@ fn aspect([width, height]: [u32; 2]) -> f64 {
     f64::from(width) / f64::from(height.max(1))
 }
 
-/// A distance behind all balls, for parallel projection.
+/// Returns a distance behind all balls, for parallel projection.
 fn far_behind(back: Vector3<f64>, balls: &[(Vector3<f64>, f64)]) -> f64 {
     let (mut nearest, mut farthest) = (f64::NEG_INFINITY, f64::INFINITY);
     for (centre, radius) in balls {
@@ -246,13 +247,13 @@ fn far_behind(back: Vector3<f64>, balls: &[(Vector3<f64>, f64)]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Framing solves linear equations: right to some units of rounding of a picture's width.
+    /// Framing solves linear equations, exact to some units of rounding of a picture's width.
     const ROUNDING_PX: f64 = 1e-6;
 
     fn edges(camera: &Camera, balls: &[(Vector3<f64>, f64)]) -> [f64; 4] {
         let mut sides = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY];
         for &(centre, radius) in balls {
-            // The outline of a ball, from many tangent rays around it.
+            // The outline of a ball, from many tangent rays.
             for k in 0..720_u32 {
                 let (sin, cos) = f64::from(k).to_radians().sin_cos();
                 let across = camera.right * cos + camera.up * sin;
@@ -275,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn framing_shows_every_ball_whole_and_wastes_no_room() {
+    fn framing_shows_every_ball_and_is_tight() {
         let balls = [([0.0, 0.0, 0.0], 1.0), ([12.0, 3.0, 0.0], 0.5), ([5.0, -4.0, 2.0], 1.5)]
             .map(|(centre, radius)| (Vector3::from(centre), radius));
         let specs = ["iso", "top", "front", "side", "20,70,9"].map(|text| CameraSpec::from_str(text).expect(text));
@@ -287,7 +288,7 @@ mod tests {
                 let free = [left, width - right, height - bottom, top];
                 let wanted = [0, 1, 2, 3].map(|side| MARGINS[side] * if side < 2 { width } else { height } / 2.0);
                 let spare = [0, 1, 2, 3].map(|side| free[side] - wanted[side]);
-                // The outline is sampled at half degrees: 1e-4 of a ball's size.
+                // The outline is sampled every half degree: 1e-4 of a ball's size.
                 let tolerance = ROUNDING_PX + 2e-4 * width.max(height);
                 assert!(spare.iter().all(|&spare| spare >= -tolerance), "{spec:?} {size_px:?}: {spare:?}");
                 let tight = [spare[0] + spare[1], spare[2] + spare[3]];
@@ -297,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_through_the_image_of_a_point_meets_the_point() {
+    fn a_ray_through_a_projected_point_meets_the_point() {
         let balls = [(Vector3::new(1.0, 2.0, 3.0), 2.0), (Vector3::new(-4.0, 0.0, 1.0), 1.0)];
         for spec in [CameraSpec::Iso, CameraSpec::Top] {
             let camera = Camera::framing(&spec, &balls, [640, 480]);
@@ -308,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_frame_is_no_reason_to_fail() {
+    fn framing_without_finite_balls_works() {
         for balls in [vec![], vec![(Vector3::zeros(), 0.0)], vec![(Vector3::repeat(f64::NAN), 1.0)]] {
             let camera = Camera::framing(&CameraSpec::Iso, &balls, [10, 10]);
             assert!(camera.project(Vector3::zeros()).is_some(), "{balls:?}");
@@ -316,15 +317,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_camera_is_refused() {
+    fn an_invalid_camera_is_refused() {
         for text in ["", "isometric", "follow:", "1,2", "1,2,3,4", "a,b,c"] {
             let refused = CameraSpec::from_str(text);
-            let said = refused.expect_err(text).to_string();
-            assert_eq!(said, format!("`{text}` is not a camera"));
+            let message = refused.expect_err(text).to_string();
+            assert_eq!(message, format!("`{text}` is not a camera"));
         }
         for text in ["nan,0,1", "0,91,1", "0,0,0", "0,0,-1", "0,0,nan", "0,0,1e10"] {
-            let said = CameraSpec::from_str(text).expect_err(text).to_string();
-            assert!(said.starts_with(&format!("the camera `{text}` has a")), "{said}");
+            let message = CameraSpec::from_str(text).expect_err(text).to_string();
+            assert!(message.starts_with(&format!("the camera `{text}` has a")), "{message}");
         }
         assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow("cf 7".to_owned())));
     }

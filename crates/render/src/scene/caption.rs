@@ -1,4 +1,4 @@
-//! Words of a picture: caption, verdict, legend, names of the vehicles, distances of pairs.
+//! Text of a picture: caption, verdict, legend, names of vehicles, and separations of pairs.
 
 use super::camera::Projected;
 use super::colour::Colour;
@@ -11,19 +11,20 @@ use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::at_least;
 use tautline_sim::plan::Plan;
 
-/// Most vehicles whose names are written on them; of more, those that are closer than delta to another are named.
-const NAMED: usize = 64;
-/// Most pairs closer than delta whose distance is written beside them: the worst ones.
-const LABELLED: usize = 3;
-/// Colours of the scale in the legend.
+/// Number of vehicles up to which all names are drawn; in a larger swarm only those of vehicles closer than delta to
+/// another.
+const MAX_NAMED: usize = 64;
+/// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
+const MAX_LABELLED: usize = 3;
+/// Number of colours on each side of the legend's scale.
 const SHADES: i16 = 16;
-/// Widest picture \[pixels\] that has no room for a legend, and lowest.
+/// Largest width, and largest height, of a picture without a legend \[pixels\].
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
-/// Longest name that is written in full.
+/// Longest name that is drawn in full \[characters\].
 const LONGEST_NAME: usize = 40;
-/// Fewest letters of a name that are worth writing.
-const FEWEST_LETTERS: usize = 4;
-/// Opacity of what is behind words.
+/// Smallest number of letters to which a name is cut.
+const MIN_LETTERS: usize = 4;
+/// Opacity of the background of text.
 const BACKING: f32 = 0.72;
 
 impl SceneBuilder<'_> {
@@ -33,7 +34,7 @@ impl SceneBuilder<'_> {
         let mut y = self.banner(labels);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
         let (bottom, taken) = labels.placed();
-        // What has no room is left out: first the closest approach, then the name, then the verdict, then the time.
+        // Without room texts are left out in this order: closest approach, name, verdict, time.
         let large_px = 1.35 * size_px;
         let time = match self.timeline.plan.as_ref().map(|plan| plan.leg_at(self.frame.time_s)) {
             Some((leg, legs)) if legs > 1 => format!("leg {} of {legs}, t = {:.2} s", leg + 1, self.frame.time_s),
@@ -48,22 +49,22 @@ impl SceneBuilder<'_> {
         let (verdicts, colour) = self.verdict();
         let verdict = verdicts.iter().find(|text| width(size_px, text) <= width_px - 2.0 * margin);
         let verdict_px = verdict.map(|text| labels.put([width_px - margin, below], [1.0, 0.0], size_px, colour, text));
-        labels.back(taken, bottom, ground, room_px);
+        labels.insert_background(taken, bottom, ground, room_px);
         let (_, taken) = labels.placed();
         if let Some(name) = cut(&shortened(&self.timeline.name), large_px, free_px) {
             labels.put([margin, y], [0.0, 0.0], large_px, theme.ink(), &name);
-            labels.back(taken, bottom, ground, room_px);
+            labels.insert_background(taken, bottom, ground, room_px);
         }
         y = below;
         let (_, taken) = labels.placed();
         let free_px = verdict_px.map_or(0.0, |corners_px| corners_px[0][0] - 2.0 * margin);
         if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
             labels.put([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
-            labels.back(taken, bottom, ground, room_px);
+            labels.insert_background(taken, bottom, ground, room_px);
         }
     }
 
-    /// A violation that lasts is written across the top, and the picture is framed; gives where the caption begins.
+    /// Draws a banner for a current violation, and a frame around the picture; returns the top of the caption.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
         let Violation { min_m, min_at_s, limit_m, .. } = violation;
@@ -84,27 +85,27 @@ impl SceneBuilder<'_> {
             format!("VIOLATION {pair} {apart}"),
             "VIOLATION".to_owned(),
         ];
-        self.alarm(labels, &texts)
+        self.draw_banner(labels, &texts)
     }
 
-    /// The banner of a vehicle too near to an obstacle, where no two vehicles are too close.
+    /// Draws the banner of a vehicle too close to an obstacle, if no two vehicles are too close.
     fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(&[vehicle, obstacle]) = self.too_near.first() else { return self.margin() };
+        let Some(&[vehicle, obstacle]) = self.too_close_to_obstacle.first() else { return self.margin() };
         let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
-        let more = match self.too_near.len() - 1 {
+        let more = match self.too_close_to_obstacle.len() - 1 {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
         let texts = [
-            format!("VIOLATION  vehicle {vehicle} too near to {obstacle}{more}"),
+            format!("VIOLATION  vehicle {vehicle} too close to {obstacle}{more}"),
             format!("VIOLATION {vehicle} {obstacle}"),
             "VIOLATION".to_owned(),
         ];
-        self.alarm(labels, &texts)
+        self.draw_banner(labels, &texts)
     }
 
-    /// Writes the first of three texts that has room across the top, and frames the picture; gives where the caption begins.
-    fn alarm(&self, labels: &mut LabelLayout, texts: &[String; 3]) -> f32 {
+    /// Draws the first of three texts that fits across the top, and the frame; returns the top of the caption.
+    fn draw_banner(&self, labels: &mut LabelLayout, texts: &[String; 3]) -> f32 {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
@@ -118,16 +119,16 @@ impl SceneBuilder<'_> {
         bottom + 0.6 * self.margin()
     }
 
-    /// The verdict up to now, from the longest wording to the shortest.
+    /// Returns the verdict so far, from the longest wording to the shortest.
     fn verdict(&self) -> (Vec<String>, Colour) {
         let (theme, now_s) = (self.view.theme, self.frame.time_s);
         if let Some(why) = self.timeline.unjudged() {
             return (vec![format!("not judged: {why}"), "not judged".to_owned()], theme.soft_ink());
         }
-        let began: Vec<_> = self.timeline.begun(now_s).collect();
+        let began: Vec<_> = self.timeline.violations_by(now_s).collect();
         let undecided_s = self.timeline.undecided_s.filter(|from_s| *from_s <= now_s);
         if began.is_empty()
-            && let Some((found, [vehicle, obstacle])) = self.timeline.too_near_by(now_s).next()
+            && let Some((found, [vehicle, obstacle])) = self.timeline.obstacle_violations_by(now_s).next()
         {
             let at = format!("violated at {:.2} s", found.from_s);
             let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
@@ -161,7 +162,7 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// The closest approach up to now, at length and in short.
+    /// Returns the closest approach so far, from the longest wording to the shortest.
     fn closest_so_far(&self) -> Vec<String> {
         let Some(approach) = self.frame.so_far else { return Vec::new() };
         let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
@@ -186,7 +187,7 @@ impl SceneBuilder<'_> {
         let (mut x, y) = (margin, height_px as f32 - margin);
         let (bottom, taken) = labels.placed();
         let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px as f32 - margin;
-        // Writes words at a place from the left; gives where the next ones begin.
+        // Draws text from the left; returns the start of the next text.
         let write = |labels: &mut LabelLayout, x: f32, text: &str| {
             labels.put([x, y], [0.0, 1.0], size_px, ink, text)[1][0] + 1.5 * size_px
         };
@@ -236,25 +237,25 @@ impl SceneBuilder<'_> {
             labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
             write(labels, x + 1.2 * size_px, shell);
         }
-        labels.back(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
+        labels.insert_background(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
     }
 
-    /// Keeps words off the vehicles that have names.
-    pub(super) fn keep_off_vehicles(&self, labels: &mut LabelLayout) {
+    /// Reserves the area of named vehicles.
+    pub(super) fn reserve_vehicles(&self, labels: &mut LabelLayout) {
         for (k, at) in self.labelled_vehicles() {
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
     }
 
-    /// The distance of the closest pair, and of the worst pairs closer than delta, beside the line that joins them; not
-    /// where that is outside the picture or has no room.
-    pub(super) fn distances(&self, labels: &mut LabelLayout) {
+    /// Draws the separation of the closest pair, and of the closest pairs below delta, beside the line between them, if
+    /// there is room in the picture.
+    pub(super) fn separations(&self, labels: &mut LabelLayout) {
         let theme = self.view.theme;
         let size_px = self.view.text_px(1.0);
         let alarmed =
-            self.violated.iter().take(LABELLED).map(|&(violation, distance_m)| (violation.pair, distance_m, true));
-        let nearest = self.clear_nearest().map(|(pair, distance_m)| (pair, distance_m, false));
+            self.violated.iter().take(MAX_LABELLED).map(|&(violation, distance_m)| (violation.pair, distance_m, true));
+        let nearest = self.closest_clear_pair().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
             let text = metres(distance_m);
@@ -271,14 +272,15 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// The vehicles that have names, with where they are: all of few, else those of the worst violations.
+    /// Returns the vehicles with names and their projections: all vehicles of a small swarm, else those of the closest
+    /// violations.
     fn labelled_vehicles(&self) -> impl Iterator<Item = (usize, Projected)> {
         let mut labelled: Vec<usize> = Vec::new();
-        if self.timeline.count() <= NAMED {
+        if self.timeline.count() <= MAX_NAMED {
             labelled.extend(0..self.timeline.count());
         } else {
             for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
-                if labelled.len() < NAMED && !labelled.contains(&k) {
+                if labelled.len() < MAX_NAMED && !labelled.contains(&k) {
                     labelled.push(k);
                 }
             }
@@ -286,11 +288,11 @@ impl SceneBuilder<'_> {
         labelled.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
     }
 
-    /// The names of the vehicles, on those that are large enough and beside the others.
+    /// Draws the names of vehicles: on vehicles that are large enough, else beside them.
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
         for (k, at) in self.labelled_vehicles() {
-            // One that is too close to another is often behind it.
+            // A vehicle too close to another is often hidden by it, and is named anyway.
             let is_hidden = self.is_hidden(k, at);
             if is_hidden && !self.alarmed[k] {
                 continue;
@@ -306,7 +308,7 @@ impl SceneBuilder<'_> {
             }
             let offset = f64::from(radius + 0.2 * size_px);
             let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k) };
-            // Above to the right, above to the left, below to the right, below to the left: where there is room.
+            // First free position of: above right, above left, below right, below left.
             for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
                 let beside = [
                     at.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
@@ -319,7 +321,7 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Whether another vehicle is in front of the middle of this one.
+    /// Returns whether another vehicle covers the centre of this one.
     fn is_hidden(&self, k: usize, own: Projected) -> bool {
         let others = (0..self.timeline.count()).filter(|&other| other != k);
         others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
@@ -328,7 +330,7 @@ impl SceneBuilder<'_> {
         })
     }
 
-    /// A pair by the names of its vehicles.
+    /// Returns the names of the two vehicles of a pair.
     fn pair(&self, pair: Pair) -> String {
         let name = |k: usize| self.timeline.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
         format!("{}-{}", name(pair.first()), name(pair.second()))
@@ -339,18 +341,18 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// A length to the millimetre, rounded down, so that no distance is shown larger than it is.
+/// Formats a length to the millimetre, rounded down, so that no separation is shown larger than it is.
 pub(crate) fn metres(length_m: f64) -> String {
     format!("{} m", at_least(length_m, 3))
 }
 
-/// As much of a name as has room, with an ellipsis where it is cut; none where even a few letters have none.
+/// Cuts a name to the available width, with an ellipsis; `None` if a few letters do not fit.
 fn cut(name: &str, size_px: f32, room_px: f32) -> Option<String> {
     if width(size_px, name) <= room_px {
         return Some(name.to_owned());
     }
     let start = |letters: usize| name.chars().take(letters).chain(['…']).collect::<String>();
-    (FEWEST_LETTERS..name.chars().count()).rev().map(start).find(|start| width(size_px, start) <= room_px)
+    (MIN_LETTERS..name.chars().count()).rev().map(start).find(|start| width(size_px, start) <= room_px)
 }
 
 fn shortened(name: &str) -> String {
@@ -366,12 +368,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_distance_is_never_shown_larger_than_it_is() {
+    fn a_length_is_rounded_down() {
         assert_eq!([1.999_999, 2.46, 2.0, 0.0].map(metres), ["1.999 m", "2.460 m", "2.000 m", "0.000 m"]);
     }
 
     #[test]
-    fn a_name_is_cut_to_its_room_or_left_out() {
+    fn a_name_is_cut_to_its_width_or_left_out() {
         assert_eq!(cut("pentagon", 10.0, 100.0).as_deref(), Some("pentagon"));
         assert_eq!(cut("pentagon", 10.0, 40.0).as_deref(), Some("penta…"));
         assert_eq!(cut("pentagon", 10.0, 20.0), None);

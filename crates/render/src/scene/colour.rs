@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// A colour: sRGB with straight alpha, 8 bits a channel.
+/// Colour in sRGB with straight alpha, 8 bits per channel.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Colour {
@@ -11,21 +11,21 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// The opaque colour `0xRRGGBB`.
+    /// Returns the opaque colour `0xRRGGBB`.
     #[must_use]
     pub const fn hex(rgb: u32) -> Self {
         let [_, red, green, blue] = rgb.to_be_bytes();
         Self { rgba: [red, green, blue, 255] }
     }
 
-    /// The same colour at this opacity, from 0 to 1.
+    /// Returns the colour with this opacity, from 0 to 1.
     #[must_use]
     pub fn at(self, opacity: f32) -> Self {
         let [red, green, blue, _] = self.rgba;
         Self { rgba: [red, green, blue, byte(opacity * 255.0)] }
     }
 
-    /// The colour at part `t`, from 0 to 1, of the way to another, opacity included.
+    /// Interpolates between two colours, opacity included; `t` is from 0 to 1.
     fn towards(self, other: Self, t: f32) -> Self {
         let mix = |k: usize| {
             let (a, b) = (f32::from(self.rgba[k]), f32::from(other.rgba[k]));
@@ -34,12 +34,12 @@ impl Colour {
         Self { rgba: [mix(0), mix(1), mix(2), mix(3)] }
     }
 
-    /// Opacity from 0 to 1.
+    /// Returns the opacity from 0 to 1.
     fn opacity(self) -> f32 {
         f32::from(self.rgba[3]) / 255.0
     }
 
-    /// Red, green, blue as light, from 0 to 1, and opacity (IEC 61966-2-1).
+    /// Returns linear red, green, blue from 0 to 1, and opacity (IEC 61966-2-1).
     pub(crate) fn linear(self) -> [f32; 4] {
         let light = |k: usize| {
             let c = f32::from(self.rgba[k]) / 255.0;
@@ -55,7 +55,7 @@ fn byte(value: f32) -> u8 {
     byte
 }
 
-/// A set of colours for a whole picture.
+/// Set of colours for a whole picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
     /// Light on nearly black, for screens.
@@ -67,14 +67,14 @@ pub enum Theme {
     Paper,
 }
 
-/// From this many vehicles on all have one colour.
+/// Number of vehicles from which on all have one colour.
 const ONE_COLOUR: usize = 200;
-/// Vehicles in order, as in the charts: told apart by colour-blind people too.
+/// Colours of vehicles in order, as in the charts; colour-blind readers can tell them apart.
 const ON_LIGHT: [u32; 6] = [0x00_72_B2, 0xD5_5E_00, 0x00_93_6C, 0xB8_5F_95, 0x9A_76_00, 0x7D_85_8E];
 const ON_DARK: [u32; 6] = [0x56_A8_E0, 0xF0_7F_2E, 0x2F_BF_94, 0xDB_8D_BB, 0xCB_A4_2B, 0xA5_AD_B6];
 
 impl Theme {
-    /// Every theme with its name.
+    /// All themes with their names.
     pub const ALL: [(&'static str, Self); 3] = [("dark", Self::Dark), ("light", Self::Light), ("paper", Self::Paper)];
 
     fn pick(self, dark: u32, light: u32, paper: u32) -> Colour {
@@ -85,7 +85,7 @@ impl Theme {
         })
     }
 
-    /// What nothing is drawn on.
+    /// Background.
     pub(crate) fn background(self) -> Colour {
         self.pick(0x14_19_1F, 0xEC_EF_F3, 0xFF_FF_FF)
     }
@@ -95,7 +95,7 @@ impl Theme {
         self.pick(0xE6_EA_EF, 0x1B_22_2B, 0x00_00_00)
     }
 
-    /// Text of less weight.
+    /// Secondary text.
     pub(crate) fn soft_ink(self) -> Colour {
         self.pick(0x9A_A4_AF, 0x55_60_6C, 0x4A_4A_4A)
     }
@@ -105,13 +105,13 @@ impl Theme {
         self.pick(0x2E_37_42, 0xCB_D2_DA, 0xDA_DA_DA)
     }
 
-    /// Vehicle `k`; the colours repeat.
+    /// Returns the colour of vehicle `k`; the colours repeat.
     pub(crate) fn vehicle(self, k: usize) -> Colour {
         let palette = if self == Self::Dark { ON_DARK } else { ON_LIGHT };
         Colour::hex(palette[k % palette.len()])
     }
 
-    /// Vehicle `k` of so many: from 200 on all have one colour.
+    /// Returns the colour of vehicle `k` of `count`; from 200 vehicles on all have one colour.
     pub(crate) fn vehicle_among(self, k: usize, count: usize) -> Colour {
         self.vehicle(if count < ONE_COLOUR { k } else { 0 })
     }
@@ -121,28 +121,28 @@ impl Theme {
         self.pick(0x8F_B4_D9, 0x5C_7F_A3, 0x6E_8A_A8)
     }
 
-    /// What is in the way.
+    /// Obstacles.
     pub(crate) fn obstacle(self) -> Colour {
         self.pick(0xB8_A0_78, 0x8A_6D_3B, 0x7A_60_34)
     }
 
-    /// What must not be overlooked: a violation.
+    /// Violations.
     pub(crate) fn alarm(self) -> Colour {
         self.pick(0xFF_2F_3C, 0xD4_00_14, 0xD4_00_14)
     }
 
-    /// Text on a violation's colour.
+    /// Text on the colour of violations.
     pub(crate) fn on_alarm(self) -> Colour {
         self.pick(0x14_00_02, 0xFF_FF_FF, 0xFF_FF_FF)
     }
 
-    /// What is as it should be.
+    /// Clear verdicts.
     pub(crate) fn good(self) -> Colour {
         self.pick(0x35_C0_8A, 0x00_7A_56, 0x00_6B_4B)
     }
 
-    /// The colour of an edge that pushes (below 0, to -1), is at rest (0) or pulls (above 0, to 1): orange over grey to
-    /// blue, which people of every colour vision tell apart.
+    /// Returns the colour of an edge: orange pushes (-1), grey is at rest (0), blue pulls (1). Colour-blind readers can
+    /// tell the three apart.
     pub(crate) fn tension(self, tension: f32) -> Colour {
         let push = self.pick(0xFF_9E_2C, 0xD9_6B_00, 0xC8_5A_00);
         let rest = self.pick(0x6B_75_80, 0xA6_AE_B7, 0xB4_B4_B4);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn text_and_verdicts_stand_out_from_the_background_in_every_theme() {
+    fn text_and_verdicts_have_enough_contrast_in_every_theme() {
         for (name, theme) in Theme::ALL {
             for (what, colour, least) in [
                 ("ink", theme.ink(), 7.0),
@@ -185,7 +185,7 @@ mod tests {
         }
     }
 
-    /// How people without cones for long waves see a colour: Viénot, Brettel and Mollon 1999.
+    /// Returns the colour that people without long-wave cones see: Viénot, Brettel and Mollon 1999.
     fn protanope(colour: Colour) -> [f32; 3] {
         let [red, green, blue, _] = colour.linear();
         let yellow = 0.112_38 * red + 0.887_62 * green;
@@ -193,17 +193,17 @@ mod tests {
     }
 
     #[test]
-    fn pushing_and_pulling_differ_for_eyes_without_red() {
+    fn pushing_and_pulling_differ_for_protanopes() {
         for (name, theme) in Theme::ALL {
             let [push, rest, pull] = [-1.0, 0.0, 1.0].map(|tension| protanope(theme.tension(tension)));
-            // More blue light than yellow in the one, more yellow than blue in the other.
+            // One has more blue light than yellow, the other more yellow than blue.
             assert!(push[0] > push[2] && pull[2] > pull[0], "{name}: {push:?} {pull:?}");
             assert!((rest[0] - rest[2]).abs() < 0.1, "{name}: {rest:?}");
         }
     }
 
     #[test]
-    fn light_and_back_is_the_same_colour() {
+    fn linear_colours_and_interpolation_are_correct() {
         assert_eq!(Colour::hex(0x00_80_FF).linear(), [0.0, 0.215_860_53, 1.0, 1.0]);
         assert_eq!(Colour::hex(0).towards(Colour::hex(0xFF_FF_FF), 0.5), Colour::hex(0x80_80_80));
     }

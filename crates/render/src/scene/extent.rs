@@ -1,4 +1,4 @@
-//! What does not change from one frame of a flight to the next.
+//! Extent of a flight: scene coordinates, ground, and framing, constant over all frames.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,78 +12,80 @@ use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::{Obstacle, Shape};
 use tautline_report::flight_log::Frame;
 
-/// Most places of vehicles that framing looks at.
+/// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
-/// The ground is at z = 0 for a flight that is not higher above it than this part of its extent.
+/// Largest height of the lowest position above z = 0, relative to the extent of the flight, at which the ground is
+/// drawn at z = 0.
 const NEAR_GROUND: f64 = 0.3;
-/// Lines of the ground along its longer side, about.
+/// Approximate number of ground lines along the longer side.
 const GROUND_LINES: f64 = 12.0;
-/// Vehicles that are named in a message at most.
-const NAMED: usize = 8;
-/// How far around a followed vehicle one sees, in units of delta (or of its radius, where there is no delta).
+/// Largest number of vehicles that a message names.
+const MAX_NAMED: usize = 8;
+/// Radius of the view around a followed vehicle, in units of delta, or of the vehicle's radius without delta.
 const FOLLOWED_DELTAS: f64 = 3.0;
 const FOLLOWED_RADII: f64 = 20.0;
-/// How far around the closest pair one sees, in units of its distance.
+/// Radius of the view around the closest pair, in units of its separation.
 const CLOSEST_DISTANCES: f64 = 1.1;
-/// Nearest that anything is drawn, in units of the farthest: centimetres in a flight of tens of kilometres.
+/// Smallest depth that is drawn, in units of the largest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
-/// How far around the flight obstacles are still shown whole, in units of its extent.
+/// Distance around the flight up to which obstacles are framed, in units of its extent.
 const OBSTACLE_ROOM: f64 = 0.5;
-/// Room around the ground for its scale, in distances of its lines.
+/// Margin around the ground for its scale, in units of the line distance.
 const SCALE_ROOM: f64 = 0.6;
 
-/// Extent of a flight, the coordinates that it is drawn in, and its ground.
+/// Extent of a flight, origin of its scene coordinates, and ground.
 #[derive(Debug)]
 pub struct Extent {
     origin_m: Vector3<f64>,
-    /// Places of vehicles over the flight with the radius that must be seen around them, and corners of the ground.
-    places: Vec<(Vector3<f64>, f64)>,
-    /// The framing asked for last: it is the same for all pictures of a film.
+    /// Positions of vehicles over the flight with the radius that must be visible around them, and corners of the
+    /// ground.
+    positions: Vec<(Vector3<f64>, f64)>,
+    /// Last computed framing; it is the same for all pictures of a film.
     framed: Mutex<Option<(CameraSpec, Camera)>>,
-    /// Corners of the ground, in the scene's coordinates \[m\].
+    /// Corners of the ground, in scene coordinates \[m\].
     pub(super) ground_m: [Vector3<f64>; 2],
-    /// Distance of its lines \[m\].
+    /// Distance of ground lines \[m\].
     pub(super) grid_m: f64,
-    /// A ball that holds everything.
+    /// Bounding ball of everything: centre and radius \[m\].
     reach: (Vector3<f64>, f64),
 }
 
 impl Extent {
-    /// The extent of a flight, as far as it is known.
+    /// Computes the extent of a flight so far.
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
         let keyframes = timeline.log.keyframes();
         let stride = keyframes.len().div_ceil((FRAMED_PLACES / timeline.count().max(1)).max(2)).max(1);
-        let mut places: Vec<(Vector3<f64>, f64)> = Vec::new();
+        let mut positions: Vec<(Vector3<f64>, f64)> = Vec::new();
         for keyframe in keyframes.iter().step_by(stride).chain(keyframes.last()) {
             let there = (0..keyframe.positions_m.nrows()).map(|k| (k, row(&keyframe.positions_m, k)));
             let there = there.filter(|(_, place)| place.iter().all(|x| x.is_finite()));
-            places.extend(there.map(|(k, place)| (place, timeline.keep_out_m(k))));
+            positions.extend(there.map(|(k, place)| (place, timeline.keep_out_m(k))));
         }
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         let mut largest = 0.0_f64;
-        for (place, radius) in &places {
+        for (place, radius) in &positions {
             (low, high, largest) = (low.inf(place), high.sup(place), largest.max(*radius));
         }
-        let flown = if places.is_empty() { [Vector3::zeros(); 2] } else { [low, high] };
-        if !places.is_empty() {
+        let flight_bounds = if positions.is_empty() { [Vector3::zeros(); 2] } else { [low, high] };
+        if !positions.is_empty() {
             let room = Vector3::repeat(OBSTACLE_ROOM * (high - low).max().max(largest));
             let [least, most] = [low - room, high + room];
             let obstacles = timeline.plan.iter().flat_map(|plan| &plan.obstacles);
             for corner in obstacles.flat_map(corners).map(|corner| corner.sup(&least).inf(&most)) {
                 (low, high) = (low.inf(&corner), high.sup(&corner));
-                places.push((corner, 0.0));
+                positions.push((corner, 0.0));
             }
         }
-        if places.is_empty() {
+        if positions.is_empty() {
             (low, high, largest) = (Vector3::zeros(), Vector3::zeros(), 1.0);
         }
-        // Halves first: the extent of the largest numbers is not a number.
+        // Halved first: the difference of the largest doubles overflows.
         let origin_m = low / 2.0 + high / 2.0;
-        for (place, _) in &mut places {
+        for (place, _) in &mut positions {
             *place -= origin_m;
         }
-        let [lowest, highest] = flown;
+        let [lowest, highest] = flight_bounds;
         let is_near = lowest.z >= 0.0 && lowest.z <= NEAR_GROUND * (highest - lowest).norm() + largest;
         let z = if is_near { 0.0 } else { low.z - largest } - origin_m.z;
         let (low, high) = (low - origin_m, high - origin_m);
@@ -97,34 +99,34 @@ impl Extent {
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
         let room = SCALE_ROOM * grid_m;
         for x in [ground_m[0].x - room, ground_m[1].x + room] {
-            places.extend([ground_m[0].y - room, ground_m[1].y + room].map(|y| (Vector3::new(x, y, z), 0.0)));
+            positions.extend([ground_m[0].y - room, ground_m[1].y + room].map(|y| (Vector3::new(x, y, z), 0.0)));
         }
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
-        Self { origin_m, places, framed: Mutex::new(None), ground_m, grid_m, reach }
+        Self { origin_m, positions, framed: Mutex::new(None), ground_m, grid_m, reach }
     }
 
-    /// Middle \[m\] and radius \[m\] of a ball that holds everything, in the scene's coordinates.
+    /// Returns the bounding ball of everything in scene coordinates: centre \[m\] and radius \[m\].
     pub(super) fn reach(&self) -> (Vector3<f64>, f64) {
         self.reach
     }
 
-    /// Where the origin of the scene's coordinates is in the recording's \[m\].
+    /// Returns the origin of the scene coordinates in coordinates of the recording \[m\].
     #[must_use]
     pub fn origin_m(&self) -> Vector3<f64> {
         self.origin_m
     }
 
-    /// Where a row of a table of positions is in the scene's coordinates \[m\]; none where it is not finite.
+    /// Returns a row of a position table in scene coordinates \[m\]; `None` if it is not finite.
     pub(crate) fn place(&self, positions_m: &Rows, k: usize) -> Option<Vector3<f64>> {
         let place = row(positions_m, k) - self.origin_m;
         place.iter().all(|x| x.is_finite()).then_some(place)
     }
 
-    /// The camera of a view of a frame.
+    /// Returns the camera of a view of a frame.
     ///
     /// # Errors
-    /// [`RenderError::NoVehicle`] when it follows a vehicle that the flight does not have.
+    /// [`RenderError::NoVehicle`] if the camera follows a vehicle that the flight does not have.
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
         let framing = |spec| self.framing(spec, view.size_px);
         Ok(match &view.camera {
@@ -144,12 +146,12 @@ impl Extent {
         })
     }
 
-    /// A camera near a pair; one that frames the flight where one of the two is not there.
+    /// Returns a camera near a pair, or one that frames the flight if a vehicle of the pair is absent.
     pub(crate) fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, size_px: [u32; 2]) -> Camera {
         let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
         let (Some(first), Some(second)) = (first, second) else { return self.framing(&CameraSpec::Iso, size_px) };
         let distance_m = (second - first).norm();
-        // Hulls of two at one place are seen too, whatever delta is.
+        // The hulls of two vehicles at one position are visible too, for any delta.
         let keep_out_m = 2.0 * timeline.keep_out_m(pair.first()).max(timeline.keep_out_m(pair.second()));
         Camera::close_up((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m), size_px)
     }
@@ -159,15 +161,15 @@ impl Extent {
         match &*framed {
             Some((known, camera)) if known == spec && camera.size_px == size_px => *camera,
             _ => {
-                let camera = Camera::framing(spec, &self.places, size_px);
+                let camera = Camera::framing(spec, &self.positions, size_px);
                 *framed = Some((spec.clone(), camera));
                 camera
             }
         }
     }
 
-    /// The orbit and the target \[m\] of a camera that frames the flight as [`CameraSpec::Iso`] does: where a person begins
-    /// to look around.
+    /// Returns the orbit and the target \[m\] of a camera that frames the flight as [`CameraSpec::Iso`] does: the
+    /// initial camera of the window.
     #[must_use]
     pub fn orbit(&self, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
         let Camera { eye_m, back, .. } = self.framing(&CameraSpec::Iso, size_px);
@@ -175,16 +177,16 @@ impl Extent {
         (Orbit { azimuth_deg, elevation_deg, distance_m: ahead_m.max(self.grid_m) }, eye_m - back * ahead_m)
     }
 
-    /// Nearest and farthest that anything is from a camera \[m\].
+    /// Returns the smallest and largest depth of the content for a camera \[m\].
     pub(super) fn depth_m(&self, camera: &Camera) -> [f64; 2] {
         let (centre, radius) = self.reach;
-        let middle = -camera.seen(centre).z;
+        let middle = -camera.to_camera_frame(centre).z;
         let far = (middle + radius).max(1e-2);
         [(middle - radius).max(NEAREST * far), far]
     }
 }
 
-/// Corners of a box around an obstacle \[m\]; none for one without bounds.
+/// Returns the corners of a box around an obstacle \[m\]; empty for an unbounded one.
 fn corners(obstacle: &Obstacle) -> Vec<Vector3<f64>> {
     let (low, high) = match obstacle.shape {
         Shape::Ball { radius_m } => (-Vector3::repeat(radius_m), Vector3::repeat(radius_m)),
@@ -203,18 +205,18 @@ fn corners(obstacle: &Obstacle) -> Vec<Vector3<f64>> {
     (0..8).map(|k| obstacle.place_m + corner(k)).collect()
 }
 
-/// The vehicle of this name.
+/// Returns the index of the vehicle with this name.
 fn find(timeline: &Timeline, name: &str) -> Result<usize, RenderError> {
     timeline.vehicles.iter().position(|vehicle| vehicle == name).ok_or_else(|| {
-        let mut vehicles = timeline.vehicles.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-        if timeline.count() > NAMED {
-            vehicles = format!("{vehicles} and {} more", timeline.count() - NAMED);
+        let mut vehicles = timeline.vehicles.iter().take(MAX_NAMED).cloned().collect::<Vec<_>>().join(", ");
+        if timeline.count() > MAX_NAMED {
+            vehicles = format!("{vehicles} and {} more", timeline.count() - MAX_NAMED);
         }
         RenderError::NoVehicle(format!("there is no vehicle `{name}` to follow; the flight has {vehicles}"))
     })
 }
 
-/// The nearest of 1, 2 and 5 times a power of ten at or above a length; 1 for what has none.
+/// Returns the smallest of 1, 2 and 5 times a power of ten at or above a length; 1 for an invalid length.
 fn round_step(length_m: f64) -> f64 {
     if !(length_m > 0.0 && length_m.is_finite()) {
         return 1.0;
@@ -228,7 +230,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_of_the_ground_are_round_numbers() {
+    fn ground_steps_are_round_numbers() {
         let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
         assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
         assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);

@@ -1,6 +1,6 @@
-//! Vehicles, shells, edges, trails, start marks, goal slots and obstacles.
+//! Geometry of a scene: vehicles, shells, edges, trails, start marks, goal slots and obstacles.
 //!
-//! Balls are solid, capsules are made of balls, boxes and planes are drawn by lines.
+//! Balls are solid, capsules are made of balls, boxes and planes are drawn with lines.
 
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
@@ -13,49 +13,49 @@ use tautline_core::swarm::Pair;
 use tautline_laws::space::{Obstacle, Shape};
 use tautline_sim::plan::Plan;
 
-/// Most edges that are drawn: more hide what they join.
-const MOST_EDGES: usize = 2100;
-/// Most pieces of all trails together, and of one.
-const TRAIL_PIECES: usize = 60_000;
-const LONGEST_TRAIL: usize = 400;
-/// Part of a flight after which a trail has faded, and what is left of it then.
+/// Largest number of edges that are drawn; more would hide the vehicles.
+const MAX_EDGES: usize = 2100;
+/// Largest number of line pieces of all trails together, and of one trail.
+const MAX_TRAIL_PIECES: usize = 60_000;
+const MAX_PIECES_PER_TRAIL: usize = 400;
+/// Fraction of a flight after which a trail has faded, and its opacity then.
 const FADED_AFTER: f64 = 0.25;
 const FADED: f32 = 0.16;
 const FRESH: f32 = 0.95;
-/// Corners of a ring.
+/// Number of corners of a ring.
 const RING: u32 = 28;
 /// Radius of a goal slot over that of the hull.
 const SLOT: f64 = 1.45;
-/// Most vehicles that have start marks and goal slots.
-const MOST_MARKS: usize = 2000;
-/// Half of the diamond at the reference in a picture 720 pixels high \[pixels\].
+/// Largest number of vehicles with start marks and goal slots.
+const MAX_MARKS: usize = 2000;
+/// Half the diagonal of the reference's diamond in a picture 720 pixels high \[pixels\].
 const REFERENCE_PX: f32 = 7.0;
-/// Least radius of a vehicle, of the cross where it started and of its goal slot in a picture 720 pixels high \[pixels\].
-const LEAST_PX: [f32; 3] = [2.0, 3.0, 4.0];
+/// Smallest radius of a vehicle, of its start mark and of its goal slot in a picture 720 pixels high \[pixels\].
+const MIN_RADIUS_PX: [f32; 3] = [2.0, 3.0, 4.0];
 
-/// Whether a graph has few enough edges to be drawn.
+/// Returns whether a graph has few enough edges to be drawn.
 pub(super) fn has_few_edges(plan: &Plan) -> bool {
-    plan.graph.edge_count() <= MOST_EDGES
+    plan.graph.edge_count() <= MAX_EDGES
 }
 
 impl SceneBuilder<'_> {
-    /// A radius at a place \[m\], or what so many pixels are there, whichever is more.
+    /// Returns the larger of a radius and the length of `least_px` pixels at a position \[m\].
     fn at_least(&self, place: Vector3<f64>, radius_m: f64, least_px: f32) -> f64 {
         let px_per_m = self.camera.project(place).map_or(f64::INFINITY, |at| at.px_per_m);
         radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
     }
 
-    /// Radius of a vehicle's shell as seen from above \[m\], where it is shown.
+    /// Returns the radius of a vehicle's shell seen from above \[m\], if it is shown.
     fn shell_m(&self, k: usize) -> Option<f64> {
         self.timeline.delta_m.filter(|_| self.view.layers.shells || self.alarmed[k]).map(|delta_m| delta_m / 2.0)
     }
 
-    /// What the vehicles, and those of their shells that are shown, cover of the picture: middles and radii \[pixels\].
-    pub(super) fn covered_px(&self) -> Vec<([f64; 2], f64)> {
+    /// Returns the areas that vehicles and their visible shells cover: centres and radii \[pixels\].
+    pub(super) fn covered_areas_px(&self) -> Vec<([f64; 2], f64)> {
         let cover = |k| {
             let place = self.vehicle(k)?;
             let at = self.camera.project(place)?;
-            let radius_m = self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]);
+            let radius_m = self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]);
             let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.log.metric().longest_m(shell_m));
             Some((at.at_px, radius_m.max(shell_m) * at.px_per_m))
         };
@@ -73,19 +73,21 @@ impl SceneBuilder<'_> {
             let colour = self.body_colour(k);
             match self.quadrotor(k) {
                 Some(quadrotor) => scene.balls.extend(quadrotor.body(colour, theme.ink())),
-                None => scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], LEAST_PX[0]), colour)),
+                None => {
+                    scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]), colour))
+                }
             }
             if let Some(radius_m) = self.shell_m(k) {
                 let strength = if theme == Theme::Paper { 0.75 } else { 0.6 };
                 let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
                 let ball = ball(radius_m, colour);
-                // In parallel projection every line of sight is along the view.
+                // In parallel projection all lines of sight are parallel to the view.
                 let metric = self.timeline.log.metric();
                 let away = metric.scaled(place - self.camera.eye_m);
                 let power = match self.camera.lens {
                     Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
                     Lens::Parallel(_) if !metric.is_metres() => -away.dot(&metric.scaled(self.camera.back)),
-                    Lens::Parallel(_) => -self.camera.seen(Vector3::from(ball.centre_m.map(f64::from))).z,
+                    Lens::Parallel(_) => -self.camera.to_camera_frame(Vector3::from(ball.centre_m.map(f64::from))).z,
                 };
                 shells.push((power, ball));
             }
@@ -102,33 +104,33 @@ impl SceneBuilder<'_> {
         for pair in plan.graph.edges().map(|(i, j)| Pair::new(i, j)) {
             let Some([from, to]) = self.ends(pair) else { continue };
             let tension = plan.tension(pair, (to - from).norm(), self.frame.time_s);
-            // What acts is seen before what rests.
+            // Edges under tension are more opaque than edges at rest.
             let strength = opacity * (0.45 + 0.55 * tension.abs());
             lines.push(Line::new([from, to], self.view.theme.tension(tension).at(strength), width_px));
         }
     }
 
-    /// The pairs that must be seen: the closest one, and every one that is closer than delta.
+    /// Draws lines between the closest pair, and between every pair closer than delta.
     pub(super) fn pairs(&self, lines: &mut Vec<Line>) {
         let theme = self.view.theme;
-        // The worst one last, which is over the others.
+        // The closest pair comes last and covers the others.
         let alarmed = self.violated.iter().rev().map(|(violation, _)| (violation.pair, theme.alarm(), 5.0));
-        let nearest = self.clear_nearest().map(|(pair, _)| (pair, theme.ink(), 2.6));
+        let nearest = self.closest_clear_pair().map(|(pair, _)| (pair, theme.ink(), 2.6));
         for (pair, colour, width) in nearest.into_iter().chain(alarmed) {
             let ends = self.ends(pair);
             lines.extend(ends.map(|ends| Line::new(ends, colour, width * self.view.unit_px())));
         }
     }
 
-    /// Where every vehicle came from, as long ago as is asked for, fading with age. The corners are samples whose number is a multiple of a power of
-    /// two, so that a trail does not shimmer as time goes on.
+    /// Draws trails of the requested length that fade with age. Corners are samples whose index is a multiple of a
+    /// power of two, so that trails do not flicker over time.
     pub(super) fn trails(&self, lines: &mut Vec<Line>) {
         let (count, last, keyframes) = (self.timeline.count(), self.frame.keyframe, self.timeline.log.keyframes());
         let ([first_s, last_s], now_s) = (self.timeline.log.range_s(), self.frame.time_s);
         let fading_s = self.view.trail_s.unwrap_or(FADED_AFTER * (last_s - first_s)).max(1e-9);
         let since_s = self.view.trail_s.map_or(first_s, |trail_s| now_s - trail_s);
         let first = keyframes.partition_point(|keyframe| keyframe.time_s < since_s);
-        let most = (TRAIL_PIECES / count.max(1)).clamp(2, LONGEST_TRAIL);
+        let most = (MAX_TRAIL_PIECES / count.max(1)).clamp(2, MAX_PIECES_PER_TRAIL);
         let mut stride = 1;
         while last.saturating_sub(first) / stride > most {
             stride *= 2;
@@ -160,18 +162,18 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Crosses where the vehicles started and rings where they belong at this time: the formation of the leg that is under
-    /// way, moved as the law leaves it free to be so that it fits best.
+    /// Draws crosses at the start positions and rings at the goal slots: the formation of the current leg at the
+    /// best-fitting motion that the law allows.
     pub(super) fn starts_and_goals(&self, lines: &mut Vec<Line>) {
         let count = self.timeline.count();
-        let Some(first) = self.timeline.log.keyframes().first().filter(|_| count <= MOST_MARKS) else { return };
+        let Some(first) = self.timeline.log.keyframes().first().filter(|_| count <= MAX_MARKS) else { return };
         let (right, up) = (self.camera.right, self.camera.up);
         let width_px = 1.8 * self.view.unit_px();
-        // Many opaque ones would hide what they mark.
+        // Many opaque marks would hide the vehicles.
         let opacity = (40.0 / count.max(1) as f32).clamp(0.05, 0.9);
         for k in 0..count {
             let Some(place) = self.extent.place(&first.positions_m, k) else { continue };
-            let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, LEAST_PX[1]);
+            let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, MIN_RADIUS_PX[1]);
             for across in [(right + up) * arm, (right - up) * arm] {
                 lines.push(Line::new([place - across, place + across], self.colour(k).at(opacity), width_px));
             }
@@ -180,7 +182,7 @@ impl SceneBuilder<'_> {
         let Some(slots_m) = plan.slots_at(self.frame.time_s, &self.frame.positions_m) else { return };
         for (k, slot_m) in slots_m.into_iter().enumerate().take(count) {
             let centre = slot_m - self.extent.origin_m();
-            let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, LEAST_PX[2]);
+            let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, MIN_RADIUS_PX[2]);
             let corner = |n: u32| {
                 let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
                 centre + (right * cos + up * sin) * radius
@@ -193,7 +195,7 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Where the reference is.
+    /// Draws a diamond at the reference.
     fn diamond(&self, centre: Vector3<f64>, width_px: f32, lines: &mut Vec<Line>) {
         let arm = self.at_least(centre, 0.0, REFERENCE_PX);
         let [right, up] = [self.camera.right, self.camera.up].map(|axis| axis * arm);
@@ -203,10 +205,10 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// Balls that a capsule is made of: so many a radius, and no more than this in all.
-const BALLS_A_RADIUS: f64 = 24.0;
-const MOST_BALLS: f64 = 3000.0;
-/// Lines across each side of a box, and of a plane.
+/// Number of balls of a capsule per radius of length, and largest number in all.
+const BALLS_PER_RADIUS: f64 = 24.0;
+const MAX_BALLS: f64 = 3000.0;
+/// Number of intervals between the lines across each side of a box, and across a plane.
 const HATCHES: u32 = 12;
 /// Opacity of lines across a side, of its rims, and of lines of a plane.
 const HATCH: f32 = 0.35;
@@ -214,23 +216,23 @@ const RIM: f32 = 0.95;
 const PLANE: f32 = 0.18;
 
 impl SceneBuilder<'_> {
-    fn solids(&self) -> &[Obstacle] {
+    fn obstacles(&self) -> &[Obstacle] {
         self.timeline.plan.as_ref().map_or(&[], |plan| &plan.obstacles)
     }
 
-    /// Balls and capsules.
+    /// Draws balls and capsules.
     pub(super) fn round_obstacles(&self, scene: &mut Scene) {
         let colour = self.view.theme.obstacle();
-        for obstacle in self.solids() {
+        for obstacle in self.obstacles() {
             let place = obstacle.place_m - self.extent.origin_m();
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let ball = |centre, radius_m: f64| Ball { centre_m: single(centre), radius_m: radius_m as f32, colour };
             match obstacle.shape {
                 Shape::Ball { radius_m } => scene.balls.push(ball(place, radius_m)),
                 Shape::Capsule { from_m, to_m, radius_m } => {
-                    let wanted = (BALLS_A_RADIUS * (to_m - from_m).norm() / radius_m).ceil();
+                    let needed = (BALLS_PER_RADIUS * (to_m - from_m).norm() / radius_m).ceil();
                     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-                    let count = wanted.clamp(1.0, MOST_BALLS) as u32;
+                    let count = needed.clamp(1.0, MAX_BALLS) as u32;
                     let along = |k: u32| place + from_m.lerp(&to_m, f64::from(k) / f64::from(count));
                     scene.balls.extend((0..=count).map(|k| ball(along(k), radius_m)));
                 }
@@ -239,9 +241,9 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Boxes and planes.
+    /// Draws boxes and planes.
     pub(super) fn flat_obstacles(&self, lines: &mut Vec<Line>) {
-        for obstacle in self.solids() {
+        for obstacle in self.obstacles() {
             let place = obstacle.place_m - self.extent.origin_m();
             match obstacle.shape {
                 Shape::Box { half_m, yaw_deg } => {
@@ -266,7 +268,7 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// A flat piece around its middle, from minus to plus two vectors.
+    /// Draws a hatched parallelogram with this centre and half sides `u` and `v`.
     fn hatched(
         &self,
         [rim, hatch]: [f32; 2],
@@ -289,24 +291,24 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// Least radius of a hull that is drawn with arms in a picture 720 pixels high, and in any \[pixels\]: a smaller one is
-/// a ball, which is seen better.
-const LEAST_HULL_PX: [f64; 2] = [9.0, 6.0];
-/// In units of the arm: radius of the body and of the mark ahead, how far ahead that is, height of the rotors above the
-/// body's middle, width of an arm.
+/// Smallest radius of a hull that is drawn with arms, in a picture 720 pixels high and in any \[pixels\]. A smaller
+/// hull is drawn as a ball.
+const MIN_HULL_PX: [f64; 2] = [9.0, 6.0];
+/// Lengths relative to the arm: radii of the body and the mark ahead, distance of the mark, height of the rotors above
+/// the body's centre, width of an arm.
 const BODY: f64 = 0.3;
 const NOSE: f64 = 0.13;
 const AHEAD: f64 = 0.72;
 const ABOVE: f64 = 0.18;
 const ARM: f64 = 0.11;
-/// Least width of an arm, and that of a blade, in a picture 720 pixels high \[pixels\].
+/// Smallest width of an arm, and width of a blade, in a picture 720 pixels high \[pixels\].
 const ARM_PX: f32 = 1.5;
 const BLADE_PX: f32 = 1.2;
 /// Opacity of a rotor's rim and of its blade.
 const DISC: f32 = 0.7;
 const BLADE: f32 = 0.75;
 
-/// A quadrotor in place, in the scene's coordinates.
+/// Quadrotor with position and attitude, in scene coordinates.
 pub(super) struct Quadrotor {
     place: Vector3<f64>,
     attitude: UnitQuaternion<f64>,
@@ -315,12 +317,12 @@ pub(super) struct Quadrotor {
 }
 
 impl Quadrotor {
-    /// A place on the body in the scene's coordinates \[m\].
+    /// Transforms a point on the body to scene coordinates \[m\].
     fn at(&self, on_body_m: Vector3<f64>) -> Vector3<f64> {
         self.place + self.attitude * on_body_m
     }
 
-    /// The body and the mark ahead.
+    /// Returns the body and the mark ahead.
     pub(super) fn body(&self, colour: Colour, nose: Colour) -> [Ball; 2] {
         #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
         let ball = |centre, share: f64, colour| Ball {
@@ -335,26 +337,26 @@ impl Quadrotor {
         self.at(Vector3::x() * (AHEAD * self.arm_m))
     }
 
-    /// Middles of the rotors \[m\].
+    /// Returns the centres of the rotors \[m\].
     fn rotors(&self) -> [Vector3<f64>; 4] {
         let above = Vector3::z() * (ABOVE * self.arm_m);
         self.shape.rotors_m.map(|rotor_m| self.at(rotor_m + above))
     }
 
-    /// Unit vector along the thrust.
+    /// Returns the unit vector along the thrust.
     fn up(&self) -> Vector3<f64> {
         self.attitude * Vector3::z()
     }
 }
 
 impl SceneBuilder<'_> {
-    /// A vehicle whose attitude is known, where it is large enough in the picture to be seen as more than a ball.
+    /// Returns a vehicle with a known attitude, if it is large enough in the picture to be drawn as a quadrotor.
     pub(super) fn quadrotor(&self, k: usize) -> Option<Quadrotor> {
         let attitude = self.frame.attitude(k)?;
         let place = self.vehicle(k)?;
         let radius_m = self.timeline.radius_m[k];
         let radius_px = radius_m * self.camera.project(place)?.px_per_m;
-        let [at_720, least] = LEAST_HULL_PX;
+        let [at_720, least] = MIN_HULL_PX;
         if radius_px < least.max(at_720 * f64::from(self.view.unit_px())) {
             return None;
         }
@@ -366,7 +368,7 @@ impl SceneBuilder<'_> {
         (0..self.timeline.count()).filter_map(|k| Some((self.quadrotor(k)?, self.body_colour(k))))
     }
 
-    /// What rotors sweep, the farthest first.
+    /// Draws the discs of rotors, farthest first.
     pub(super) fn rotors(&self, discs: &mut Vec<Disc>) {
         let mut ordered = Vec::new();
         for (quadrotor, colour) in self.quadrotors() {
@@ -374,14 +376,14 @@ impl SceneBuilder<'_> {
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let radius_m = quadrotor.shape.rotor_radius_m as f32;
             let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, colour };
-            ordered.extend(quadrotor.rotors().map(|centre| (self.camera.seen(centre).z, disc(centre))));
+            ordered.extend(quadrotor.rotors().map(|centre| (self.camera.to_camera_frame(centre).z, disc(centre))));
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         discs.extend(ordered.into_iter().map(|(_, disc)| disc));
     }
 
-    /// Arms, the neck of the mark ahead, and in every disc its diameter across the line of sight, which is seen from
-    /// its edge too.
+    /// Draws arms, the neck of the mark ahead, and in every disc the diameter across the line of sight, which is
+    /// visible edge-on too.
     pub(super) fn arms(&self, lines: &mut Vec<Line>) {
         let unit_px = self.view.unit_px();
         for (quadrotor, colour) in self.quadrotors() {

@@ -1,4 +1,4 @@
-//! The ground with its scale, and axes.
+//! Ground with its scale, and coordinate axes.
 
 use nalgebra::Vector3;
 
@@ -8,13 +8,13 @@ use super::compose::SceneBuilder;
 use super::labels::{LabelLayout, width};
 use tautline_core::text::decimals_of;
 
-/// Most lines of the ground in each direction.
-const MOST_LINES: u32 = 60;
-/// Sine of the elevation below which the ground is seen as a line.
+/// Largest number of ground lines in each direction.
+const MAX_LINES: u32 = 60;
+/// Sine of the elevation below which the ground is seen edge-on.
 const EDGE_ON: f64 = 0.05;
-/// Length of the axes in distances of lines of the ground.
+/// Length of the axes in units of the line distance.
 const AXIS: f64 = 1.0;
-/// Colours of x, y and z on dark and on light ground: the usual red, green and blue, none of them pure.
+/// Colours of x, y and z on dark and on light background.
 const AXES: [[Colour; 3]; 2] = [
     [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
     [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
@@ -42,7 +42,7 @@ impl SceneBuilder<'_> {
         AXES[usize::from(self.view.theme != Theme::Dark)]
     }
 
-    /// Metres along the two edges of the ground that are nearest to the camera, and the names of the axes.
+    /// Draws coordinates in metres along the two edges of the ground nearest to the camera, and the names of the axes.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
         let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
@@ -53,8 +53,8 @@ impl SceneBuilder<'_> {
                 labels.put_if_free(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
             }
         }
-        // A number over a ball would be taken for its name.
-        let covered_px = self.covered_px();
+        // A number on a ball would look like its name.
+        let covered_px = self.covered_areas_px();
         let is_covered = |[x, y]: [f64; 2], text: &str| {
             let half = [width(size_px, text), size_px].map(|side| f64::from(side) / 2.0);
             covered_px.iter().any(|([at_x, at_y], radius)| {
@@ -80,19 +80,19 @@ impl SceneBuilder<'_> {
             });
             let Some(edge) = edge else { continue };
             let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
-            // Seen along the ground the numbers are below the line that it is.
+            // Edge-on the numbers are below the line of the ground.
             let (anchor, below_px) = if self.camera.back.z.abs() < EDGE_ON {
                 ([0.5, 0.0], 0.4 * f64::from(size_px))
             } else {
                 ([0.5; 2], 0.0)
             };
-            // The unit is that of the last number that has room.
+            // Only the last number that fits has the unit.
             let mut unit = " m";
             for k in (0..=steps(high[axis] - low[axis], step)).rev() {
                 let mut point = low;
                 point[axis] += f64::from(k) * step;
                 point[other] = edge + outwards * 0.42 * step;
-                let text = format!("{}{unit}", plain(point[axis] + origin_m[axis], step));
+                let text = format!("{}{unit}", format_multiple(point[axis] + origin_m[axis], step));
                 let Some(at) = self.camera.project(point) else { continue };
                 let [x, y] = at.at_px;
                 let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
@@ -104,15 +104,15 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// How many whole steps there are in a length.
+/// Returns the number of steps in a length, at most [`MAX_LINES`].
 fn steps(length: f64, step: f64) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
     let steps = (length / step).round() as u32;
-    steps.min(MOST_LINES)
+    steps.min(MAX_LINES)
 }
 
-/// A multiple of a step with as many decimals as the step has.
-fn plain(metres: f64, step: f64) -> String {
+/// Formats a multiple of a step with the decimals of the step.
+fn format_multiple(metres: f64, step: f64) -> String {
     let decimals = decimals_of(step, 9);
     // Adding 0 turns a negative zero into zero.
     format!("{:.decimals$}", (metres / step).round() * step + 0.0)
@@ -125,9 +125,9 @@ mod tests {
     #[test]
     fn the_scale_shows_round_numbers() {
         assert_eq!(
-            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| plain(at, step)),
+            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| format_multiple(at, step)),
             ["0", "4", "0.30", "-15"]
         );
-        assert_eq!(steps(f64::INFINITY, 1.0), MOST_LINES);
+        assert_eq!(steps(f64::INFINITY, 1.0), MAX_LINES);
     }
 }

@@ -1,8 +1,8 @@
-//! From a frame of a flight to a draw list.
+//! Scenes: draw lists composed from frames of a flight.
 //!
-//! A [`Scene`] is plain data and knows nothing of how it is drawn: balls, discs, shells and lines in metres, and [`Annotation`]s
-//! (words, boxes, scales of colour) in pixels. Lengths are in the scene's coordinates, which are the recording's but for
-//! their origin: it lies amid the flight, so that single precision does for swarms far from the recording's origin.
+//! A [`Scene`] is plain data, independent of the renderer: balls, discs, shells and lines in metres, and
+//! [`Annotation`]s (text, boxes, colour scales) in pixels. Lengths are in scene coordinates. Their origin lies in the
+//! middle of the flight, so that single precision is enough for swarms far from the recording's origin.
 
 mod camera;
 mod caption;

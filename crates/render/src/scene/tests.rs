@@ -16,7 +16,8 @@ use tautline_report::request::replay_of_run;
 use tautline_report::run::run;
 use tautline_sim::scenario::{Scenario, Source};
 
-/// Four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4 s to 6 s.
+/// Returns four vehicles at the corners of a square that fly to the right for ten seconds; 1 and 2 are too close from 4
+/// s to 6 s.
 fn timeline() -> Timeline {
     timeline_in(Metric::default())
 }
@@ -61,7 +62,7 @@ fn camera(text: &str) -> View {
 }
 
 #[test]
-fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
+fn every_vehicle_is_in_the_list_once_for_any_camera() {
     let timeline = timeline();
     for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
         let scene = scene(&timeline, 2.0, &camera(text));
@@ -72,7 +73,7 @@ fn whatever_the_camera_every_vehicle_is_in_the_list_once() {
 }
 
 #[test]
-fn shells_come_farthest_first_along_every_line_of_sight() {
+fn shells_are_sorted_along_every_line_of_sight() {
     for (text, ratio) in
         ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
     {
@@ -82,7 +83,7 @@ fn shells_come_farthest_first_along_every_line_of_sight() {
         assert_eq!(f64::from(scene.shell_ratio), ratio);
         let camera = scene.camera;
         let centre = |ball: &Ball| Vector3::from(ball.centre_m.map(f64::from));
-        // Where rays enter each shell, through points all over the picture, in lengths in which shells are balls.
+        // Entry of rays into each shell, through points all over the picture, in lengths in which shells are balls.
         for n in 0..400_u32 {
             let at_px = [f64::from(n % 20) * 64.0, f64::from(n / 20) * 36.0];
             let [origin, direction] = camera.ray(at_px);
@@ -104,7 +105,7 @@ fn shells_come_farthest_first_along_every_line_of_sight() {
 }
 
 #[test]
-fn layers_that_are_off_leave_nothing_behind() {
+fn layers_that_are_off_draw_nothing() {
     let timeline = timeline();
     let bare = scene(&timeline, 2.0, &View { layers: Layers::NONE, ..View::default() });
     assert_eq!((bare.balls.len(), bare.shells.len(), bare.lines.len(), bare.annotations.len()), (4, 0, 0, 0));
@@ -113,7 +114,7 @@ fn layers_that_are_off_leave_nothing_behind() {
 }
 
 #[test]
-fn a_violation_shows_while_it_lasts_and_is_remembered() {
+fn a_violation_is_shown_while_it_lasts_and_in_the_verdict_after() {
     let timeline = timeline();
     let alarm = Theme::Dark.alarm();
     let red = |scene: &Scene| scene.balls.iter().filter(|ball| ball.colour == alarm).count();
@@ -123,19 +124,19 @@ fn a_violation_shows_while_it_lasts_and_is_remembered() {
     assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
     assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
     assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
-    // Of several, their number is said, and which was the first.
+    // Several violations are shown by their number and the first one.
     let mut again = timeline;
     again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
     let twice = scene(&again, 8.0, &View::default());
     assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
     let timeline = self::timeline();
-    // Even with every layer off, what is violated has its shell.
+    // A vehicle in violation has its shell even with every layer off.
     let bare = scene(&timeline, 5.0, &View { layers: Layers::NONE, ..View::default() });
     assert_eq!(bare.shells.len(), 2);
 }
 
 #[test]
-fn a_violation_between_samples_has_the_distance_of_its_judge_in_banner_label_and_caption() {
+fn a_violation_between_samples_shows_the_audited_separation() {
     let mut timeline = timeline();
     let pair = Pair::new(2, 3);
     timeline.note(&Event::ViolationBegan { pair, time_s: 8.2 });
@@ -150,7 +151,7 @@ fn a_violation_between_samples_has_the_distance_of_its_judge_in_banner_label_and
 }
 
 #[test]
-fn what_the_judge_finds_after_the_last_sample_is_in_the_last_picture() {
+fn a_violation_after_the_last_sample_is_in_the_last_picture() {
     let mut timeline = timeline();
     timeline.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 10.01 });
     let says = |time_s: f64| {
@@ -161,7 +162,7 @@ fn what_the_judge_finds_after_the_last_sample_is_in_the_last_picture() {
 }
 
 #[test]
-fn what_the_judge_cannot_tell_is_not_called_clear() {
+fn an_undecided_flight_is_not_shown_as_clear() {
     let mut timeline = timeline();
     timeline.undecided_s = Some(2.0);
     let verdict = |time_s: f64| {
@@ -170,14 +171,14 @@ fn what_the_judge_cannot_tell_is_not_called_clear() {
     };
     let said = [1.9, 2.0, 4.5].map(verdict);
     assert_eq!(said, [Some("clear so far".to_owned()), Some("undecided from 2.00 s on".to_owned()), None]);
-    // What was assumed is said in the same line.
+    // The assumption is in the same line.
     (timeline.undecided_s, timeline.assumes_straight) = (None, true);
     let scene = scene(&timeline, 1.9, &View::default());
     assert!(words(&scene).contains(&"clear so far, if straight between samples"), "{:?}", words(&scene));
 }
 
 #[test]
-fn the_caption_says_the_smallest_separation_so_far() {
+fn the_caption_shows_the_smallest_separation_so_far() {
     let timeline = timeline();
     let scene = scene(&timeline, 3.0, &View::default());
     assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1-2 at 3.00 s")));
@@ -185,7 +186,7 @@ fn the_caption_says_the_smallest_separation_so_far() {
 }
 
 #[test]
-fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
+fn goals_fit_the_formation_and_starts_are_at_the_first_positions() {
     let timeline = timeline();
     let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
     let scene = scene(&timeline, 10.0, &only);
@@ -202,7 +203,7 @@ fn goals_are_where_the_formation_fits_and_starts_where_it_began() {
 }
 
 #[test]
-fn edges_push_below_their_rest_length_and_pull_beyond_it() {
+fn edges_push_below_their_rest_length_and_pull_above_it() {
     let timeline = timeline();
     let plan = timeline.plan.as_ref().expect("a plan");
     assert_eq!(plan.graph, Graph::complete(4));
@@ -213,7 +214,7 @@ fn edges_push_below_their_rest_length_and_pull_beyond_it() {
 }
 
 #[test]
-fn a_follower_of_nobody_is_told_whom_it_can_follow() {
+fn an_unknown_vehicle_to_follow_is_refused_with_the_known_names() {
     let timeline = timeline();
     let frame = timeline.log.at(0.0).expect("a frame");
     let error = Extent::of(&timeline).camera(&timeline, &frame, &camera("follow:9")).expect_err("no vehicle 9");
@@ -221,7 +222,7 @@ fn a_follower_of_nobody_is_told_whom_it_can_follow() {
 }
 
 #[test]
-fn no_size_of_picture_and_no_swarm_breaks_the_list() {
+fn any_picture_size_and_swarm_gives_a_finite_list() {
     let timeline = timeline();
     for size_px in [[1, 1], [64, 2000], [16_384, 16], [320, 180]] {
         let scene = scene(&timeline, 5.0, &View { size_px, ..View::default() });
@@ -235,7 +236,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
     let mut alone = Timeline::new("alone", 1);
     let swarm = Swarm::at_rest(Rows::from_row_slice(&[f64::NAN, 0.0, 0.0]));
     alone.take(&Sample::new(0.0, 0, &swarm, &Rows::zeros(1)));
-    assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle that is nowhere is not drawn");
+    assert!(scene(&alone, 0.0, &View::default()).balls.is_empty(), "a vehicle without a position is not drawn");
     let far = Swarm::at_rest(Rows::from_row_slice(&[5e6, 4e6, 100.0]));
     let mut far_away = Timeline::new("far", 1);
     far_away.take(&Sample::new(0.0, 0, &far, &Rows::zeros(1)));
@@ -243,7 +244,7 @@ fn no_size_of_picture_and_no_swarm_breaks_the_list() {
 }
 
 #[test]
-fn the_worst_pair_is_named_first_and_few_are_labelled() {
+fn the_closest_pair_is_named_first_and_few_are_labelled() {
     let mut timeline = timeline();
     for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
         timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
@@ -256,7 +257,7 @@ fn the_worst_pair_is_named_first_and_few_are_labelled() {
 }
 
 #[test]
-fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
+fn the_caption_of_a_small_picture_is_shortened_without_overlap() {
     let mut timeline = timeline();
     "an exceedingly long name of a flight".clone_into(&mut timeline.name);
     let said = |size_px| {
@@ -271,7 +272,7 @@ fn in_a_small_picture_the_caption_gives_way_and_never_runs_over_itself() {
 }
 
 #[test]
-fn what_is_too_small_to_see_is_a_dot() {
+fn a_vehicle_too_small_to_see_is_a_dot() {
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 30e3, 0.0, 1.0]));
     let mut timeline = Timeline::new("far", 2);
     for (step, time_s) in [0.0, 1.0].into_iter().enumerate() {
@@ -285,7 +286,7 @@ fn what_is_too_small_to_see_is_a_dot() {
 }
 
 #[test]
-fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit() {
+fn the_scale_is_below_the_ground_edge_on_and_its_last_number_has_the_unit() {
     let timeline = timeline();
     for text in ["iso", "front", "side", "top"] {
         let scene = scene(&timeline, 2.0, &camera(text));
@@ -306,7 +307,7 @@ fn seen_along_the_ground_its_scale_is_below_it_and_the_last_number_has_the_unit(
 }
 
 #[test]
-fn of_many_vehicles_those_that_are_too_close_are_named() {
+fn only_vehicles_in_violation_are_named_in_a_large_swarm() {
     let places: Vec<f64> = (0..100_u32).flat_map(|k| [f64::from(k % 10) * 4.0, f64::from(k / 10) * 4.0, 5.0]).collect();
     let mut swarm = Swarm::at_rest(Rows::from_row_slice(&places));
     swarm.positions_m[(99, 0)] = swarm.positions_m[(98, 0)] + 0.5;
@@ -327,8 +328,8 @@ fn of_many_vehicles_those_that_are_too_close_are_named() {
 }
 
 #[test]
-fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
-    // One on the ground and three high above its edges, which are seen over them from above.
+fn numbers_of_the_ground_do_not_cover_vehicles_or_shells() {
+    // One vehicle on the ground, and three high above its edges, which cover the edges from above.
     let places = [0.0, 0.0, 0.5, 6.0, 0.0, 9.0, 0.0, 6.0, 9.0, -6.0, -6.0, 9.0];
     let swarm = Swarm::at_rest(Rows::from_row_slice(&places));
     let mut timeline = Timeline::new("tower", 4);
@@ -368,9 +369,9 @@ fn no_number_of_the_ground_is_written_over_a_vehicle_or_its_shell() {
     assert!(dropped > 0, "shells cover numbers from some side");
 }
 
-/// A leg later, behind a reference that moves: goals are the slots of that leg where the reference has carried them.
+/// A later leg behind a moving reference: goals are the slots of that leg at the reference's position.
 #[test]
-fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
+fn goals_are_those_of_the_current_leg_at_the_reference() {
     use tautline_laws::target::{Begins, Guidance, Leg, ReferenceMotion};
 
     let start = Swarm::at_rest(Formation::line(4, 3.0).slots_m);
@@ -393,7 +394,7 @@ fn goals_are_those_of_the_leg_under_way_where_the_reference_is() {
 }
 
 #[test]
-fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_caption_and_label() {
+fn the_closest_approach_is_the_same_in_report_figure_replay_and_picture() {
     let mut scenario = Scenario::read(&Source::Builtin("swap".to_owned()), &[]).expect("built in");
     scenario.time.record_hz = 1.0;
     let mut log = FlightLog::of(&scenario);
@@ -430,7 +431,7 @@ fn a_closest_approach_between_samples_is_the_same_in_report_figure_replay_captio
     assert!(report.headline().contains(&metres), "{}", report.headline());
 }
 
-/// Vehicles whose attitude is known.
+/// Vehicles with a known attitude.
 mod quadrotors {
     use nalgebra::{UnitQuaternion, Vector3};
 
@@ -442,7 +443,7 @@ mod quadrotors {
     const ABOVE: f64 = 0.18;
     const PLACES_M: [f64; 6] = [0.0, 0.0, 1.0, 3.0, 0.0, 1.0];
 
-    /// Two vehicles 3 m apart, both with one attitude.
+    /// Returns two vehicles 3 m apart with the same attitude.
     fn timeline(attitude: Option<UnitQuaternion<f64>>) -> Timeline {
         let swarm = Swarm::at_rest(Rows::from_row_slice(&PLACES_M));
         let mut timeline = Timeline::new("pair", 2);
@@ -465,7 +466,7 @@ mod quadrotors {
         Scene::compose(timeline, &extent, &frame, &view, camera)
     }
 
-    /// How far the discs of a scene are from where the rotors of both vehicles are under an attitude \[m\].
+    /// Returns the largest distance of discs from the rotors of both vehicles at an attitude \[m\].
     fn off_m(timeline: &Timeline, attitude: UnitQuaternion<f64>) -> f64 {
         let (shape, origin_m) = (QuadrotorShape::within(0.25), Extent::of(timeline).origin_m());
         let scene = scene(timeline, [1280, 720]);
@@ -486,20 +487,26 @@ mod quadrotors {
     }
 
     #[test]
-    fn the_discs_of_a_tilted_quadrotor_are_where_its_attitude_says() {
+    fn the_discs_of_a_tilted_quadrotor_follow_its_attitude() {
         let tilted = UnitQuaternion::from_euler_angles(0.3, -0.4, 1.1);
         assert!(off_m(&timeline(Some(tilted)), tilted) < 1e-6);
-        assert!(off_m(&timeline(Some(tilted)), UnitQuaternion::identity()) > 0.05, "level they would be elsewhere");
-        assert!(off_m(&timeline(Some(tilted)), tilted.inverse()) > 0.05, "turned the other way they would be too");
+        assert!(
+            off_m(&timeline(Some(tilted)), UnitQuaternion::identity()) > 0.05,
+            "the discs differ from those of a level vehicle"
+        );
+        assert!(
+            off_m(&timeline(Some(tilted)), tilted.inverse()) > 0.05,
+            "the discs differ from those of the inverse attitude"
+        );
     }
 
     #[test]
-    fn a_quadrotor_keeps_its_shell_and_shows_where_it_looks() {
+    fn a_quadrotor_has_a_shell_and_a_mark_ahead() {
         let left = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
         let timeline = timeline(Some(left));
         let scene = scene(&timeline, [1280, 720]);
         assert_eq!(scene.shells.len(), 2);
-        // A body and the mark ahead each.
+        // A body and a mark ahead per vehicle.
         assert_eq!(scene.balls.len(), 4);
         let [body, nose] = [0, 1].map(|k| Vector3::from(scene.balls[k].centre_m.map(f64::from)));
         let ahead = (nose - body).normalize();
@@ -508,7 +515,7 @@ mod quadrotors {
     }
 
     #[test]
-    fn what_is_small_or_of_unknown_attitude_is_a_ball() {
+    fn a_small_vehicle_or_one_without_attitude_is_a_ball() {
         let level = timeline(Some(UnitQuaternion::identity()));
         let small = scene(&level, [64, 36]);
         let unknown = scene(&timeline(None), [64, 36]);

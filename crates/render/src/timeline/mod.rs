@@ -1,4 +1,4 @@
-//! A recorded flight, ready to be drawn at any time of it.
+//! Timeline of a recorded flight, which can be drawn at any time.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,30 +18,30 @@ mod tracks;
 
 pub use tracks::TracksError;
 
-/// Radius of a vehicle of which nothing is known \[m\].
+/// Radius of a vehicle without a known radius \[m\].
 const UNKNOWN_RADIUS_M: f64 = 0.1;
-/// Distance of the rotors from the centre and their radius, over the radius of the hull, where the model is not known.
+/// Distance of the rotors from the centre, and their radius, over the radius of the hull, for an unknown model.
 const ARM: f64 = 0.66;
 const ROTOR: f64 = 0.33;
 
-/// Places and size of the rotors of a quadrotor.
+/// Positions and size of the rotors of a quadrotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadrotorShape {
-    /// Their middles from the centre of the body, x ahead and y to the left \[m\].
+    /// Centres of the rotors relative to the centre of the body, x ahead and y to the left \[m\].
     pub rotors_m: [Vector3<f64>; 4],
-    /// Radius of each \[m\].
+    /// Radius of each rotor \[m\].
     pub rotor_radius_m: f64,
 }
 
 impl QuadrotorShape {
-    /// Shape of a scenario's model, where its vehicles are quadrotors.
+    /// Returns the shape of a scenario's model, if its vehicles are quadrotors.
     pub(crate) fn of(scenario: &Scenario) -> Option<Self> {
         let model = &scenario.airframe.quadrotor()?.model;
         let rotors_m = model.rotor_positions_m.map(|[x, y]| Vector3::new(x, y, 0.0));
         Some(Self { rotors_m, rotor_radius_m: model.rotor_radius_m })
     }
 
-    /// Four rotors within a hull of this radius \[m\].
+    /// Creates four rotors within a hull of this radius \[m\].
     #[must_use]
     pub fn within(hull_radius_m: f64) -> Self {
         let out = hull_radius_m * ARM * std::f64::consts::FRAC_1_SQRT_2;
@@ -52,14 +52,14 @@ impl QuadrotorShape {
         }
     }
 
-    /// Distance of the outermost rotor from the centre \[m\].
+    /// Returns the distance of the outermost rotor from the centre \[m\].
     #[must_use]
     pub fn arm_m(&self) -> f64 {
         self.rotors_m.iter().map(Vector3::norm).fold(0.0, f64::max)
     }
 }
 
-/// A flight with everything that its pictures show: its log, and what does not change while it is flown.
+/// Flight with everything that its pictures show: the log, and data that are constant over the flight.
 #[derive(Clone, Debug)]
 pub struct Timeline {
     /// Name of the flight.
@@ -68,28 +68,28 @@ pub struct Timeline {
     pub vehicles: Vec<String>,
     /// Radius of each vehicle's hull \[m\].
     pub radius_m: Vec<f64>,
-    /// Safety distance delta \[m\], where the flight is judged by one.
+    /// Safety distance delta \[m\], if the flight is judged by one.
     pub delta_m: Option<f64>,
-    /// Rotors of every vehicle, where the flight has a model.
+    /// Rotors of every vehicle, if the flight has a model.
     pub shape: Option<QuadrotorShape>,
-    /// Formation and graph, where the flight has them.
+    /// Formation and graph, if the flight has them.
     pub plan: Option<Plan>,
-    /// Notes on how the flight was read, a sentence each.
+    /// Notes on how the flight was read, one sentence each.
     pub notes: Vec<String>,
     /// Motion, closest approaches and violations.
     pub log: Arc<FlightLog>,
-    /// From when on the judge cannot tell whether two were too close \[s\].
+    /// Time from which on the audit is undecided \[s\].
     pub(crate) undecided_s: Option<f64>,
-    /// Every vehicle has a radius of its own in the recording, which is judged by where there is no delta.
+    /// Whether the recording has a radius for every vehicle; without delta the radii are the limits.
     by_radii: bool,
-    /// The judge assumed straight lines between samples.
+    /// Whether the audit assumed straight lines between samples.
     pub(crate) assumes_straight: bool,
-    /// The judge refused the motion.
+    /// Whether the audit refused the motion.
     refused: bool,
 }
 
 impl Timeline {
-    /// An empty flight of this name by so many vehicles, numbered from 1.
+    /// Creates an empty flight with this name and number of vehicles, numbered from 1.
     #[must_use]
     pub fn new(name: &str, vehicles: usize) -> Self {
         Self {
@@ -108,13 +108,13 @@ impl Timeline {
         }
     }
 
-    /// An empty flight of this scenario.
+    /// Creates an empty flight of this scenario.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self::flown(scenario, Arc::new(FlightLog::of(scenario)))
     }
 
-    /// A flight of this scenario with its log.
+    /// Creates a flight of this scenario with its log.
     #[must_use]
     pub fn flown(scenario: &Scenario, log: Arc<FlightLog>) -> Self {
         let mut plan = Plan::of(scenario);
@@ -129,12 +129,12 @@ impl Timeline {
         }
     }
 
-    /// Reads a recording of this program. Where its scenario cannot be understood, formation and graph are not known.
+    /// Reads a recording of this program. If its scenario cannot be read, formation and graph are unknown.
     ///
-    /// The result may be without keyframes.
+    /// The result may have no keyframes.
     ///
     /// # Errors
-    /// [`RenderError`] when it cannot be read, or a vehicle is beyond [`FARTHEST_M`](crate::FARTHEST_M).
+    /// [`RenderError`] if it cannot be read, or a vehicle is beyond [`FARTHEST_M`](crate::FARTHEST_M).
     pub fn read_mcap(path: &Path) -> Result<Self, RenderError> {
         let mut recording = McapRecording::open(path)?;
         let header = recording.header().clone();
@@ -156,38 +156,41 @@ impl Timeline {
         if let StoredAudit::AsWritten(audit) = recording.stored_audit()
             && let Some(closest) = audit.closest.iter().find(|approach| approach.other_vehicle > 0)
         {
-            // The audit of ellipsoids counts in half axes, of which the limit has two; the log counts in delta.
+            // The audit of ellipsoids counts in half axes, and its limit is 2. The log counts in units of delta.
             let scale = if audit.limit_m == header.delta_m { 1.0 } else { header.delta_m / audit.limit_m };
             Arc::make_mut(&mut timeline.log).conclude(closest.min_m * scale, closest.min_at_s);
         }
         if !recording.is_complete() {
-            let note = "the recording was not closed: it is drawn up to the last part that was written";
+            let note = "the recording was not closed: it is drawn up to its last complete part";
             timeline.notes.push(note.to_owned());
         }
         Ok(timeline)
     }
 
-    /// Number of vehicles N.
+    /// Returns the number of vehicles N.
     #[must_use]
     pub fn count(&self) -> usize {
         self.vehicles.len()
     }
 
-    /// Radius around a vehicle that must stay empty: half of delta, half of an ellipsoid's longer axis, or its own radius
-    /// where that is more \[m\].
+    /// Returns the radius around a vehicle that must stay empty \[m\]: half of delta, half of an ellipsoid's longer
+    /// axis, or its own radius if that is larger.
     pub(crate) fn keep_out_m(&self, vehicle: usize) -> f64 {
         self.delta_m.map_or(0.0, |delta_m| self.log.metric().longest_m(delta_m) / 2.0).max(self.radius_m[vehicle])
     }
 
-    /// The violations of two vehicles that have begun by a time \[s\]; at the end of the flight all of them.
-    pub(crate) fn begun(&self, time_s: f64) -> impl Iterator<Item = Violation> {
+    /// Returns the violations of two vehicles that began by a time \[s\]; at the end of the flight all of them.
+    pub(crate) fn violations_by(&self, time_s: f64) -> impl Iterator<Item = Violation> {
         let until_s = self.until_s(time_s);
         self.log.violations().of_vehicles().filter(move |violation| violation.from_s <= until_s)
     }
 
-    /// The violations of obstacles that have begun by a time \[s\], each with its vehicle and obstacle; at the end of the
-    /// flight all of them.
-    pub(crate) fn too_near_by(&self, time_s: f64) -> impl Iterator<Item = (&Violation<ObjectPair>, [usize; 2])> {
+    /// Returns the violations of obstacles that began by a time \[s\], each with its vehicle and obstacle; at the end
+    /// of the flight all of them.
+    pub(crate) fn obstacle_violations_by(
+        &self,
+        time_s: f64,
+    ) -> impl Iterator<Item = (&Violation<ObjectPair>, [usize; 2])> {
         let until_s = self.until_s(time_s);
         self.log.violations().of_obstacles().filter(move |(found, _)| found.from_s <= until_s)
     }
@@ -196,13 +199,13 @@ impl Timeline {
         if time_s < self.log.range_s()[1] { time_s } else { f64::INFINITY }
     }
 
-    /// Name of an obstacle, in quotes; its number where it is not known.
+    /// Returns the name of an obstacle in quotes, or its number if it is unknown.
     pub(crate) fn obstacle(&self, k: usize) -> String {
         let known = self.plan.as_ref().and_then(|plan| plan.obstacles.get(k));
         known.map_or_else(|| format!("obstacle {}", k + 1), |obstacle| format!("`{}`", obstacle.name))
     }
 
-    /// Why nothing is judged, where nothing is.
+    /// Returns the reason why nothing is judged, if so.
     pub(crate) fn unjudged(&self) -> Option<&'static str> {
         match self.delta_m {
             None if !self.by_radii => Some("no delta"),
@@ -211,12 +214,12 @@ impl Timeline {
         }
     }
 
-    /// Takes one sample, which must be later than the one before.
+    /// Adds a sample, which must be later than the last one.
     pub fn take(&mut self, sample: &Sample<'_>) {
         Arc::make_mut(&mut self.log).take(sample);
     }
 
-    /// Takes one sample unless a vehicle of it is too far away to be drawn.
+    /// Adds a sample, unless a vehicle is too far away to be drawn.
     pub(crate) fn take_checked(&mut self, sample: &Sample<'_>) -> Result<(), RenderError> {
         for (k, place) in sample.swarm.positions_m.row_iter().enumerate() {
             let name = || self.vehicles.get(k).map_or_else(|| (k + 1).to_string(), Clone::clone);
@@ -226,7 +229,7 @@ impl Timeline {
         Ok(())
     }
 
-    /// Takes one event of the judge of the flight.
+    /// Adds an event of the audit.
     pub fn note(&mut self, event: &Event) {
         if let Some(plan) = &mut self.plan {
             plan.note(event);

@@ -1,4 +1,4 @@
-//! A timeline of recorded motion of any origin, judged as it is read.
+//! Timeline of recorded motion from any source, audited while it is read.
 
 use std::sync::Arc;
 
@@ -12,25 +12,25 @@ use tautline_core::swarm::{ClosestApproach, Rows, set_row};
 use tautline_core::track::{Item, Piece, Tracks};
 use tautline_report::flight_log::{BUDGET_BYTES, FlightLog, PICTURED, Violations};
 
-/// Keyframes a second at which known curves are drawn \[Hz\].
+/// Rate of keyframes at which recorded curves are drawn \[Hz\].
 const CURVE_HZ: f64 = 30.0;
-/// Items that are read before the first is judged: usual intervals are learnt from them.
+/// Number of items that are read before the audit starts: usual intervals are learnt from them.
 const OPENING: usize = 65_536;
-/// Keyframes of vehicles that were seen at times of their own, over those of the one that was seen most often.
-const SHARED: usize = 2;
+/// Largest number of keyframes over the number of samples of the vehicle with the most samples.
+const MAX_SHARED: usize = 2;
 
-/// Why recorded motion cannot be drawn.
+/// Error of recorded motion.
 #[derive(Debug, thiserror::Error)]
 pub enum TracksError<E> {
-    /// It cannot be read.
+    /// The recording cannot be read.
     #[error("{0}")]
     Read(E),
-    /// It can be read and not be drawn.
+    /// The recording can be read but not drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
 }
 
-/// What is known of one vehicle.
+/// Recorded motion of one vehicle.
 #[derive(Default)]
 struct VehicleTrack {
     samples: Vec<(f64, Vector3<f64>)>,
@@ -39,23 +39,22 @@ struct VehicleTrack {
 }
 
 impl Timeline {
-    /// Reads recorded motion. Vehicles that were seen at times of their own are put on common ones, with straight lines
-    /// between; one that has not been seen yet, or no longer, is not there. The closest approaches, and the violations of
-    /// `delta_m` \[m\], are those that [`TrackAuditor`](tautline_audit::recorded::TrackAuditor) finds in the recording; what
-    /// it refuses is drawn and not judged.
+    /// Reads recorded motion. Vehicles with different sample times are interpolated linearly to common times; a vehicle
+    /// before its first or after its last sample is absent. Closest approaches, and violations of `delta_m` \[m\], come
+    /// from [`TrackAuditor`](tautline_audit::recorded::TrackAuditor). Motion that it refuses is drawn without a
+    /// verdict.
     ///
-    /// The result may be without keyframes.
+    /// The result may have no keyframes.
     ///
     /// # Errors
-    /// [`TracksError`] when the recording cannot be read, or a vehicle is beyond
-    /// [`FARTHEST_M`](crate::FARTHEST_M).
+    /// [`TracksError`] if the recording cannot be read, or a vehicle is beyond [`FARTHEST_M`](crate::FARTHEST_M).
     pub fn from_tracks<T: Tracks + ?Sized>(
         name: &str,
         recording: &mut T,
         delta_m: Option<f64>,
     ) -> Result<Self, TracksError<T::Error>> {
-        let mut judge = Judge::new(delta_m);
-        let tracks = read(recording, &mut judge)?;
+        let mut audit = RecordingAudit::new(delta_m);
+        let tracks = read(recording, &mut audit)?;
         let mut timeline = Self::new(name, tracks.len());
         timeline.delta_m = delta_m;
         timeline.vehicles = (0..tracks.len()).map(|k| vehicle(recording, k)).collect();
@@ -66,12 +65,12 @@ impl Timeline {
         timeline.by_radii = !tracks.is_empty() && tracks.iter().all(|track| track.radius_m.is_some());
         timeline.assumes_straight = tracks.iter().any(|track| !track.samples.is_empty());
         let mut places = vec![0; tracks.len()];
-        let (judged, mut log) = (judge.finish(), FlightLog::default());
+        let (judged, mut log) = (audit.finish(), FlightLog::default());
         for time_s in common_times(&tracks, &moments_s(&judged)) {
             let mut positions_m = Rows::zeros(tracks.len());
             for (k, track) in tracks.iter().enumerate() {
                 let position_m = track.at(time_s, &mut places[k]);
-                // Curves may go far between times that do not.
+                // Curves may exceed the limit between times at which they do not.
                 check_lengths(position_m.iter(), "coordinate", time_s, || timeline.vehicles[k].clone())?;
                 set_row(&mut positions_m, k, position_m);
             }
@@ -84,8 +83,11 @@ impl Timeline {
     }
 }
 
-/// Everything that is recorded, by vehicle.
-fn read<T: Tracks + ?Sized>(recording: &mut T, judge: &mut Judge) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
+/// Reads all motion, by vehicle.
+fn read<T: Tracks + ?Sized>(
+    recording: &mut T,
+    audit: &mut RecordingAudit,
+) -> Result<Vec<VehicleTrack>, TracksError<T::Error>> {
     let (mut tracks, mut items): (Vec<VehicleTrack>, _) = (Vec::new(), Vec::new());
     let (mut more, mut first) = (true, true);
     while more {
@@ -93,7 +95,7 @@ fn read<T: Tracks + ?Sized>(recording: &mut T, judge: &mut Judge) -> Result<Vec<
             more = recording.read(&mut items).map_err(TracksError::Read)?;
         }
         first = false;
-        judge.push(recording.vehicles(), &items);
+        audit.push(recording.vehicles(), &items);
         for item in items.drain(..) {
             let k = item.vehicle();
             if tracks.len() <= k {
@@ -114,15 +116,15 @@ fn read<T: Tracks + ?Sized>(recording: &mut T, judge: &mut Judge) -> Result<Vec<
     Ok(tracks)
 }
 
-/// The name of a vehicle; its number where it has none.
+/// Returns the name of a vehicle, or its number without one.
 fn vehicle<T: Tracks + ?Sized>(recording: &T, k: usize) -> String {
     recording.vehicles().get(k).cloned().unwrap_or_else(|| (k + 1).to_string())
 }
 
 impl VehicleTrack {
-    /// Where the vehicle is at a time that is not before the time of the last call; `place` is kept between calls.
+    /// Returns the position at a time, which must not be before that of the last call. `place` is state between calls.
     fn at(&self, time_s: f64, place: &mut usize) -> Vector3<f64> {
-        let nowhere = Vector3::repeat(f64::NAN);
+        let absent = Vector3::repeat(f64::NAN);
         if self.pieces.is_empty() {
             while self.samples.get(*place + 1).is_some_and(|next| next.0 <= time_s) {
                 *place += 1;
@@ -132,20 +134,20 @@ impl VehicleTrack {
                 (Some(here), Some(next)) if here.0 < time_s => {
                     here.1 + (next.1 - here.1) * ((time_s - here.0) / (next.0 - here.0))
                 }
-                _ => nowhere,
+                _ => absent,
             };
         }
         while self.pieces.get(*place).is_some_and(|piece| piece.to_s < time_s) {
             *place += 1;
         }
-        self.pieces.get(*place).filter(|piece| piece.from_s <= time_s).map_or(nowhere, |piece| {
+        self.pieces.get(*place).filter(|piece| piece.from_s <= time_s).map_or(absent, |piece| {
             let t = time_s - piece.from_s;
             piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * t + coefficient)
         })
     }
 }
 
-/// The times of all samples where they are few, else evenly spaced ones and the moments that are looked at \[s\].
+/// Returns all sample times if they are few, else evenly spaced times and the moments of interest \[s\].
 fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     let mut times: Vec<f64> = Vec::new();
     for track in tracks {
@@ -156,15 +158,15 @@ fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     times.sort_unstable_by(f64::total_cmp);
     times.dedup();
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else { return times };
-    let most = BUDGET_BYTES / (tracks.len().max(1) * 6 * size_of::<f64>());
+    let max_times = BUDGET_BYTES / (tracks.len().max(1) * 6 * size_of::<f64>());
     let has_curves = tracks.iter().any(|track| !track.pieces.is_empty());
     let longest = tracks.iter().map(|track| track.samples.len()).max().unwrap_or(0);
-    if !has_curves && times.len() <= most && times.len() <= SHARED * longest {
+    if !has_curves && times.len() <= max_times && times.len() <= MAX_SHARED * longest {
         return times;
     }
     let wanted = if has_curves { (last - first) * CURVE_HZ } else { longest as f64 };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
-    let steps = wanted.ceil().clamp(1.0, most.max(2) as f64) as usize;
+    let steps = wanted.ceil().clamp(1.0, max_times.max(2) as f64) as usize;
     let even = (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64));
     let mut times: Vec<f64> = even.chain(moments_s.iter().copied().filter(|at| (first..=last).contains(at))).collect();
     times.sort_unstable_by(f64::total_cmp);
@@ -172,15 +174,15 @@ fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     times
 }
 
-/// Safety distance of a recording that is to be drawn and not judged \[m\]: the closest approach is asked for alone.
+/// Safety distance of a recording that is drawn without limits \[m\]; only the closest approach is used.
 const NO_DELTA_M: f64 = 1e-9;
 
-/// The judge of recordings, as it reads on. Motion that it refuses is drawn and labelled as not judged.
-struct Judge {
+/// Audit of a recording while it is read. Refused motion is drawn and labelled as not judged.
+struct RecordingAudit {
     auditor: Result<TrackAuditor, RecordedError>,
 }
 
-impl Judge {
+impl RecordingAudit {
     fn new(delta_m: Option<f64>) -> Self {
         let settings = Settings::delta(delta_m.unwrap_or(NO_DELTA_M));
         Self { auditor: TrackAuditor::new(settings).map(TrackAuditor::with_smallest) }
@@ -199,7 +201,7 @@ impl Judge {
     }
 }
 
-/// Times of the closest approach and of the worst moments of the first violations \[s\].
+/// Returns the times of the closest approach, and of the smallest separations of the first violations \[s\].
 fn moments_s(judged: &Result<Outcome, RecordedError>) -> Vec<f64> {
     let worst = |outcome: &Outcome| outcome.violations.iter().take(PICTURED).map(|found| found.min_at_s).collect();
     let mut moments: Vec<f64> = judged.as_ref().map_or_else(|_| Vec::new(), worst);
@@ -208,7 +210,7 @@ fn moments_s(judged: &Result<Outcome, RecordedError>) -> Vec<f64> {
 }
 
 impl Timeline {
-    /// Takes the outcome of the judge on the motion of a log.
+    /// Adds the outcome of the audit to a log.
     fn take_outcome(&mut self, log: &mut FlightLog, judged: Result<Outcome, RecordedError>) {
         let outcome = match judged {
             Ok(outcome) => outcome,

@@ -1,4 +1,4 @@
-//! The window: a flight played, scrubbed, turned around and looked into, live or from a recording.
+//! Interactive window: plays a flight, live or from a recording, with camera, timeline and panels.
 
 mod open_window;
 mod panels;
@@ -25,18 +25,17 @@ pub use player::LiveUpdate;
 use player::Player;
 use state::WindowState;
 
-/// Longest time between two pictures that is played \[s\]: a window that was hidden does not jump.
+/// Longest time between two pictures that is played \[s\], so that a window that was hidden does not jump.
 const LONGEST_PAUSE_S: f64 = 0.1;
-/// How long the window sleeps while it waits for a flight in the air.
+/// Interval at which the window checks a live flight for updates.
 const LIVE_SLEEP: Duration = Duration::from_millis(30);
 
-/// Opens a window on a flight and stays until it is closed.
+/// Opens a window on a flight and returns when it is closed.
 ///
-/// `live` brings samples of a flight that is still in the air. Pictures that the person asks for are written into the
-/// working folder.
+/// `live` delivers samples of a flight in progress. Saved pictures are written to the working folder.
 ///
 /// # Errors
-/// [`RenderError`] when there is no display, or nothing that can draw on it.
+/// [`RenderError`] without a display, or without an adapter that can draw on it.
 pub fn show(
     timeline: Timeline,
     live: Option<Receiver<LiveUpdate>>,
@@ -52,7 +51,7 @@ pub fn show(
     })
 }
 
-/// What the window system said, without the place in a library that noticed it.
+/// Returns the message of the window system without its source location.
 fn reason(error: &EventLoopError) -> String {
     let text = error.to_string();
     match text.strip_prefix("os error at ").and_then(|placed| placed.split_once(": ")) {
@@ -66,7 +65,7 @@ struct App {
     player: Player,
     state: WindowState,
     open: Option<OpenWindow>,
-    /// When the last picture was drawn.
+    /// Time of the last picture.
     drawn: Instant,
     failure: Option<RenderError>,
 }
@@ -90,7 +89,7 @@ impl ApplicationHandler for App {
             WindowEvent::RedrawRequested => {
                 if let Err(error) = self.draw() {
                     self.fail(events, error);
-                } else if self.state.quits {
+                } else if self.state.is_closing {
                     events.exit();
                 }
                 return;
@@ -104,8 +103,8 @@ impl ApplicationHandler for App {
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
         let Some(open) = &self.open else { return };
-        let came = out_of_library(|| self.player.receive());
-        if self.player.playing || came {
+        let received = out_of_library(|| self.player.receive());
+        if self.player.playing || received {
             open.window.request_redraw();
         }
         events.set_control_flow(if self.player.is_live() {
@@ -122,7 +121,7 @@ impl App {
         events.exit();
     }
 
-    /// Draws the picture, then the panels around it, in the order that what the person does is seen at once.
+    /// Draws the picture, then the panels, so that an input takes effect in the same frame.
     fn draw(&mut self) -> Result<(), RenderError> {
         let (Some(open), player, state) = (&mut self.open, &mut self.player, &mut self.state) else { return Ok(()) };
         let now = Instant::now();
@@ -162,37 +161,37 @@ impl App {
             let area_px = [area.width(), area.height()].map(|side| (side * points).round() as u32);
             Ok::<_, RenderError>((output, area_px))
         })?;
-        // What the panels leave is known now: the next picture fits.
+        // The panels have determined the area of the picture: the next picture has this size.
         open.fit_picture(area_px);
         open.present(output)
     }
 }
 
 thread_local! {
-    static WITHIN: Cell<bool> = const { Cell::new(false) };
+    static IN_LIBRARY: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether this thread runs the window library, and no callback of this program. A panic there means that the display went
-/// away: the library reports it in no other way.
+/// Returns whether this thread is in the window library, outside of callbacks. A panic there means that the display was
+/// closed: the library reports that in no other way.
 #[must_use]
 pub fn is_in_window_library() -> bool {
-    WITHIN.get()
+    IN_LIBRARY.get()
 }
 
 /// Runs a call of the window library.
 fn in_library<T>(act: impl FnOnce() -> T) -> T {
-    marked(true, act)
+    with_flag(true, act)
 }
 
 /// Runs a callback of this program.
 fn out_of_library<T>(act: impl FnOnce() -> T) -> T {
-    marked(false, act)
+    with_flag(false, act)
 }
 
-fn marked<T>(within: bool, act: impl FnOnce() -> T) -> T {
-    let before = WITHIN.replace(within);
+fn with_flag<T>(is_inside: bool, act: impl FnOnce() -> T) -> T {
+    let before = IN_LIBRARY.replace(is_inside);
     let done = act();
-    WITHIN.set(before);
+    IN_LIBRARY.set(before);
     done
 }
 
@@ -201,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_library_calls_of_ours_is_not_the_library() {
+    fn callbacks_are_outside_the_library() {
         assert!(!is_in_window_library());
         in_library(|| {
             assert!(is_in_window_library());

@@ -1,4 +1,4 @@
-//! A window that is open, and how things get on it.
+//! Open window: surface, panels, and the picture between them.
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -16,23 +16,23 @@ use crate::gpu::{AdapterChoice, Gpu, Renderer, instance, lost, unusable};
 use crate::scene::{Extent, Scene};
 use crate::timeline::Timeline;
 
-/// Size of the window at first \[points\].
-const FIRST_SIZE: [f64; 2] = [1280.0, 800.0];
-/// Least side of the picture \[pixels\].
-const LEAST_PX: u32 = 16;
+/// Initial size of the window \[points\].
+const INITIAL_SIZE: [f64; 2] = [1280.0, 800.0];
+/// Smallest side of the picture \[pixels\].
+const MIN_PX: u32 = 16;
 
-/// A window that is open.
+/// Open window with its renderer.
 pub(super) struct OpenWindow {
     painter: Painter,
     panels: RenderState,
     renderer: Renderer,
     pub(super) input: egui_winit::State,
     pub(super) extent: Extent,
-    /// How many keyframes the extent knows.
-    known: usize,
-    /// What shows the picture between the panels.
+    /// Number of keyframes in the extent.
+    known_keyframes: usize,
+    /// Texture that shows the picture between the panels.
     pub(super) texture: TextureId,
-    /// Size of the picture, without the panels \[pixels\].
+    /// Size of the picture without panels \[pixels\].
     pub(super) picture_px: [u32; 2],
     pub(super) window: Arc<Window>,
 }
@@ -45,7 +45,7 @@ impl OpenWindow {
     ) -> Result<Self, RenderError> {
         let attributes = Window::default_attributes()
             .with_title(format!("tautline: {}", timeline.name))
-            .with_inner_size(LogicalSize::new(FIRST_SIZE[0], FIRST_SIZE[1]));
+            .with_inner_size(LogicalSize::new(INITIAL_SIZE[0], INITIAL_SIZE[1]));
         let window = events.create_window(attributes).map_err(|error| RenderError::NoWindow(error.to_string()))?;
         let window = Arc::new(window);
         let context = egui::Context::default();
@@ -63,13 +63,13 @@ impl OpenWindow {
         let side = Some(gpu.largest_px as usize);
         let input = egui_winit::State::new(context, ViewportId::ROOT, &window, Some(scale), None, side);
         let mut renderer = Renderer::on(gpu);
-        let picture_px = fitting(window.inner_size().into(), &renderer);
+        let picture_px = clamped_size(window.inner_size().into(), &renderer);
         let view = &renderer.draw(&Scene::blank(picture_px), false)?.words_view;
         let nearest = wgpu::FilterMode::Nearest;
         let texture = panels.renderer.write().register_native_texture(&panels.device, view, nearest);
-        let (extent, known) = (Extent::of(timeline), timeline.log.keyframes().len());
+        let (extent, known_keyframes) = (Extent::of(timeline), timeline.log.keyframes().len());
         window.request_redraw();
-        Ok(Self { painter, panels, renderer, input, extent, known, texture, picture_px, window })
+        Ok(Self { painter, panels, renderer, input, extent, known_keyframes, texture, picture_px, window })
     }
 
     pub(super) fn resize(&mut self, size_px: [u32; 2]) {
@@ -80,24 +80,24 @@ impl OpenWindow {
         self.window.request_redraw();
     }
 
-    /// Looks again at how far a flight in the air reaches, when it has grown by a tenth.
+    /// Recomputes the extent of a live flight when its number of keyframes has grown by a tenth.
     pub(super) fn update_extent(&mut self, timeline: &Timeline) {
         let now = timeline.log.keyframes().len();
-        if now > self.known + self.known / 10 || now < self.known {
-            (self.extent, self.known) = (Extent::of(timeline), now);
+        if now > self.known_keyframes + self.known_keyframes / 10 || now < self.known_keyframes {
+            (self.extent, self.known_keyframes) = (Extent::of(timeline), now);
         }
     }
 
-    /// Makes room for a picture of this size \[pixels\], if it has another one.
+    /// Resizes the picture \[pixels\] if necessary.
     pub(super) fn fit_picture(&mut self, size_px: [u32; 2]) {
-        let fitting = fitting(size_px, &self.renderer);
-        if fitting != self.picture_px {
-            self.picture_px = fitting;
+        let clamped_size = clamped_size(size_px, &self.renderer);
+        if clamped_size != self.picture_px {
+            self.picture_px = clamped_size;
             self.window.request_redraw();
         }
     }
 
-    /// Draws what is between the panels.
+    /// Draws the picture between the panels.
     pub(super) fn show_picture(&mut self, scene: &Scene) -> Result<(), RenderError> {
         let view = &self.renderer.draw(scene, false)?.words_view;
         let mut panels = self.panels.renderer.write();
@@ -106,7 +106,7 @@ impl OpenWindow {
         Ok(())
     }
 
-    /// Writes the picture as PNG; gives a sentence about it.
+    /// Saves the picture as PNG; returns a message.
     pub(super) fn write_picture(&mut self, scene: &Scene, name: &str, time_s: f64) -> String {
         let path = PathBuf::from(format!("{name}-{time_s:.3}s.png"));
         let png = self.renderer.paint(scene).and_then(|picture| picture.to_png()).map_err(|error| error.to_string());
@@ -116,7 +116,7 @@ impl OpenWindow {
         }
     }
 
-    /// Puts the panels on the window.
+    /// Draws the panels on the window.
     pub(super) fn present(&mut self, mut output: egui::FullOutput) -> Result<(), RenderError> {
         self.input.handle_platform_output(&self.window, std::mem::take(&mut output.platform_output));
         let scale = output.pixels_per_point;
@@ -136,7 +136,7 @@ impl OpenWindow {
     }
 }
 
-/// Starts an adapter that can draw on a window, and what paints panels with it.
+/// Starts an adapter that can draw on a window, and the painter of the panels.
 fn start(
     events: &ActiveEventLoop,
     adapter: &AdapterChoice,
@@ -144,13 +144,13 @@ fn start(
     context: &egui::Context,
 ) -> Result<(Gpu, Painter), RenderError> {
     let instance = instance(Some(Box::new(events.owned_display_handle())));
-    // Without any driver the instance has nothing to make a surface with.
+    // Without a driver the instance cannot create a surface.
     let probe = instance.create_surface(Arc::clone(window)).map_err(|_| RenderError::NoAdapter)?;
     let gpu = Gpu::open(&instance, adapter, Some(&probe))?;
     drop(probe);
     let (adapter, device, queue) = (gpu.adapter.clone(), gpu.device.clone(), gpu.queue.clone());
     let wgpu_setup = WgpuSetupExisting { instance, adapter, device, queue }.into();
-    // In order: where late pictures may overtake, an older one can be left on the window.
+    // Pictures are presented in order: a mode that drops late ones can leave an older picture on the window.
     let surface = SurfaceConfig { present_mode: wgpu::PresentMode::Fifo, ..SurfaceConfig::HIGH_THROUGHPUT };
     let configuration = WgpuConfiguration { wgpu_setup, surface, ..WgpuConfiguration::default() };
     let options = RendererOptions::default();
@@ -160,6 +160,6 @@ fn start(
     Ok((gpu, painter))
 }
 
-fn fitting(size_px: [u32; 2], renderer: &Renderer) -> [u32; 2] {
-    size_px.map(|side| side.clamp(LEAST_PX, renderer.gpu.largest_px))
+fn clamped_size(size_px: [u32; 2], renderer: &Renderer) -> [u32; 2] {
+    size_px.map(|side| side.clamp(MIN_PX, renderer.gpu.largest_px))
 }

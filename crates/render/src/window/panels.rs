@@ -1,4 +1,4 @@
-//! What the window shows around the picture, and what the mouse does.
+//! Panels around the picture, and mouse input.
 
 use egui::{
     Align2, Button, Color32, Key, PointerButton, Rect, RichText, Sense, Slider, Stroke, TextureId, Ui, Vec2, pos2, vec2,
@@ -14,41 +14,41 @@ use tautline_core::swarm::{Pair, row};
 use tautline_report::flight_log::Frame;
 use tautline_sim::plan::Plan;
 
-/// Degrees that the camera turns for a point that the mouse is dragged.
-const TURN_DEG: f64 = 0.35;
-/// Most neighbours of the picked vehicle that are listed.
-const LISTED: usize = 8;
-/// Room for the button of the help \[points\].
+/// Rotation of the camera per point of a mouse drag \[degrees\].
+const DRAG_TURN_DEG: f64 = 0.35;
+/// Largest number of neighbours that are listed for the picked vehicle.
+const MAX_NEIGHBOURS: usize = 8;
+/// Height of the help button \[points\].
 const HELP_HEIGHT: f32 = 28.0;
 
-/// Keys and what they do, for the help.
+/// Keys and their effects, for the help.
 const HELP: [(&str, &str); 14] = [
     ("Space", "play, pause"),
-    ("Left, Right", "a sample back, on"),
-    ("Home, End", "to the start, to the end"),
-    ("N", "to the closest approach"),
+    ("Left, Right", "previous, next sample"),
+    ("Home, End", "start, end"),
+    ("N", "closest approach"),
     ("- , +", "slower, faster"),
     ("drag, W A S D", "turn the camera"),
     ("right drag", "move the camera"),
-    ("wheel, Page Up, Page Down", "nearer, farther"),
-    ("click, V", "pick a vehicle, the next one"),
-    ("F, T", "frame everything, change colours"),
+    ("wheel, Page Up, Page Down", "zoom"),
+    ("click, V", "pick a vehicle, the next vehicle"),
+    ("F, T", "frame everything, change theme"),
     ("1 to 8", "shells, edges, trails, marks, ground, names, closest pair, caption"),
-    ("Tab", "to the next button"),
-    ("P", "write a picture beside you"),
+    ("Tab", "next button"),
+    ("P", "save a picture in the working folder"),
     ("H, Q", "this help, quit"),
 ];
 
-/// The picture, and what is in it.
+/// Picture and its content.
 pub(super) struct Viewport<'a> {
     pub(super) texture: TextureId,
     pub(super) extent: &'a Extent,
-    /// The flight at this time and its draw list; none before its first sample.
+    /// Frame at the current time and its draw list; `None` before the first sample.
     pub(super) drawn: Option<&'a (Frame, Scene)>,
 }
 
 impl Viewport<'_> {
-    /// Where a vehicle is in the picture and how large \[pixels\].
+    /// Returns projection, position and radius of a vehicle in the picture \[pixels\].
     fn on_picture(&self, k: usize, player: &Player) -> Option<(Projected, Vec2, f32)> {
         let (frame, scene) = self.drawn?;
         let at = scene.camera.project(self.extent.place(&frame.positions_m, k)?)?;
@@ -57,7 +57,7 @@ impl Viewport<'_> {
         Some((at, vec2(x, y), radius))
     }
 
-    /// The nearest vehicle whose ball, or a few pixels around its middle, is at a point of the picture.
+    /// Returns the nearest vehicle at a point of the picture, within its ball or a few pixels around its centre.
     fn pick(&self, point: Vec2, player: &Player) -> Option<usize> {
         let depth_m = |k: usize| {
             let (at, place, radius) = self.on_picture(k, player)?;
@@ -68,7 +68,7 @@ impl Viewport<'_> {
     }
 }
 
-/// Draws the panels and the picture; gives the area that is left for the picture \[points\].
+/// Draws the panels and the picture; returns the area left for the picture \[points\].
 pub(super) fn show(ui: &mut Ui, state: &mut WindowState, player: &mut Player, viewport: &Viewport<'_>) -> Rect {
     egui::Panel::bottom("time").show(ui, |ui| controls(ui, state, player));
     egui::Panel::right("sides").default_size(230.0).show(ui, |ui| sides(ui, state, player, viewport));
@@ -91,7 +91,7 @@ fn picture(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Vie
     }
     let drag = response.drag_delta();
     if response.dragged_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) {
-        state.turn(-f64::from(drag.x) * TURN_DEG, f64::from(drag.y) * TURN_DEG);
+        state.turn(-f64::from(drag.x) * DRAG_TURN_DEG, f64::from(drag.y) * DRAG_TURN_DEG);
     } else if response.dragged()
         && let Some((_, scene)) = viewport.drawn
     {
@@ -130,7 +130,7 @@ fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewp
     egui::ScrollArea::vertical().max_height(height).show(ui, |ui| match (state.picked, viewport.drawn) {
         (Some(picked), Some((frame, _))) if picked < player.timeline.count() => vehicle(ui, player, frame, picked),
         _ => {
-            ui.label("Click a vehicle to see its distances and forces.");
+            ui.label("Click a vehicle to see its separations and tensions.");
         }
     });
     ui.with_layout(egui::Layout::bottom_up(egui::Align::LEFT), |ui| {
@@ -140,17 +140,17 @@ fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewp
     });
 }
 
-/// Play, step, scrub, speed.
+/// Draws the buttons, the time slider and the speed.
 fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
     ui.add_space(3.0);
     ui.horizontal(|ui| {
         let play = Button::new(if player.playing { "Pause" } else { "Play" }).min_size(vec2(56.0, 18.0));
         let buttons = [
-            (Button::new("|<"), "to the start (Home)", Key::Home),
-            (Button::new("<"), "a sample back (Left)", Key::ArrowLeft),
+            (Button::new("|<"), "start (Home)", Key::Home),
+            (Button::new("<"), "previous sample (Left)", Key::ArrowLeft),
             (play, "Space", Key::Space),
-            (Button::new(">"), "a sample on (Right)", Key::ArrowRight),
-            (Button::new(">|"), "to the end (End)", Key::End),
+            (Button::new(">"), "next sample (Right)", Key::ArrowRight),
+            (Button::new(">|"), "end (End)", Key::End),
         ];
         for (button, what, key) in buttons {
             if ui.add(button).on_hover_text(what).clicked() {
@@ -168,22 +168,22 @@ fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
             player.seek(time_s);
         }
         if ui.small_button("-").on_hover_text("slower (-)").clicked() {
-            player.faster(false);
+            player.change_speed(false);
         }
         ui.label(format!("{} x", player.speed));
         if ui.small_button("+").on_hover_text("faster (+)").clicked() {
-            player.faster(true);
+            player.change_speed(true);
         }
         if player.is_live() {
             ui.label(RichText::new("live").strong());
         }
     });
-    // Its line is always there, so that the picture keeps its size.
-    ui.add(egui::Label::new(player.said.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
+    // The message line is always present, so that the picture keeps its size.
+    ui.add(egui::Label::new(player.end_message.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
     ui.add_space(2.0);
 }
 
-/// What is known of a vehicle at a time.
+/// Draws the state of a vehicle at a time.
 fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
     let timeline = &player.timeline;
     ui.label(RichText::new(format!("Vehicle {}", timeline.vehicles[k])).strong());
@@ -211,23 +211,26 @@ fn vehicle(ui: &mut Ui, player: &Player, frame: &Frame, k: usize) {
             }
             ui.end_row();
         };
-        row(ui, ["to", "distance", "tension"]);
-        for (distance_m, other) in others.into_iter().take(LISTED) {
-            let tension =
-                timeline.plan.as_ref().map(|plan| in_words(plan, Pair::new(k, other), distance_m, frame.time_s));
+        row(ui, ["to", "separation", "tension"]);
+        for (distance_m, other) in others.into_iter().take(MAX_NEIGHBOURS) {
+            let tension = timeline
+                .plan
+                .as_ref()
+                .map(|plan| describe_tension(plan, Pair::new(k, other), distance_m, frame.time_s));
             row(ui, [&timeline.vehicles[other], &metres(distance_m), &tension.unwrap_or_default()]);
         }
     });
 }
 
-/// How far a vehicle's axis of thrust is from upright, and where it looks, from the x axis towards the y axis \[degrees\].
+/// Returns the angle of the thrust axis from the vertical, and the heading from the x axis towards the y axis
+/// \[degrees\].
 fn tilt_and_heading_deg(attitude: &UnitQuaternion<f64>) -> (f64, f64) {
     let (up, ahead) = (attitude * Vector3::z(), attitude * Vector3::x());
     (up.xy().norm().atan2(up.z).to_degrees(), ahead.y.atan2(ahead.x).to_degrees())
 }
 
-/// How hard an edge pulls or pushes, or by how much it is too long where the law has no tension.
-fn in_words(plan: &Plan, pair: Pair, distance_m: f64, time_s: f64) -> String {
+/// Describes the acceleration of an edge, or its relative elongation if the law has no tension.
+fn describe_tension(plan: &Plan, pair: Pair, distance_m: f64, time_s: f64) -> String {
     if plan.graph.later_neighbours(pair.first()).all(|other| other != pair.second()) {
         return "no edge".to_owned();
     }
@@ -255,10 +258,10 @@ fn help(context: &egui::Context, open: &mut bool) {
     });
 }
 
-/// Most points of the plot.
-const PLOT_POINTS: usize = 600;
+/// Largest number of points in the plot.
+const MAX_PLOT_POINTS: usize = 600;
 
-/// The smallest separation over time against delta, with where one is.
+/// Draws the smallest separation over time with delta and the current time.
 fn plot(ui: &mut Ui, player: &Player) {
     let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), 120.0), Sense::hover());
     let painter = ui.painter_at(area);
@@ -270,10 +273,10 @@ fn plot(ui: &mut Ui, player: &Player) {
     let keyframes = player.timeline.log.keyframes();
     let separations: Vec<_> =
         keyframes.iter().filter_map(|keyframe| Some([keyframe.time_s, keyframe.closest?.separation_m])).collect();
-    // The smallest of those that share a point is what counts.
+    // A point shows the smallest of its separations.
     let smallest =
         |shared: &[[f64; 2]]| [shared[0][0], shared.iter().fold(f64::INFINITY, |least, at| least.min(at[1]))];
-    let points: Vec<_> = separations.chunks(keyframes.len().div_ceil(PLOT_POINTS).max(1)).map(smallest).collect();
+    let points: Vec<_> = separations.chunks(keyframes.len().div_ceil(MAX_PLOT_POINTS).max(1)).map(smallest).collect();
     let values = || points.iter().map(|point| point[1]).chain(delta_m);
     let top = values().fold(0.0, f64::max) * 1.1;
     let bottom = (values().fold(f64::INFINITY, f64::min) * 0.9).min(top);
@@ -308,7 +311,7 @@ fn plot(ui: &mut Ui, player: &Player) {
     }
 }
 
-/// The colour of the numbers of the plot.
+/// Returns the colour of the plot's numbers.
 fn plot_ink(visuals: &egui::Visuals) -> Color32 {
     visuals.text_color()
 }
@@ -325,23 +328,23 @@ mod tests {
     }
 
     #[test]
-    fn the_table_gives_the_acceleration_of_an_edge_and_no_share_of_a_limit() {
+    fn the_table_shows_the_acceleration_of_an_edge() {
         let (plan, pair) = (plan("pentagon"), Pair::new(0, 1));
         let pushed = plan.pull_m_s2(pair, 2.001, 0.0).expect("a tension");
         assert!(
             pushed < -10.0 && plan.tension(pair, 2.001, 0.0) == -1.0,
             "{pushed} m/s^2, far below the limit of the colour"
         );
-        assert_eq!(in_words(&plan, pair, 2.001, 0.0), format!("push {:.2} m/s\u{b2}", -pushed));
+        assert_eq!(describe_tension(&plan, pair, 2.001, 0.0), format!("push {:.2} m/s\u{b2}", -pushed));
         let pulled = plan.pull_m_s2(pair, 9.0, 0.0).expect("a tension");
-        assert_eq!(in_words(&plan, pair, 9.0, 0.0), format!("pull {pulled:.2} m/s\u{b2}"));
+        assert_eq!(describe_tension(&plan, pair, 9.0, 0.0), format!("pull {pulled:.2} m/s\u{b2}"));
         let rest_m = plan.formation_at(0.0).desired_distance(0, 1);
-        assert_eq!(in_words(&plan, pair, rest_m, 0.0), "rest");
-        assert_eq!(in_words(&plan, pair, 2.0, 0.0), "inside delta");
+        assert_eq!(describe_tension(&plan, pair, rest_m, 0.0), "rest");
+        assert_eq!(describe_tension(&plan, pair, 2.0, 0.0), "inside delta");
     }
 
     #[test]
-    fn tilt_is_from_upright_and_heading_from_x_to_y() {
+    fn tilt_is_measured_from_the_vertical_and_heading_from_x_to_y() {
         let (ahead, left) = (Vector3::x_axis(), Vector3::y_axis());
         let yawed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5);
         let (tilt, heading) = tilt_and_heading_deg(&(yawed * UnitQuaternion::from_axis_angle(&left, 0.3)));
@@ -351,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn the_accelerations_of_its_edges_add_up_to_what_the_law_commands() {
+    fn edge_accelerations_add_up_to_the_command() {
         let scenario = Scenario::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("built in");
         let (plan, swarm) = (Plan::of(&scenario), Swarm::at_rest(scenario.start.positions_m.clone()));
         let mut control = Rows::zeros(swarm.count());
@@ -367,17 +370,17 @@ mod tests {
     }
 
     #[test]
-    fn two_without_an_edge_have_no_tension_and_springs_are_long_or_short() {
+    fn a_pair_without_an_edge_has_no_tension_and_springs_have_an_elongation() {
         let mut ring = plan("pentagon");
         ring.graph = Graph::ring(5);
-        assert_eq!(in_words(&ring, Pair::new(0, 2), 3.0, 0.0), "no edge");
+        assert_eq!(describe_tension(&ring, Pair::new(0, 2), 3.0, 0.0), "no edge");
         let springs = plan("pentagon-laplacian");
         let rest_m = springs.formation_at(0.0).desired_distance(0, 1);
-        assert_eq!(in_words(&springs, Pair::new(0, 1), 1.5 * rest_m, 0.0), "50 % too long");
+        assert_eq!(describe_tension(&springs, Pair::new(0, 1), 1.5 * rest_m, 0.0), "50 % too long");
     }
 
     #[test]
-    fn the_numbers_of_the_plot_stand_out_from_its_ground() {
+    fn the_numbers_of_the_plot_have_enough_contrast() {
         for visuals in [egui::Visuals::dark(), egui::Visuals::light()] {
             let luminance = |colour: Color32| {
                 let [red, green, blue, _] = egui::Rgba::from(colour).to_array();

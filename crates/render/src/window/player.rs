@@ -1,32 +1,32 @@
-//! Where in a flight the window is, and how it goes on.
+//! Playback: current time, speed, and updates of a live flight.
 
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use crate::timeline::Timeline;
 use tautline_core::record::{Event, OwnedSample};
 
-/// Speeds that keys go through.
+/// Available speeds.
 const SPEEDS: [f64; 10] = [0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
-/// Most that is taken from a flight in the air before a picture is drawn.
-const TAKEN_AT_ONCE: usize = 2000;
+/// Largest number of live updates that are processed per picture.
+const MAX_UPDATES: usize = 2000;
 
-/// What a flight in the air sends.
+/// Update of a live flight.
 #[derive(Clone, Debug)]
 pub enum LiveUpdate {
-    /// A sample.
+    /// Sample.
     Sample(Box<OwnedSample>),
-    /// An event.
+    /// Event.
     Event(Event),
-    /// The end, with a sentence where something went wrong.
+    /// End of the flight, with a message after an error.
     Ended(Option<String>),
 }
 
-/// A flight being watched.
+/// Flight with its playback state.
 pub(super) struct Player {
     pub(super) timeline: Timeline,
     live: Option<Receiver<LiveUpdate>>,
-    /// What the flight said at its end.
-    pub(super) said: Option<String>,
+    /// Message at the end of the flight.
+    pub(super) end_message: Option<String>,
     pub(super) time_s: f64,
     pub(super) playing: bool,
     pub(super) speed: f64,
@@ -35,18 +35,18 @@ pub(super) struct Player {
 impl Player {
     pub(super) fn new(timeline: Timeline, live: Option<Receiver<LiveUpdate>>) -> Self {
         let time_s = timeline.log.range_s()[0];
-        Self { timeline, live, said: None, time_s, playing: true, speed: 1.0 }
+        Self { timeline, live, end_message: None, time_s, playing: true, speed: 1.0 }
     }
 
-    /// Whether the flight is still being flown.
+    /// Returns whether the flight is still in progress.
     pub(super) fn is_live(&self) -> bool {
         self.live.is_some()
     }
 
-    /// Takes what has been flown; whether there was anything.
+    /// Processes live updates; returns whether there were any.
     pub(super) fn receive(&mut self) -> bool {
         let Some(live) = &self.live else { return false };
-        for taken in 0..TAKEN_AT_ONCE {
+        for taken in 0..MAX_UPDATES {
             match live.try_recv() {
                 Ok(LiveUpdate::Sample(sample)) => {
                     if let Err(error) = self.timeline.take_checked(&sample.as_sample()) {
@@ -54,7 +54,7 @@ impl Player {
                     }
                 }
                 Ok(LiveUpdate::Event(event)) => self.timeline.note(&event),
-                Ok(LiveUpdate::Ended(said)) => return self.end(said),
+                Ok(LiveUpdate::Ended(end_message)) => return self.end(end_message),
                 Err(TryRecvError::Empty) => return taken > 0,
                 Err(TryRecvError::Disconnected) => return self.end(None),
             }
@@ -62,13 +62,13 @@ impl Player {
         true
     }
 
-    /// Watches the flight no further.
-    fn end(&mut self, said: Option<String>) -> bool {
-        (self.said, self.live) = (said, None);
+    /// Ends the live mode.
+    fn end(&mut self, end_message: Option<String>) -> bool {
+        (self.end_message, self.live) = (end_message, None);
         true
     }
 
-    /// Lets time pass; at the end of a flight that has ended it stops, at the end of one in the air it waits.
+    /// Advances the time. Playback stops at the end of a finished flight and waits at the end of a live one.
     pub(super) fn advance(&mut self, seconds: f64) {
         let [first_s, last_s] = self.timeline.log.range_s();
         if self.playing {
@@ -80,7 +80,7 @@ impl Player {
         self.time_s = self.time_s.clamp(first_s, last_s.max(first_s));
     }
 
-    /// Plays or pauses; from the end it plays again from the start.
+    /// Plays or pauses; at the end it plays from the start.
     pub(super) fn toggle(&mut self) {
         let [first_s, last_s] = self.timeline.log.range_s();
         if !self.playing && self.time_s >= last_s && !self.is_live() {
@@ -94,13 +94,13 @@ impl Player {
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
-    /// Goes so many samples on, or back.
+    /// Steps by a number of samples, forward or back.
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
         let keyframes = self.timeline.log.keyframes();
         let at = keyframes.partition_point(|keyframe| keyframe.time_s <= self.time_s).saturating_sub(1);
         let between = keyframes.get(at).is_some_and(|keyframe| keyframe.time_s < self.time_s);
-        // Back from between two samples is the one before.
+        // A step back from between two samples goes to the sample before.
         let by = if samples < 0 && between { samples + 1 } else { samples };
         let to = at.saturating_add_signed(by).min(keyframes.len().saturating_sub(1));
         if let Some(keyframe) = keyframes.get(to) {
@@ -108,8 +108,8 @@ impl Player {
         }
     }
 
-    /// The next speed up, or down.
-    pub(super) fn faster(&mut self, up: bool) {
+    /// Selects the next higher or lower speed.
+    pub(super) fn change_speed(&mut self, up: bool) {
         let next = if up {
             SPEEDS.into_iter().find(|&speed| speed > self.speed)
         } else {
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn playing_ends_at_the_end_and_starts_again_from_the_start() {
+    fn playback_stops_at_the_end_and_restarts_from_the_start() {
         let mut player = player();
         player.advance(0.75);
         assert_eq!((player.time_s, player.playing), (0.75, true));
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_in_the_air_that_leaves_all_measure_is_watched_no_further() {
+    fn a_live_flight_with_too_large_coordinates_is_ended() {
         let (sender, receiver) = std::sync::mpsc::channel();
         let mut player = Player::new(Timeline::new("one", 1), Some(receiver));
         let mut gone = sample(1.0);
@@ -184,21 +184,21 @@ mod tests {
         }
         assert!(player.receive() && !player.is_live());
         assert_eq!(player.timeline.log.range_s(), [0.0, 0.0]);
-        let said = player.said.expect("a sentence");
-        assert!(said.starts_with("vehicle 1 has a coordinate of -10000000000.0 m at 1 s"), "{said}");
+        let end_message = player.end_message.expect("a message");
+        assert!(end_message.starts_with("vehicle 1 has a coordinate of -10000000000.0 m at 1 s"), "{end_message}");
     }
 
     #[test]
-    fn speed_goes_up_and_down_and_stays_in_range() {
+    fn the_speed_changes_and_stays_in_range() {
         let mut player = player();
-        player.faster(true);
+        player.change_speed(true);
         assert_eq!(player.speed, 2.0);
-        (0..20).for_each(|_| player.faster(false));
+        (0..20).for_each(|_| player.change_speed(false));
         assert_eq!(player.speed, 0.05);
     }
 
     #[test]
-    fn a_flight_in_the_air_is_waited_for() {
+    fn playback_waits_for_a_live_flight() {
         let (sender, receiver) = std::sync::mpsc::channel();
         let mut player = Player::new(Timeline::new("one", 1), Some(receiver));
         sender.send(LiveUpdate::Sample(Box::new(sample(0.0)))).expect("sent");
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!((player.time_s, player.playing, player.is_live()), (1.0, true, true));
         sender.send(LiveUpdate::Ended(Some("it broke".to_owned()))).expect("sent");
         assert!(player.receive() && !player.is_live());
-        assert_eq!(player.said.as_deref(), Some("it broke"));
+        assert_eq!(player.end_message.as_deref(), Some("it broke"));
         player.advance(0.1);
         assert!(!player.playing);
     }

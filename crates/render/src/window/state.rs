@@ -1,4 +1,4 @@
-//! What the person has chosen, and what keys do.
+//! State of the window that the user controls, and keyboard input.
 
 use egui::{Key, Vec2};
 use nalgebra::Vector3;
@@ -6,10 +6,10 @@ use nalgebra::Vector3;
 use super::player::Player;
 use crate::scene::{Camera, Extent, Layers, Orbit, TAN_HALF_VIEW, Theme, View};
 
-/// Degrees that the camera turns for a key.
+/// Rotation of the camera per key press \[degrees\].
 const KEY_TURN_DEG: f64 = 5.0;
 
-/// What the person has chosen.
+/// State of the window that the user controls.
 #[expect(clippy::struct_excessive_bools, reason = "each is on or off by itself")]
 pub(super) struct WindowState {
     orbit: Orbit,
@@ -18,13 +18,13 @@ pub(super) struct WindowState {
     pub(super) theme: Theme,
     pub(super) picked: Option<usize>,
     pub(super) help: bool,
-    /// The camera follows the extent of the flight until somebody moves it.
+    /// Whether the camera frames the whole flight; a camera movement ends it.
     pub(super) framed: bool,
     pub(super) message: Option<String>,
-    /// A picture is to be written.
+    /// Whether a picture is to be saved.
     pub(super) wants_picture: bool,
-    /// The window is to be closed.
-    pub(super) quits: bool,
+    /// Whether the window is to be closed.
+    pub(super) is_closing: bool,
 }
 
 impl WindowState {
@@ -39,7 +39,7 @@ impl WindowState {
             framed: true,
             message: None,
             wants_picture: false,
-            quits: false,
+            is_closing: false,
         }
     }
 
@@ -67,14 +67,14 @@ impl WindowState {
         self.framed = false;
     }
 
-    /// Moves what is looked at with the mouse, in a picture so many points high.
+    /// Moves the target with the mouse, in a picture of this height \[points\].
     pub(super) fn pan(&mut self, drag: Vec2, camera: &Camera, height: f32) {
         let metres = 2.0 * TAN_HALF_VIEW * self.orbit.distance_m / f64::from(height.max(1.0));
         self.target_m += (camera.up * f64::from(drag.y) - camera.right * f64::from(drag.x)) * metres;
         self.framed = false;
     }
 
-    /// What can be shown, with its names, in the order of its keys.
+    /// Returns the layers with their names, in the order of their keys.
     pub(super) fn layers(&mut self) -> [(&'static str, &mut bool); 8] {
         let layers = &mut self.layers;
         [
@@ -90,12 +90,12 @@ impl WindowState {
     }
 
     pub(super) fn keys(&mut self, context: &egui::Context, player: &mut Player) {
-        // A field being typed into has its keys to itself; any other field in focus has those that work it.
+        // A text field in focus receives all keys, any other field only the keys that operate it.
         let focus = context.memory(egui::Memory::focused);
         if focus.is_some_and(|id| egui::text_edit::TextEditState::load(context, id).is_some()) {
             return;
         }
-        let works_it = |key: Key| {
+        let operates_focus = |key: Key| {
             matches!(key, Key::Space | Key::Enter | Key::ArrowLeft | Key::ArrowRight | Key::Escape) && focus.is_some()
         };
         let pressed: Vec<Key> = context.input(|input| {
@@ -105,14 +105,14 @@ impl WindowState {
             };
             input.events.iter().filter_map(pressed).collect()
         });
-        // What was said last is read by now.
+        // A key press clears the last message.
         if !pressed.is_empty() {
             self.message = None;
         }
-        pressed.into_iter().filter(|&key| !works_it(key)).for_each(|key| self.press(key, player));
+        pressed.into_iter().filter(|&key| !operates_focus(key)).for_each(|key| self.press(key, player));
     }
 
-    /// Does what a key, or the button that stands for it, is for.
+    /// Performs the action of a key or of its button.
     pub(super) fn press(&mut self, key: Key, player: &mut Player) {
         match key {
             Key::Space => player.toggle(),
@@ -126,8 +126,8 @@ impl WindowState {
                     player.seek(closest.time_s);
                 }
             }
-            Key::Minus => player.faster(false),
-            Key::Plus | Key::Equals => player.faster(true),
+            Key::Minus => player.change_speed(false),
+            Key::Plus | Key::Equals => player.change_speed(true),
             Key::A => self.turn(-KEY_TURN_DEG, 0.0),
             Key::D => self.turn(KEY_TURN_DEG, 0.0),
             Key::W => self.turn(0.0, KEY_TURN_DEG),
@@ -146,7 +146,7 @@ impl WindowState {
             Key::P => self.wants_picture = true,
             Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
             Key::Escape if self.help => self.help = false,
-            Key::Q | Key::Escape => self.quits = true,
+            Key::Q | Key::Escape => self.is_closing = true,
             digit => {
                 if let Ok(number @ 1..=8) = digit.name().parse::<usize>() {
                     let (_, shown) = &mut self.layers()[number - 1];
