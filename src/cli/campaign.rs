@@ -16,8 +16,8 @@ use tautline_studies::campaign::{
 /// Arguments of `tautline campaign`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 no violation (`missing`: no missing shard); 1 violations, unknown flights, or interrupted; 2 wrong input; \
-3 failure of the machine. See docs/campaigns.md for all causes.")]
+Exit codes: 0 no violation (`missing`: no missing shard); 1 violations, unknown flights, or interrupted; 2 wrong \
+input; 3 failure of the machine. See docs/campaigns.md for all causes.")]
 pub(super) struct CampaignArguments {
     #[command(subcommand)]
     command: CampaignCommand,

@@ -46,8 +46,8 @@ const ASSUMED: [&str; 4] = [
     CAVEAT,
     "The search minimises the smallest separation of two vehicles, also between samples. Clearances of obstacles are \
      judged, but not minimised.",
-    "Bounds are a box: each number varies independently of the others. Candidates that cannot be flown, such as a start \
-     of two vehicles within delta, cost no flight.",
+    "Bounds are a box: each number varies independently of the others. Candidates that cannot be flown, such as a \
+     start of two vehicles within delta, cost no flight.",
     "Noise has the seed of the scenario, or with --seeds also the next: a seed does not make a scenario harder.",
 ];
 
