@@ -2,7 +2,7 @@
 
 use tautline_core::record::{Channel, OwnedSample, ReadFault};
 
-use super::own::{Run, fault, hash, read, recorded};
+use super::run_recording::{Run, fault, hash, read, recorded};
 
 /// Returns a channel of a synthetic sensor that measures `columns` of every vehicle.
 fn channel(name: &str, columns: &[&str], vehicles: usize, seed: f64) -> Channel {

@@ -8,7 +8,7 @@ use mcap::Message;
 use tautline_core::record::Sink as _;
 use tautline_recordings::mcap::{McapRecorder, McapRecording, RunAudit, RunFinding, StoredAudit};
 
-use super::own::{Run, folder};
+use super::run_recording::{Run, folder};
 
 fn audit() -> RunAudit {
     let closest = RunFinding { vehicle: 1, other_vehicle: 2, limit_m: 2.0, min_m: 2.5, ..RunFinding::default() };
