@@ -64,14 +64,14 @@ fn refused(folder: &Path, arguments: &[&str], said: &str, remedy: &str) {
 #[test]
 fn nested_folders_are_named_with_a_remedy() {
     let both = both(&[("day1/a.csv", A.as_bytes()), ("day1/b.csv", B.as_bytes()), ("day2/a.csv", A.as_bytes())]);
-    let said = "its tables lie in folders: day1/ (2 tables), day2/ (1 table)";
-    refused(both.path(), &["flight.zip"], said, "unpack it, and give a folder of it: day1");
+    let said = "its tables are in folders: day1/ (2 tables), day2/ (1 table)";
+    refused(both.path(), &["flight.zip"], said, "unpack it, and give one of its folders: day1");
     refused(both.path(), &["flight"], said, "give one of them: flight/day1");
     let one = audit(both.path(), &["flight/day1"]);
     assert_eq!(one.exit, Some(0), "{one:?}");
     // Beside another file, nested tables are named too.
     fs::write(both.path().join("c.csv"), A).expect("written");
-    refused(both.path(), &["--join", "c.csv", "flight"], "some of its tables lie in folders: day1/", "flight/day1");
+    refused(both.path(), &["--join", "c.csv", "flight"], "some of its tables are in folders: day1/", "flight/day1");
     // Curves in folders are read in order; in an archive, files at the top come before folders.
     let curves = self::both(&[("a/1.csv", CURVES[0].as_bytes()), ("b/1.csv", CURVES[1].as_bytes())]);
     for path in ["flight", "flight.zip"] {
@@ -154,7 +154,7 @@ fn two_entries_of_one_name_are_refused() {
         bytes[at..at + 9].copy_from_slice(b"one/x.csv");
     }
     let folder = folder(&[("twice.zip", &bytes)]);
-    refused(folder.path(), &["twice.zip"], "two of its entries are called `one/x.csv`", "unpack it");
+    refused(folder.path(), &["twice.zip"], "two entries have the name `one/x.csv`", "unpack it");
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn errors_in_joined_files_name_their_file() {
     ]);
     for (files, said) in [
         (["a.csv", "late.csv"], "late.csv: the clock of `late` begins more than a month"),
-        (["a.csv", "other/a.csv"], "other/a.csv: the vehicle of a.csv is called `a` too"),
+        (["a.csv", "other/a.csv"], "other/a.csv: the vehicle of a.csv has the same name `a`"),
         (["a.csv", "wrong.csv"], "wrong.csv, line 2: column `y` holds `zero`"),
         (["a.csv", "nowhere.csv"], "nowhere.csv: "),
         (["a.csv", "radius.csv"], "a.csv, radius.csv: vehicle radius at 1.0 s: the radius changes"),

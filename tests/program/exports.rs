@@ -93,7 +93,7 @@ fn wrong_input_ends_with_2_and_leaves_no_file() {
     fs::write(folder.path().join("wrong.csv"), LONG.replace("3.5", "three")).expect("written");
     for (arguments, words) in [
         (vec!["wrong.csv", "-o", "out.npz"], ["wrong.csv, line 4", "`three`"]),
-        (vec!["missing.csv", "-o", "out.npz"], ["missing.csv", "spelling"]),
+        (vec!["missing.csv", "-o", "out.npz"], ["missing.csv", "check the path"]),
         (vec!["flight.csv", "-o", "out"], ["has no extension of a known format", "--format"]),
         (vec!["flight.csv", "-o", "out.npz", "--scale", "-1"], ["--scale", "positive"]),
         (vec!["flight.csv", "-o", "out.npz", "--column", "w=x"], ["unknown role `w`", "radius"]),

@@ -184,7 +184,7 @@ fn invalid_requests_are_refused_with_a_remedy() {
         (&["out/run.mcap", "--out", "refused", "--size", "60000x9"], WRONG_INPUT, "pixels a side"),
         (&["out/run.mcap", "--adapter", "no such adapter"], WRONG_INPUT, "there is no `no such adapter` adapter"),
         (&["nowhere.mcap"], WRONG_INPUT, "nowhere.mcap"),
-        (&["noise.mcap"], WRONG_INPUT, "noise.mcap, line 1: there is no column for time"),
+        (&["noise.mcap"], WRONG_INPUT, "noise.mcap, line 1: no column gives time"),
         (&["empty.mcap"], WRONG_INPUT, "no samples"),
         (&["out/run.mcap", "--out", "a-file/below"], MACHINE_FAILED, "cannot write to a-file/below"),
         (&["out/run.mcap", "--film", "a-file/film.gif"], MACHINE_FAILED, "cannot write to a-file"),

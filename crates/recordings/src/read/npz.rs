@@ -119,8 +119,8 @@ fn axis(name: &str) -> Option<ArrayAxis> {
     }
 }
 
-/// Returns the layout of an array of positions with this shape and number of times; `known_axes` holds the known leading
-/// axes. Only lengths distinguish the axes, so that several layouts may fit: then the array is refused.
+/// Returns the layout of an array of positions with this shape and number of times; `known_axes` holds the known
+/// leading axes. Only lengths distinguish the axes, so that several layouts may fit: then the array is refused.
 fn layout(shape: [usize; 3], times: usize, known_axes: &[ArrayAxis]) -> Result<ArrayLayout, Fault> {
     let fits = |layout: &ArrayLayout| {
         layout.starts_with(known_axes)

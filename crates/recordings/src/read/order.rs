@@ -43,8 +43,8 @@ pub(super) struct RecordingInfo {
 }
 
 impl RecordingInfo {
-    /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of the
-    /// file.
+    /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of
+    /// the file.
     pub(super) fn new(
         source: &Source,
         options: &ReadOptions,

@@ -23,9 +23,12 @@ fn refused(valid: &str, changes: &[(&str, &str, &str, &str)]) {
 }
 
 const VVIZ: &str = concat!(
-    r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl", "#,
-    r#""defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": [ "#,
-    r#"{"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": [ "#,
+    r#"{"version": "1.0", "performanceName": "test", "coordinateFrame": "ogl","#,
+    "\n",
+    r#""defaultPositionRate": 2.0, "defaultColorRate": 10.0, "timeOffsetSecs": 100.0, "performances": ["#,
+    "\n",
+    r#"{"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": ["#,
+    "\n",
     r#"{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]}, "#,
     r#""payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "#,
     r#""b": 3, "frames": 4}]}]}, "#,
